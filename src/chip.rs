@@ -1,0 +1,3 @@
+//! The substrate: unsigned crossbars, their periphery, and the engine that drives them.
+
+pub mod crossbar;

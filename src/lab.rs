@@ -1,0 +1,3 @@
+//! Everything around a run: files in, files out.
+
+pub mod data;

@@ -1,0 +1,1 @@
+//! Data sets, and the door from files to [`crate::task::classify::Examples`].

@@ -1,0 +1,1 @@
+//! Tables: floats in, integers out, at load only.

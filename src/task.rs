@@ -1,0 +1,3 @@
+//! What the substrate is asked to learn.
+
+pub mod classify;

@@ -1,0 +1,5 @@
+//! Classification of labelled images.
+
+mod examples;
+
+pub use examples::{Examples, ExamplesError, Split};

@@ -1,0 +1,219 @@
+//! Labelled data as it enters a run: unsigned values with a common full scale, in file order.
+//!
+//! ```text
+//! code = floor( (2 x (2^drive_bits - 1) + M) / (2 M) )          x in 0 ..= M, M the full scale
+//! ```
+//!
+//! See docs/MODEL.md, 1.
+#![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
+
+use crate::num::fixed::DriveBits;
+
+/// Why values and labels do not make a set of examples.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum ExamplesError {
+    /// Values do not divide into rows.
+    #[error("{values} values do not make {examples} examples of {features} features")]
+    Shape {
+        /// Values found.
+        values: usize,
+        /// Labels found.
+        examples: usize,
+        /// Features an example.
+        features: usize,
+    },
+    /// A value above the full scale.
+    #[error("example {example} holds the value {found}, above the full scale {full_scale}")]
+    Value {
+        /// Which example, counted from 0.
+        example: usize,
+        /// The value.
+        found: u8,
+        /// Greatest value allowed.
+        full_scale: u8,
+    },
+    /// A label beyond the last class.
+    #[error("example {example} has the label {found}, but there are {classes} classes (0..={})", .classes - 1)]
+    Label {
+        /// Which example, counted from 0.
+        example: usize,
+        /// The label.
+        found: u8,
+        /// Number of classes.
+        classes: usize,
+    },
+}
+
+/// Labelled examples. Every value is at most `full_scale`, every label below `classes`.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Examples {
+    values: Vec<u8>,
+    labels: Vec<u8>,
+    features: usize,
+    full_scale: u8,
+    classes: usize,
+}
+
+impl Examples {
+    /// Checks and keeps `values` (example after example, `features` each) and `labels`.
+    ///
+    /// # Errors
+    /// When the shapes disagree, a value is above `full_scale` or a label not below `classes`.
+    ///
+    /// # Panics
+    /// When `features`, `full_scale` or `classes` is 0, or `classes` is above 256.
+    pub fn new(
+        values: Vec<u8>,
+        labels: Vec<u8>,
+        features: usize,
+        full_scale: u8,
+        classes: usize,
+    ) -> Result<Self, ExamplesError> {
+        assert!(features > 0 && full_scale > 0, "an example has features with a range");
+        assert!((1..=256).contains(&classes), "labels are bytes");
+        if labels.len().checked_mul(features) != Some(values.len()) {
+            let (values, examples) = (values.len(), labels.len());
+            return Err(ExamplesError::Shape { values, examples, features });
+        }
+        if let Some(at) = values.iter().position(|&v| v > full_scale) {
+            let (example, found) = (at / features, values[at]);
+            return Err(ExamplesError::Value { example, found, full_scale });
+        }
+        if let Some(example) = labels.iter().position(|&label| usize::from(label) >= classes) {
+            return Err(ExamplesError::Label { example, found: labels[example], classes });
+        }
+        Ok(Self { values, labels, features, full_scale, classes })
+    }
+
+    /// Number of examples.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.labels.len()
+    }
+
+    /// Whether there is no example.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.labels.is_empty()
+    }
+
+    /// Values of one example, row-major.
+    #[must_use]
+    pub fn values(&self, example: usize) -> &[u8] {
+        &self.values[example * self.features..][..self.features]
+    }
+
+    /// Values of all examples.
+    #[must_use]
+    pub fn all_values(&self) -> &[u8] {
+        &self.values
+    }
+
+    /// Labels of all examples.
+    #[must_use]
+    pub fn labels(&self) -> &[u8] {
+        &self.labels
+    }
+
+    /// Values an example has.
+    #[must_use]
+    pub const fn features(&self) -> usize {
+        self.features
+    }
+
+    /// Greatest value.
+    #[must_use]
+    pub const fn full_scale(&self) -> u8 {
+        self.full_scale
+    }
+
+    /// Number of classes.
+    #[must_use]
+    pub const fn classes(&self) -> usize {
+        self.classes
+    }
+
+    /// Splits off the examples from `at` on.
+    ///
+    /// # Panics
+    /// When `at` is beyond the end.
+    #[must_use]
+    pub fn split_at(mut self, at: usize) -> (Self, Self) {
+        let values = self.values.split_off(at * self.features);
+        let labels = self.labels.split_off(at);
+        let rest = Self { values, labels, ..self };
+        (self, rest)
+    }
+
+    /// The examples of `self`, then those of `other`.
+    ///
+    /// # Panics
+    /// When the two differ in features, full scale or classes.
+    #[must_use]
+    pub fn joined(mut self, other: &Self) -> Self {
+        let shape = |e: &Self| (e.features, e.full_scale, e.classes);
+        assert_eq!(shape(&self), shape(other), "only sets of one kind are joined");
+        self.values.extend_from_slice(&other.values);
+        self.labels.extend_from_slice(&other.labels);
+        self
+    }
+
+    /// The drive code of every possible value.
+    #[must_use]
+    pub fn codes(&self, bits: DriveBits) -> [u8; 256] {
+        let (scale, code_max) = (u32::from(self.full_scale), u32::from(bits.code_max()));
+        std::array::from_fn(|value| {
+            let value = (value as u32).min(scale);
+            u8::try_from((2 * value * code_max + scale) / (2 * scale)).expect("code <= code_max")
+        })
+    }
+}
+
+/// A data set: what is learnt from, what is chosen on, and what is read once at the end.
+#[derive(Debug, Clone)]
+pub struct Split {
+    /// Training half.
+    pub train: Examples,
+    /// Validation part, cut from the end of the training half.
+    pub validation: Examples,
+    /// Test half.
+    pub test: Examples,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn codes_round_half_up_and_reach_both_ends() {
+        let set = Examples::new(vec![], vec![], 1, 16, 2).unwrap();
+        let codes = set.codes(DriveBits::new(8).unwrap());
+        assert_eq!([0, 1, 8, 16].map(|x| codes[x]), [0, 16, 128, 255]);
+        let codes = set.codes(DriveBits::new(1).unwrap());
+        assert_eq!([0, 7, 8, 16].map(|x| codes[x]), [0, 0, 1, 1]);
+        let set = Examples::new(vec![], vec![], 1, 255, 2).unwrap();
+        let codes = set.codes(DriveBits::new(8).unwrap());
+        assert!((0..256).all(|x| usize::from(codes[x]) == x));
+    }
+
+    #[test]
+    fn values_and_labels_are_checked_at_the_door() {
+        let new = |values: &[u8], labels: &[u8]| {
+            Examples::new(values.to_vec(), labels.to_vec(), 2, 16, 3).map(|e| e.len())
+        };
+        assert_eq!(new(&[0, 16, 1, 2], &[0, 2]), Ok(2));
+        assert!(matches!(new(&[0, 16, 1], &[0, 2]), Err(ExamplesError::Shape { .. })));
+        let value = ExamplesError::Value { example: 1, found: 17, full_scale: 16 };
+        assert_eq!(new(&[0, 16, 17, 0], &[0, 2]), Err(value));
+        let label = ExamplesError::Label { example: 0, found: 3, classes: 3 };
+        assert_eq!(new(&[0, 16, 1, 2], &[3, 2]), Err(label));
+    }
+
+    #[test]
+    fn splitting_and_joining_are_inverse() {
+        let set = Examples::new((0..12).collect(), vec![0, 1, 2, 0], 3, 16, 3).unwrap();
+        let (head, tail) = set.clone().split_at(3);
+        assert_eq!((head.len(), tail.len(), tail.values(0)), (3, 1, &[9, 10, 11][..]));
+        assert_eq!(head.joined(&tail), set);
+    }
+}
