@@ -1,3 +1,9 @@
 //! The substrate: unsigned crossbars, their periphery, and the engine that drives them.
 
 pub mod crossbar;
+pub mod engine;
+pub mod hardware;
+pub mod layer;
+pub mod ledger;
+pub mod periphery;
+pub mod population;

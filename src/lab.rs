@@ -1,3 +1,5 @@
 //! Everything around a run: files in, files out.
 
 pub mod data;
+pub mod report;
+pub mod store;

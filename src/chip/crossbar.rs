@@ -1,7 +1,429 @@
-//! Unsigned arrays of cells: storage, read, transposed read, outer-product sums, programming.
+//! Unsigned arrays of cells: storage, read, outer-product sums, programming.
 //!
 //! A [`Crossbar`] is one logical array, rows x columns, of levels in a window. It is stored as the
-//! physical tile is read: see [`layout`]. The loops that touch every cell live in [`kernel`].
+//! physical tile is read (see [`layout`]), and the loops that touch every cell live in [`kernel`]. Above 8
+//! bits a level has two byte planes: `level = low + 256 high`.
+#![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
+
+use bitvec::prelude::*;
+
+use super::hardware::{DitherBits, DitherPattern, FloorKind, Hardware, Window};
+use crate::num::draw::{Place, Site};
+use kernel::{Backend, Cells, Dither, Half, Write, WriteCounts};
+use layout::{BLOCK_CELLS, HALF_CELLS, HALF_COLUMNS, Layout, PANEL_COLUMNS, in_half};
 
 pub mod kernel;
 pub mod layout;
+
+/// 64-bit words of pruned bits in a half block.
+const HALF_WORDS: usize = HALF_CELLS / 64;
+
+/// One logical array of cells and the digital state behind them.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Crossbar {
+    layout: Layout,
+    window: Window,
+    low: Vec<u8>,
+    high: Option<Vec<u8>>,
+    residual: Option<Vec<u16>>,
+    /// One bit a cell in the order of levels, of absorbing floors.
+    pruned: Option<Vec<u64>>,
+}
+
+/// The parts of one panel that a write may change.
+#[derive(Debug)]
+pub struct PanelMut<'a> {
+    panel: usize,
+    layout: Layout,
+    low: &'a mut [u8],
+    high: Option<&'a mut [u8]>,
+    residual: Option<&'a mut [u16]>,
+    pruned: Option<&'a mut [u64]>,
+}
+
+impl Crossbar {
+    /// An array with every cell on the floor.
+    #[must_use]
+    pub fn new(layout: Layout, hardware: &Hardware) -> Self {
+        let cells = layout.cells_padded();
+        let [low, high] = hardware.window.floor().to_le_bytes();
+        let wide = hardware.level_bits.get() > 8;
+        Self {
+            layout,
+            window: hardware.window,
+            low: vec![low; cells],
+            high: wide.then(|| vec![high; cells]),
+            residual: (hardware.residual_bits.get() > 0).then(|| vec![0; cells]),
+            pruned: (hardware.floor_kind == FloorKind::Absorbing).then(|| vec![0; cells / 64]),
+        }
+    }
+
+    /// Size and places.
+    #[must_use]
+    pub const fn layout(&self) -> Layout {
+        self.layout
+    }
+
+    /// The level of a cell.
+    #[inline]
+    #[must_use]
+    pub fn level(&self, row: usize, column: usize) -> u16 {
+        let at = self.layout.index(row, column);
+        u16::from_le_bytes([self.low[at], self.high.as_ref().map_or(0, |high| high[at])])
+    }
+
+    /// Loads a row of levels.
+    ///
+    /// # Panics
+    /// When a level lies outside the window: levels are checked at the door.
+    pub fn load_row(&mut self, row: usize, levels: &[u16]) {
+        assert_eq!(levels.len(), self.layout.columns, "a row has one level a column");
+        for (column, &level) in levels.iter().enumerate() {
+            assert!(
+                (self.window.floor()..=self.window.ceiling()).contains(&level),
+                "level {level} lies outside the window"
+            );
+            let at = self.layout.index(row, column);
+            let [low, high] = level.to_le_bytes();
+            self.low[at] = low;
+            if let Some(plane) = &mut self.high {
+                plane[at] = high;
+            }
+        }
+    }
+
+    /// The levels, row-major.
+    pub fn levels(&self) -> impl Iterator<Item = u16> + '_ {
+        let Layout { rows, columns } = self.layout;
+        (0..rows).flat_map(move |row| (0..columns).map(move |column| self.level(row, column)))
+    }
+
+    /// The remainders behind the cells, row-major; `None` when the array has none.
+    #[must_use]
+    pub fn residuals(&self) -> Option<Vec<u16>> {
+        let Layout { rows, columns } = self.layout;
+        let cells = (0..rows).flat_map(|row| (0..columns).map(move |column| (row, column)));
+        self.residual
+            .as_ref()
+            .map(|residual| cells.map(|(r, c)| residual[self.layout.index(r, c)]).collect())
+    }
+
+    /// Which cells are gone for good, row-major; `None` unless the floor absorbs.
+    #[must_use]
+    pub fn pruned(&self) -> Option<BitVec<u8, Lsb0>> {
+        let Layout { rows, columns } = self.layout;
+        let cells = (0..rows).flat_map(|row| (0..columns).map(move |column| (row, column)));
+        let bits = self.pruned.as_ref()?.view_bits::<Lsb0>();
+        Some(cells.map(|(r, c)| bits[self.layout.index(r, c)]).collect())
+    }
+
+    /// Restores the remainders, row-major.
+    ///
+    /// # Panics
+    /// When the array has none or the number differs.
+    pub fn load_residuals(&mut self, values: &[u16]) {
+        let layout = self.layout;
+        let residual = self.residual.as_mut().expect("only arrays with a remainder load one");
+        assert_eq!(values.len(), layout.cells(), "one remainder a cell");
+        for (i, &value) in values.iter().enumerate() {
+            residual[layout.index(i / layout.columns, i % layout.columns)] = value;
+        }
+    }
+
+    /// Restores which cells are gone for good, row-major.
+    ///
+    /// # Panics
+    /// When the floor does not absorb or the number differs.
+    pub fn load_pruned(&mut self, values: &BitSlice<u8, Lsb0>) {
+        let layout = self.layout;
+        let words = self.pruned.as_mut().expect("only absorbing floors load pruned cells");
+        assert_eq!(values.len(), layout.cells(), "one bit a cell");
+        let bits = words.view_bits_mut::<Lsb0>();
+        for (i, value) in values.iter().by_vals().enumerate() {
+            bits.set(layout.index(i / layout.columns, i % layout.columns), value);
+        }
+    }
+
+    /// Sums of one panel over the rows of `blocks`, from the low plane, then from the high plane if there
+    /// is one: `current = low + 256 high`.
+    pub fn read(
+        &self,
+        backend: Backend,
+        panel: usize,
+        blocks: std::ops::Range<usize>,
+        drives: &[u8],
+        currents: &mut [i64],
+        scratch: &mut Vec<i32>,
+    ) {
+        let stride = self.layout.rows_padded();
+        let cells = self.layout.panel_cells();
+        scratch.resize(currents.len(), 0);
+        backend.read(&self.low[panel * cells..][..cells], blocks.clone(), drives, stride, scratch);
+        for (current, &low) in currents.iter_mut().zip(scratch.iter()) {
+            *current = i64::from(low);
+        }
+        if let Some(high) = &self.high {
+            backend.read(&high[panel * cells..][..cells], blocks, drives, stride, scratch);
+            for (current, &high) in currents.iter_mut().zip(scratch.iter()) {
+                *current += i64::from(high) << 8;
+            }
+        }
+    }
+
+    /// The transposed read: sums of every row over all columns, `[sample][rows padded]`. `gates` holds
+    /// `columns_padded` unsigned gates a sample.
+    #[must_use]
+    pub fn read_columns(&self, backend: Backend, gates: &[u8]) -> Vec<i64> {
+        let layout = self.layout;
+        let mut sums = vec![0; gates.len() / layout.columns_padded() * layout.rows_padded()];
+        backend.read_columns(&self.low, layout, gates, &mut sums);
+        let mut currents: Vec<i64> = sums.iter().map(|&sum| i64::from(sum)).collect();
+        if let Some(high) = &self.high {
+            backend.read_columns(high, layout, gates, &mut sums);
+            for (current, &sum) in currents.iter_mut().zip(&sums) {
+                *current += i64::from(sum) << 8;
+            }
+        }
+        currents
+    }
+
+    /// The array cut into panels that can be written side by side.
+    pub fn panels_mut(&mut self) -> impl Iterator<Item = PanelMut<'_>> {
+        let layout = self.layout;
+        let cells = layout.panel_cells();
+        let mut low = self.low.chunks_mut(cells);
+        let mut high = self.high.as_mut().map(|plane| plane.chunks_mut(cells));
+        let mut residual = self.residual.as_mut().map(|plane| plane.chunks_mut(cells));
+        let mut pruned = self.pruned.as_mut().map(|plane| plane.chunks_mut(cells / 64));
+        (0..layout.panels()).map(move |panel| PanelMut {
+            panel,
+            layout,
+            low: low.next().expect("one chunk a panel"),
+            high: high.as_mut().map(|chunks| chunks.next().expect("one chunk a panel")),
+            residual: residual.as_mut().map(|chunks| chunks.next().expect("one chunk a panel")),
+            pruned: pruned.as_mut().map(|chunks| chunks.next().expect("one chunk a panel")),
+        })
+    }
+}
+
+/// Everything a write needs beside the cells.
+#[derive(Debug, Clone, Copy)]
+pub struct WriteRequest<'a> {
+    /// Which loops run.
+    pub backend: Backend,
+    /// Drives of the written samples, `[rows padded][stride]`.
+    pub drives: &'a [u8],
+    /// Samples, padded to a multiple of 4 with zero drives.
+    pub stride: usize,
+    /// Rounding, bound and window.
+    pub write: Write,
+    /// Kind of dither.
+    pub dither_bits: DitherBits,
+    /// Where dither words come from.
+    pub dither_pattern: DitherPattern,
+    /// Address of this write's dither.
+    pub place: Place,
+}
+
+impl PanelMut<'_> {
+    /// Which panel this is.
+    #[must_use]
+    pub const fn panel(&self) -> usize {
+        self.panel
+    }
+
+    /// Accumulates, rounds, bounds and programs this panel. `gates` lies
+    /// `[2 halves][stride / 4][16 columns][4 samples]`.
+    ///
+    /// Blocks whose drives are all 0 or whose sums are all 0 are skipped: a zero sum rounds to no pulse
+    /// whatever its dither word, and a remainder alone is less than a pulse.
+    pub fn write(&mut self, request: &WriteRequest<'_>, gates: &[i8]) -> WriteCounts {
+        let stride = request.stride;
+        let mut counts = WriteCounts::default();
+        let mut sums: Box<Half<i32>> = Box::new([0; HALF_CELLS]);
+        let mut words = Words::new();
+        for block in 0..self.layout.blocks() {
+            let drives = &request.drives[block * 64 * stride..][..64 * stride];
+            if drives.iter().all(|&code| code == 0) {
+                continue;
+            }
+            for half in 0..2 {
+                let column = self.panel * PANEL_COLUMNS + half * HALF_COLUMNS;
+                if column >= self.layout.columns {
+                    continue;
+                }
+                let gates = &gates[half * 16 * stride..][..16 * stride];
+                request.backend.accumulate(drives, stride, gates, &mut sums);
+                if sums.iter().all(|&sum| sum == 0) {
+                    continue;
+                }
+                let dither = words.draw(request, self.layout.rows, column, block);
+                counts += self.program(block, half, &sums, request, dither);
+            }
+        }
+        counts
+    }
+
+    fn program(
+        &mut self,
+        block: usize,
+        half: usize,
+        sums: &Half<i32>,
+        request: &WriteRequest<'_>,
+        dither: Dither<'_>,
+    ) -> WriteCounts {
+        let at = block * BLOCK_CELLS + half * HALF_CELLS;
+        let mut flags: Option<Half<u8>> = None;
+        if let Some(pruned) = &self.pruned {
+            let bits = pruned[at / 64..][..HALF_WORDS].view_bits::<Lsb0>();
+            flags = Some(std::array::from_fn(|i| u8::from(bits[i])));
+        }
+        let cells = Cells {
+            low: half_mut(self.low, at),
+            high: self.high.as_deref_mut().map(|plane| half_mut(plane, at)),
+            residual: self.residual.as_deref_mut().map(|plane| half_mut(plane, at)),
+            pruned: flags.as_mut(),
+        };
+        let counts = request.backend.program(cells, sums, &request.write, dither);
+        if let (Some(pruned), Some(flags)) = (&mut self.pruned, flags) {
+            let bits = pruned[at / 64..][..HALF_WORDS].view_bits_mut::<Lsb0>();
+            for (i, flag) in flags.into_iter().enumerate() {
+                bits.set(i, flag != 0);
+            }
+        }
+        counts
+    }
+}
+
+fn half_mut<T>(plane: &mut [T], at: usize) -> &mut Half<T> {
+    (&mut plane[at..at + HALF_CELLS]).try_into().expect("a half block has 1024 cells")
+}
+
+/// Scratch for the dither words of a half block.
+struct Words {
+    bytes: Box<Half<u8>>,
+    halves: Box<Half<u16>>,
+}
+
+impl Words {
+    fn new() -> Self {
+        Self { bytes: Box::new([0; HALF_CELLS]), halves: Box::new([0; HALF_CELLS]) }
+    }
+
+    fn draw(
+        &mut self,
+        request: &WriteRequest<'_>,
+        rows: usize,
+        column: usize,
+        block: usize,
+    ) -> Dither<'_> {
+        let place = request.place;
+        match (request.dither_bits, request.dither_pattern) {
+            (DitherBits::Zero, _) => return Dither::Nearest,
+            (DitherBits::Eight, DitherPattern::PerCell) => {
+                request.backend.dither(&place, rows, column, block, &mut self.bytes);
+            }
+            (DitherBits::Sixteen, DitherPattern::PerCell) => {
+                for (c, group) in (0..HALF_COLUMNS).flat_map(|c| [(c, 0), (c, 1)]) {
+                    if (2 * block + group) * 32 >= rows {
+                        continue;
+                    }
+                    let words = place.halves(rows, column + c, 2 * block + group);
+                    for (row, word) in words.into_iter().enumerate() {
+                        self.halves[in_half(32 * group + row, c)] = word;
+                    }
+                }
+            }
+            (bits, DitherPattern::Separable) => {
+                // numbered as one column each: rows at sub 1, columns at sub 2
+                let word = |sub: u32, at: usize| separable_word(&Place { sub, ..place }, bits, at);
+                let down: [u16; 64] = std::array::from_fn(|row| word(1, block * 64 + row));
+                for c in 0..HALF_COLUMNS {
+                    let across = word(2, column + c);
+                    for (row, down) in down.iter().enumerate() {
+                        let [byte, _] = (down ^ across).to_le_bytes();
+                        self.bytes[in_half(row, c)] = byte;
+                        self.halves[in_half(row, c)] = down ^ across;
+                    }
+                }
+            }
+        }
+        match request.dither_bits {
+            DitherBits::Sixteen => Dither::Word(&self.halves),
+            _ => Dither::Byte(&self.bytes),
+        }
+    }
+}
+
+/// Word `at` of an array of one column, 8 or 16 bits wide.
+fn separable_word(place: &Place, bits: DitherBits, at: usize) -> u16 {
+    if bits == DitherBits::Sixteen {
+        place.half(at + 1, at, 0)
+    } else {
+        let mut bytes = [0; 64];
+        place.bytes(at + 1, 0, at / 64, &mut bytes);
+        u16::from(bytes[at % 64])
+    }
+}
+
+/// The levels of a fresh array.
+///
+/// ```text
+/// level = clamp( (u G + (r << 16)) >> 32, floor, ceiling )      u, r: 16-bit words at sub 0 and sub 1
+/// ```
+///
+/// `scale` is G. Calls `row` with each row of levels.
+pub fn initial_levels(
+    layout: Layout,
+    window: Window,
+    scale: u64,
+    place: Place,
+    mut row: impl FnMut(usize, &[u16]),
+) {
+    debug_assert!(place.site == Site::InitialLevels && place.count == 0);
+    let words = |sub: u32, column, group| Place { sub, ..place }.halves(layout.rows, column, group);
+    let mut levels = vec![0; 32 * layout.columns];
+    for group in 0..layout.rows.div_ceil(32) {
+        for column in 0..layout.columns {
+            let (u, r) = (words(0, column, group), words(1, column, group));
+            for i in 0..32 {
+                let wanted = (u64::from(u[i]) * scale + (u64::from(r[i]) << 16)) >> 32;
+                let ceiling = u64::from(window.ceiling());
+                let held = wanted.clamp(u64::from(window.floor()), ceiling);
+                levels[i * layout.columns + column] = u16::try_from(held).expect("in the window");
+            }
+        }
+        for (i, levels) in levels.chunks(layout.columns).enumerate() {
+            if group * 32 + i < layout.rows {
+                row(group * 32 + i, levels);
+            }
+        }
+    }
+}
+
+/// `G = floor( 2^16 gain 2^level_bits / (weight_max sqrt(fan_in)) + 1/2 )`, exact by integer square root.
+/// `gain_64ths` is the gain in units of 1/64.
+#[must_use]
+pub fn initial_scale(gain_64ths: u32, level_bits: u32, weight_max_log2: i32, fan_in: usize) -> u64 {
+    // y = floor(2A / sqrt(f)) with A = 2^16 gain 2^level_bits / weight_max; G = floor((y + 1) / 2)
+    let exponent = 2 * (17 + i64::from(level_bits) - i64::from(weight_max_log2)) - 12;
+    let gain = u128::from(gain_64ths).pow(2);
+    let square = if exponent >= 0 { gain << exponent } else { gain >> -exponent };
+    let y = (square / fan_in as u128).isqrt();
+    u64::try_from(y.div_ceil(2)).expect("at most 2^30")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_initial_scale_is_rounded_to_nearest() {
+        // gain 3/2, 8 bits, weight_max 4, fan_in 784: 65536 * 1.5 * 64 / 28 = 224694.857
+        assert_eq!(initial_scale(96, 8, 2, 784), 224_695);
+        // gain 1, 8 bits, weight_max 2, fan_in 4: 65536 * 128 / 2
+        assert_eq!(initial_scale(64, 8, 1, 4), 65536 * 64);
+        // 65536 * 256 / sqrt(2) = 11863283.2
+        assert_eq!(initial_scale(64, 8, 0, 2), 11_863_283);
+    }
+}

@@ -112,7 +112,7 @@ bounded! {
     /// Bits of a drive code, the number a row is driven with.
     DriveBits = "drive_bits" in 1 ..= 8;
     /// Bits of a converter on a column.
-    AdcBits = "adc_bits" in 1 ..= 16;
+    AdcBits = "adc_bits" in 2 ..= 16;
     /// Bits of a table index; the table has `2^bits` entries.
     LutBits = "lut_bits" in 2 ..= 14;
     /// Bits of an error word, sign included.

@@ -1,1 +1,297 @@
-//! Tables: floats in, integers out, at load only.
+//! Tables: floats in, integers out, at load only. The one room of the core where floats are allowed.
+//!
+//! ```text
+//! lut_a[i] = floor(255 f + 1/2), lut_d[i] = floor(255 f' / peak + 1/2), both at z = i * 2^lsh units, clamped to 0..=255
+//! unit     = weight_max / ( 2^level_bits * (2^drive_bits - 1) )                        of z
+//! lsh      = least shift >= 0 with 2^(lut_bits - 1 + lsh) units >= 4 alpha (sigmoid), 4 (ReLU, identity)
+//! k        = integer nearest to -log2( rate / (B m) * 2^error_bits
+//!            / ( (2^drive_bits - 1) (2^(error_bits-1) - 1) 255 * 2 alpha ) * 2^level_bits / weight_max )
+//! ```
+//!
+//! Only `+ - * /` and the functions of the `libm` crate (pure Rust, pinned) are used, so the integers are the
+//! same on every machine. See docs/MODEL.md, 2 and 3.
+#![expect(clippy::float_arithmetic, reason = "floats become integers here and nowhere else")]
+#![deny(clippy::disallowed_types, clippy::disallowed_methods)]
+
+use super::fixed::{Batch, DriveBits, ErrorBits, LevelBits, LutBits, RateMantissa};
+
+/// A finite number above 0, given by the user: a width, a rate, a factor.
+#[derive(Debug, Clone, Copy, PartialEq, PartialOrd)]
+pub struct Positive(f64);
+
+impl Positive {
+    /// One.
+    pub const ONE: Self = Self(1.0);
+
+    /// `value`, if it is finite and lies in `1e-6..=1e6`.
+    #[must_use]
+    pub fn new(value: f64) -> Option<Self> {
+        (1e-6..=1e6).contains(&value).then_some(Self(value))
+    }
+
+    /// The plain number, for files and reports.
+    #[must_use]
+    pub const fn get(self) -> f64 {
+        self.0
+    }
+
+    /// The product, if it is still in range.
+    #[must_use]
+    pub fn times(self, other: Self) -> Option<Self> {
+        Self::new(self.0 * other.0)
+    }
+}
+
+/// The function a unit applies to its pre-activation.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Activation {
+    /// `1 / (1 + exp(-2 z / alpha))`, of width alpha (paper, section 3.3).
+    Sigmoid(Positive),
+    /// `max(z, 0)`, full code at 1; derivative 0 at 0.
+    Relu,
+    /// `z` in 0..=1.
+    Identity,
+}
+
+impl Activation {
+    /// `z` at which the table ends.
+    fn range(self) -> f64 {
+        match self {
+            Self::Sigmoid(alpha) => 4.0 * alpha.0,
+            Self::Relu | Self::Identity => 4.0,
+        }
+    }
+
+    /// `1 / peak` of the derivative.
+    fn steepness(self) -> f64 {
+        match self {
+            Self::Sigmoid(alpha) => 2.0 * alpha.0,
+            Self::Relu | Self::Identity => 1.0,
+        }
+    }
+
+    /// Value, and derivative as a fraction of its peak.
+    fn at(self, z: f64) -> (f64, f64) {
+        match self {
+            Self::Sigmoid(alpha) => {
+                let y = 1.0 / (1.0 + libm::exp(-2.0 * z / alpha.0));
+                (y, 4.0 * y * (1.0 - y))
+            }
+            Self::Relu => (z, if z > 0.0 { 1.0 } else { 0.0 }),
+            Self::Identity => (z, 1.0),
+        }
+    }
+}
+
+/// What one accumulator unit stands for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Unit {
+    /// `log2(weight_max)`.
+    pub weight_max_log2: i32,
+    /// Bits of a level.
+    pub level_bits: LevelBits,
+    /// Bits of a drive code.
+    pub drive_bits: DriveBits,
+}
+
+impl Unit {
+    fn of_z(self) -> f64 {
+        let levels = libm::exp2(f64::from(self.level_bits.get()));
+        libm::exp2(f64::from(self.weight_max_log2))
+            / (levels * f64::from(self.drive_bits.code_max()))
+    }
+}
+
+/// Activation and derivative of a layer, by table index.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Lut {
+    /// `lut_a`: activity code at index `i + 2^(bits-1)`.
+    pub activity: Vec<u8>,
+    /// `lut_d`: derivative code, peak 255.
+    pub derivative: Vec<u8>,
+    /// `lsh`: accumulator units of one table step, as a shift.
+    pub shift: u32,
+}
+
+impl Lut {
+    /// Builds the table of `2^bits` entries.
+    #[must_use]
+    pub fn new(activation: Activation, bits: LutBits, unit: Unit) -> Self {
+        let half = i32::try_from(1u32 << (bits.get() - 1)).expect("at most 2^13");
+        let span = f64::from(half) * unit.of_z();
+        let mut shift = 0;
+        while span * libm::exp2(f64::from(shift)) < activation.range() {
+            shift += 1;
+        }
+        let step = unit.of_z() * libm::exp2(f64::from(shift));
+        let (activity, derivative) = (-half..half)
+            .map(|i| {
+                let (value, slope) = activation.at(f64::from(i) * step);
+                (code(value), code(slope))
+            })
+            .unzip();
+        Self { activity, derivative, shift }
+    }
+}
+
+/// `floor(255 x + 1/2)`, clamped to a byte.
+fn code(x: f64) -> u8 {
+    let rounded = libm::floor(255.0 * x + 0.5).clamp(0.0, 255.0);
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0..=255, whole")]
+    {
+        rounded as u8
+    }
+}
+
+/// How the rate falls over a training.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Decay {
+    /// Not at all.
+    Constant,
+    /// Half a cosine, from 1 to 0.
+    Cosine,
+}
+
+/// What a layer's rate is made of.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Rate {
+    /// Rate of the layer, its multiplier included.
+    pub rate: Positive,
+    /// Configured batch.
+    pub batch: Batch,
+    /// Small factor beside the shift.
+    pub mantissa: RateMantissa,
+    /// Bits of an error word.
+    pub error_bits: ErrorBits,
+    /// The layer's activation.
+    pub activation: Activation,
+    /// The layer's accumulator unit.
+    pub unit: Unit,
+}
+
+/// Greatest shift of a rate.
+pub const SHIFT_MAX: u32 = 30;
+
+impl Rate {
+    fn shift_exact(self) -> f64 {
+        let rail = f64::from((1u32 << (self.error_bits.get() - 1)) - 1);
+        let codes = f64::from(self.unit.drive_bits.code_max());
+        let scale = libm::exp2(f64::from(self.error_bits.get()))
+            / (codes * rail * 255.0 * self.activation.steepness());
+        let levels = libm::exp2(f64::from(self.unit.level_bits.get()))
+            / libm::exp2(f64::from(self.unit.weight_max_log2));
+        let samples = f64::from(self.batch.get()) * f64::from(self.mantissa.get());
+        -libm::log2(self.rate.0 / samples * scale * levels)
+    }
+
+    /// The shifts over `updates` updates: `(first update, k)`, in order; k changes at each entry.
+    ///
+    /// The decay is applied before rounding: `k(t) = nearest(k - log2(decay(t)))`, at most 30.
+    #[must_use]
+    pub fn shifts(self, decay: Decay, updates: u64) -> Vec<(u64, u32)> {
+        let exact = self.shift_exact();
+        let mut table: Vec<(u64, u32)> = Vec::new();
+        for update in 0..updates.max(1) {
+            let factor = match decay {
+                Decay::Constant => 1.0,
+                Decay::Cosine => {
+                    #[expect(clippy::cast_precision_loss, reason = "far fewer than 2^53 updates")]
+                    let t = update as f64 / updates as f64;
+                    0.5 * (1.0 + libm::cos(std::f64::consts::PI * t))
+                }
+            };
+            let nearest = libm::floor(exact - libm::log2(factor) + 0.5);
+            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0..=30")]
+            let k = nearest.clamp(0.0, f64::from(SHIFT_MAX)) as u32;
+            if table.last().is_none_or(|&(_, last)| last != k) {
+                table.push((update, k));
+            }
+            if decay == Decay::Constant {
+                break;
+            }
+        }
+        table
+    }
+}
+
+/// `rate * width / alpha^2`, above which wide nets diverge (about 320 to 570), rounded down.
+#[must_use]
+pub fn divergence_index(rate: Positive, width: usize, alpha: Positive) -> u64 {
+    #[expect(
+        clippy::cast_precision_loss,
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "a width is small, the quotient positive and below 2^63"
+    )]
+    {
+        libm::floor(rate.0 * width as f64 / (alpha.0 * alpha.0)) as u64
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn unit(weight_max_log2: i32, level_bits: i64, drive_bits: i64) -> Unit {
+        Unit {
+            weight_max_log2,
+            level_bits: LevelBits::new(level_bits).unwrap(),
+            drive_bits: DriveBits::new(drive_bits).unwrap(),
+        }
+    }
+
+    fn sigmoid(alpha: f64) -> Activation {
+        Activation::Sigmoid(Positive::new(alpha).unwrap())
+    }
+
+    fn rate(rate: f64, alpha: f64) -> Rate {
+        Rate {
+            rate: Positive::new(rate).unwrap(),
+            batch: Batch::new(32).unwrap(),
+            mantissa: RateMantissa::new(1).unwrap(),
+            error_bits: ErrorBits::new(8).unwrap(),
+            activation: sigmoid(alpha),
+            unit: unit(2, 8, 8),
+        }
+    }
+
+    #[test]
+    fn a_sigmoid_table_is_centred_monotone_and_reaches_both_rails() {
+        let lut = Lut::new(sigmoid(4.0), LutBits::new(10).unwrap(), unit(2, 8, 8));
+        assert_eq!(lut.shift, 9); // 2^9 * 2^9 units of 4 / (256 * 255) just reach 16
+        assert_eq!((lut.activity[512], lut.derivative[512]), (128, 255));
+        assert_eq!((lut.activity[0], lut.activity[1023]), (0, 255));
+        assert!(lut.activity.is_sorted());
+        assert!((1..512).all(|i| lut.derivative[512 - i] == lut.derivative[512 + i]));
+    }
+
+    #[test]
+    fn relu_and_identity_end_at_full_code() {
+        let bits = LutBits::new(10).unwrap();
+        let relu = Lut::new(Activation::Relu, bits, unit(0, 8, 8));
+        assert_eq!((relu.activity[512], relu.derivative[512]), (0, 0));
+        assert_eq!((relu.derivative[513], relu.activity[1023]), (255, 255));
+        let identity = Lut::new(Activation::Identity, bits, unit(0, 8, 8));
+        assert!(identity.derivative.iter().all(|&d| d == 255) && identity.activity[0] == 0);
+    }
+
+    #[test]
+    fn the_known_recipe_has_the_known_shift() {
+        // rate 20, B = 32, alpha = 6, weight_max = 4, 8 bits: k = 13 with 8-bit gates
+        assert_eq!(rate(20.0, 6.0).shifts(Decay::Constant, 1000), [(0, 13)]);
+    }
+
+    #[test]
+    fn a_cosine_starts_at_the_constant_shift_and_only_rises() {
+        let table = rate(20.0, 6.0).shifts(Decay::Cosine, 1000);
+        assert_eq!(table[..4], [(0, 13), (269, 14), (546, 15), (699, 16)]);
+        assert!(table.is_sorted() && table.last().unwrap().1 <= SHIFT_MAX);
+    }
+
+    #[test]
+    fn numbers_outside_the_range_are_refused() {
+        for bad in [0.0, -1.0, 1e7, f64::NAN, f64::INFINITY] {
+            assert_eq!(Positive::new(bad), None);
+        }
+    }
+}

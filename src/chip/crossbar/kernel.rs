@@ -7,7 +7,7 @@
 
 use std::ops::Range;
 
-use super::layout::HALF_CELLS;
+use super::layout::{HALF_CELLS, Layout};
 use crate::num::draw::Place;
 
 mod scalar;
@@ -126,6 +126,16 @@ impl Backend {
         assert_eq!(drives.len() / stride * 32, out.len(), "32 sums a sample");
         match self {
             Self::Scalar => scalar::read(plane, blocks, drives, stride, out),
+        }
+    }
+
+    /// The transposed read: `out[b][r] = sum over c of level[r][c] * gates[b][c]`, gates 0..=127, over a whole
+    /// plane. `gates` holds `columns_padded` gates a sample, `out` `rows_padded` sums.
+    pub fn read_columns(self, plane: &[u8], layout: Layout, gates: &[u8], out: &mut [i32]) {
+        assert_eq!(plane.len(), layout.cells_padded());
+        assert_eq!(gates.len() / layout.columns_padded() * layout.rows_padded(), out.len());
+        match self {
+            Self::Scalar => scalar::read_columns(plane, layout, gates, out),
         }
     }
 

@@ -15,7 +15,7 @@
 use std::ops::Range;
 
 use super::{Cells, Dither, Half, Write, WriteCounts};
-use crate::chip::crossbar::layout::{BLOCK_CELLS, HALF_CELLS, HALF_COLUMNS, in_half};
+use crate::chip::crossbar::layout::{BLOCK_CELLS, HALF_CELLS, HALF_COLUMNS, Layout, in_half};
 use crate::num::draw::Place;
 use crate::num::fixed::rsh;
 
@@ -36,6 +36,27 @@ pub(super) fn read(
                     for column in 0..HALF_COLUMNS {
                         out[half * HALF_COLUMNS + column] +=
                             i32::from(cells[in_half(row, column)]) * drive;
+                    }
+                }
+            }
+        }
+    }
+}
+
+pub(super) fn read_columns(plane: &[u8], layout: Layout, gates: &[u8], out: &mut [i32]) {
+    let samples = gates.chunks_exact(layout.columns_padded());
+    for (gates, out) in samples.zip(out.chunks_exact_mut(layout.rows_padded())) {
+        out.fill(0);
+        let panels = plane.chunks_exact(layout.panel_cells());
+        for (cells, gates) in panels.zip(gates.chunks_exact(32)) {
+            for (block, cells) in cells.chunks_exact(BLOCK_CELLS).enumerate() {
+                let halves = cells.chunks_exact(HALF_CELLS).zip(gates.chunks_exact(HALF_COLUMNS));
+                for (cells, gates) in halves {
+                    for row in 0..64 {
+                        for (column, &gate) in gates.iter().enumerate() {
+                            out[block * 64 + row] +=
+                                i32::from(cells[in_half(row, column)]) * i32::from(gate);
+                        }
                     }
                 }
             }
@@ -89,9 +110,8 @@ pub(super) fn program(
     for row in 0..64 {
         for column in 0..HALF_COLUMNS {
             let at = in_half(row, column);
-            if cells.pruned.as_ref().is_some_and(|pruned| pruned[at] != 0) {
-                continue;
-            }
+            // a pruned cell takes pulses and does not move: attempted, not effective
+            let gone = cells.pruned.as_ref().is_some_and(|pruned| pruned[at] != 0);
             let sum = i64::from(sums[row * HALF_COLUMNS + column]) * i64::from(write.mantissa);
             let sum = if write.negate { -sum } else { sum };
             let shift = i64::from(write.shift) - i64::from(fraction);
@@ -107,7 +127,7 @@ pub(super) fn program(
 
             let high = cells.high.as_ref().map_or(0, |high| i64::from(high[at]));
             let before = i64::from(cells.low[at]) + (high << 8);
-            let level = (before + pulses).clamp(floor, ceiling);
+            let level = if gone { before } else { (before + pulses).clamp(floor, ceiling) };
             cells.low[at] = (level & 0xff) as u8;
             if let Some(high) = cells.high.as_mut() {
                 high[at] = (level >> 8) as u8;
@@ -117,7 +137,7 @@ pub(super) fn program(
                 residual[at] = u16::try_from(left).expect("at most 15 fractional bits");
             }
             if let Some(pruned) = cells.pruned.as_mut() {
-                pruned[at] = u8::from(pulses != 0 && level == floor);
+                pruned[at] = u8::from(gone || (pulses != 0 && level == floor));
             }
             counts.requested += u64::from(wanted != 0);
             counts.bounded += u64::from(wanted != pulses);

@@ -1,0 +1,385 @@
+//! The engine: five operations on tiles, the same for every task and rule.
+//!
+//! ```text
+//! LOADW(row)             load a row of levels
+//! LOADX(row)             put drive codes on the rows of the first layer
+//! FWD(rows | columns)    read a layer, or read it backwards
+//! ERR(words)             deliver error words over the bus; units latch their taps and form gates
+//! UPD(now | add | write) now: accumulate one sample and program; add: accumulate; write: program and clear
+//! ```
+//!
+//! An operation carries a range of samples, as so many repetitions. The numbers come from kernels; the counts
+//! are those of the chip, which does not skip. A task only decides which numbers arrive and who computes the
+//! error words. See docs/MODEL.md, 4.
+#![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
+
+use std::ops::Range;
+
+use super::crossbar::kernel::Backend;
+use super::crossbar::layout::PANEL_COLUMNS;
+use super::hardware::Hardware;
+use super::layer::Layer;
+use super::ledger::{During, Event, Ledger};
+use super::population::{Stream, Wiring};
+
+mod calibrate;
+mod forward;
+mod update;
+
+pub use calibrate::Calibration;
+
+/// Which side of a crossbar is driven.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Side {
+    /// Rows are driven, columns are read.
+    Rows,
+    /// Columns are driven with gates, rows are read.
+    Columns,
+}
+
+/// What an update does with its samples.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Write {
+    /// Accumulate one sample and program.
+    Now,
+    /// Accumulate.
+    Add,
+    /// Program what was accumulated, and clear.
+    Program,
+}
+
+/// One operation, with its numbers.
+#[derive(Debug, Clone)]
+pub enum Operation<'a> {
+    /// `LOADW`: one row of one array.
+    LoadWeights {
+        /// Which layer.
+        layer: usize,
+        /// Which of its arrays.
+        array: usize,
+        /// Which row.
+        row: usize,
+        /// One level a column.
+        levels: &'a [u16],
+    },
+    /// `LOADX`: drive codes of a batch, sample after sample.
+    LoadDrives {
+        /// `inputs` codes a sample.
+        codes: &'a [u8],
+    },
+    /// `FWD` of all loaded samples.
+    Forward {
+        /// Which layer.
+        layer: usize,
+        /// Which side.
+        side: Side,
+    },
+    /// `ERR` for some samples.
+    Error {
+        /// Which layer.
+        layer: usize,
+        /// Which of the loaded samples.
+        samples: Range<usize>,
+        /// `width` words a sample, for stream p; stream n latches them negated.
+        words: &'a [i16],
+    },
+    /// `UPD` for some samples.
+    Update {
+        /// Which layer.
+        layer: usize,
+        /// Which field.
+        write: Write,
+        /// Which of the loaded samples (none for `Program`).
+        samples: Range<usize>,
+        /// The layer's shift k.
+        shift: u32,
+    },
+}
+
+impl Operation<'_> {
+    /// The (operation, field) pair, as the instruction is written.
+    #[must_use]
+    pub const fn name(&self) -> &'static str {
+        match self {
+            Self::LoadWeights { .. } => "LOADW(row)",
+            Self::LoadDrives { .. } => "LOADX(row)",
+            Self::Forward { side: Side::Rows, .. } => "FWD(rows)",
+            Self::Forward { side: Side::Columns, .. } => "FWD(columns)",
+            Self::Error { .. } => "ERR(words)",
+            Self::Update { write: Write::Now, .. } => "UPD(now)",
+            Self::Update { write: Write::Add, .. } => "UPD(add)",
+            Self::Update { write: Write::Program, .. } => "UPD(write)",
+        }
+    }
+}
+
+/// Which ledger is charged.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Phase {
+    /// Learning, initial loads included.
+    Training,
+    /// Finding converter ranges.
+    Calibration,
+    /// Reading validation or test samples.
+    Evaluation,
+}
+
+impl Phase {
+    /// All phases, in the order of the state hash.
+    pub const ALL: [Self; 3] = [Self::Training, Self::Calibration, Self::Evaluation];
+
+    /// Name in files.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Training => "training",
+            Self::Calibration => "calibration",
+            Self::Evaluation => "evaluation",
+        }
+    }
+}
+
+/// Registers of a layer for the loaded samples. Streams are indexed by [`Stream`]; what a layer does not
+/// have stays empty.
+#[derive(Debug, Clone, Default)]
+struct Registers {
+    /// Drive codes by source stream, `[sample][rows padded]`. The first layer drives both streams alike and keeps
+    /// one copy, at P.
+    drives: [Vec<u8>; 2],
+    /// By target stream, `[panel][sample][32]`.
+    accumulators: [Vec<i64>; 2],
+    activity: [Vec<u8>; 2],
+    derivative: [Vec<u8>; 2],
+    gates: [Vec<i8>; 2],
+    /// Row sums of the last transposed read, `[sample][rows]`.
+    backward: Vec<i64>,
+    /// Samples added and not yet programmed, and their shift.
+    pending: usize,
+}
+
+/// Sum of bank currents of a layer since they were last taken: `[E, I]` by target stream.
+pub type Currents = [[i64; 2]; 2];
+
+/// A network on a chip.
+#[derive(Debug)]
+pub struct Engine {
+    hardware: Hardware,
+    backend: Backend,
+    seed: u64,
+    /// Only potentiating pulses: excitatory arrays take positive gates, inhibitory ones negative gates.
+    potentiation_only: bool,
+    /// Rate mantissa.
+    mantissa: u32,
+    layers: Vec<Layer>,
+    registers: Vec<Registers>,
+    currents: Vec<Currents>,
+    samples: usize,
+    phase: Phase,
+    ledgers: [Ledger; 3],
+    trace: Option<Vec<(&'static str, u16, usize)>>,
+}
+
+impl Engine {
+    /// An engine over `layers`, whose sizes follow one another.
+    ///
+    /// # Panics
+    /// When the layers do not follow one another: the plan checks that.
+    #[must_use]
+    pub fn new(hardware: Hardware, backend: Backend, seed: u64, layers: Vec<Layer>) -> Self {
+        let joined = layers.windows(2).all(|pair| pair[0].spec.units == pair[1].spec.inputs);
+        assert!(joined && !layers.is_empty(), "layers follow one another");
+        let ledger = Ledger::new(layers.len());
+        Self {
+            hardware,
+            backend,
+            seed,
+            potentiation_only: false,
+            mantissa: 1,
+            registers: vec![Registers::default(); layers.len()],
+            currents: vec![[[0; 2]; 2]; layers.len()],
+            layers,
+            samples: 0,
+            phase: Phase::Training,
+            ledgers: [ledger.clone(), ledger.clone(), ledger],
+            trace: None,
+        }
+    }
+
+    /// Restricts writes to potentiation (Kaneko's rule).
+    pub const fn set_potentiation_only(&mut self, only: bool) {
+        self.potentiation_only = only;
+    }
+
+    /// Sets the small factor of the rate, 1..=15.
+    pub const fn set_mantissa(&mut self, mantissa: u32) {
+        self.mantissa = mantissa;
+    }
+
+    /// Charges what follows to `phase`.
+    pub const fn set_phase(&mut self, phase: Phase) {
+        self.phase = phase;
+    }
+
+    /// Starts or stops recording (operation, layer, samples).
+    pub fn set_trace(&mut self, on: bool) {
+        self.trace = on.then(Vec::new);
+    }
+
+    /// What was recorded: operation, layer, samples.
+    #[must_use]
+    pub fn trace(&self) -> &[(&'static str, u16, usize)] {
+        self.trace.as_deref().unwrap_or_default()
+    }
+
+    /// The chip.
+    #[must_use]
+    pub const fn hardware(&self) -> &Hardware {
+        &self.hardware
+    }
+
+    /// The loops that run.
+    #[must_use]
+    pub const fn backend(&self) -> Backend {
+        self.backend
+    }
+
+    /// The layers.
+    #[must_use]
+    pub fn layers(&self) -> &[Layer] {
+        &self.layers
+    }
+
+    /// The layers, to restore a state. Registers are cleared.
+    pub fn layers_mut(&mut self) -> &mut [Layer] {
+        self.registers.fill(Registers::default());
+        self.samples = 0;
+        &mut self.layers
+    }
+
+    /// A ledger.
+    #[must_use]
+    pub const fn ledger(&self, phase: Phase) -> &Ledger {
+        &self.ledgers[phase as usize]
+    }
+
+    /// A ledger, to restore a state or to charge what digital logic beside the tiles did.
+    pub const fn ledger_mut(&mut self, phase: Phase) -> &mut Ledger {
+        &mut self.ledgers[phase as usize]
+    }
+
+    /// The phase that is charged.
+    #[must_use]
+    pub const fn phase(&self) -> Phase {
+        self.phase
+    }
+
+    /// Samples loaded.
+    #[must_use]
+    pub const fn samples(&self) -> usize {
+        self.samples
+    }
+
+    /// Bank currents by layer since the last call, and starts over.
+    pub fn take_currents(&mut self) -> Vec<Currents> {
+        let zero = vec![[[0; 2]; 2]; self.layers.len()];
+        std::mem::replace(&mut self.currents, zero)
+    }
+
+    /// Accumulator of a unit of the last layer's p stream.
+    #[must_use]
+    pub fn output_accumulator(&self, sample: usize, unit: usize) -> i64 {
+        let registers = self.registers.last().expect("a network has layers");
+        registers.accumulators[Stream::P.index()][self.register_at(sample, unit)]
+    }
+
+    /// Activity code of a unit of the last layer's p stream.
+    #[must_use]
+    pub fn output_activity(&self, sample: usize, unit: usize) -> u8 {
+        let registers = self.registers.last().expect("a network has layers");
+        registers.activity[Stream::P.index()][self.register_at(sample, unit)]
+    }
+
+    /// Row sums of the last transposed read of `layer`, `[sample][inputs]`.
+    #[must_use]
+    pub fn backward(&self, layer: usize) -> &[i64] {
+        &self.registers[layer].backward
+    }
+
+    /// Place of a unit in registers that lie `[panel][sample][32]`.
+    const fn register_at(&self, sample: usize, unit: usize) -> usize {
+        (unit / PANEL_COLUMNS * self.samples + sample) * PANEL_COLUMNS + unit % PANEL_COLUMNS
+    }
+
+    /// Executes one operation.
+    ///
+    /// # Panics
+    /// When the numbers do not have the shape the operation says: tasks and rules are our own code.
+    pub fn execute(&mut self, operation: &Operation<'_>) {
+        if self.trace.is_some() {
+            self.record(operation);
+        }
+        match *operation {
+            Operation::LoadWeights { layer, array, row, levels } => {
+                let pathway = self.layers[layer].spec.wiring.pathways()[array].code;
+                self.layers[layer].arrays[array].load_row(row, levels);
+                let (during, count) = (During::LoadWeights, levels.len() as u64);
+                self.charge(layer, pathway, during, Event::CellLoads, count);
+            }
+            Operation::LoadDrives { codes } => self.load_drives(codes),
+            Operation::Forward { layer, side: Side::Rows } => self.forward(layer),
+            Operation::Forward { layer, side: Side::Columns } => self.forward_columns(layer),
+            Operation::Error { layer, ref samples, words } => {
+                self.error(layer, samples.clone(), words);
+            }
+            Operation::Update { layer, write, ref samples, shift } => {
+                self.update(layer, write, samples.clone(), shift);
+            }
+        }
+    }
+
+    fn record(&mut self, operation: &Operation<'_>) {
+        let (layer, samples) = match operation {
+            Operation::LoadWeights { layer, .. } => (*layer, 1),
+            Operation::LoadDrives { codes } => (0, codes.len() / self.layers[0].spec.inputs),
+            Operation::Forward { layer, .. } => (*layer, self.samples),
+            Operation::Error { layer, samples, .. } | Operation::Update { layer, samples, .. } => {
+                (*layer, samples.len())
+            }
+        };
+        let entry = (operation.name(), self.layers[layer].index, samples);
+        self.trace.as_mut().expect("only called while recording").push(entry);
+    }
+
+    fn load_drives(&mut self, codes: &[u8]) {
+        let layer = &self.layers[0];
+        let (inputs, stride) = (layer.spec.inputs, layer.layout.rows_padded());
+        assert!(codes.len().is_multiple_of(inputs), "codes come in whole samples");
+        assert!(self.registers.iter().all(|r| r.pending == 0), "sums wait to be programmed");
+        self.samples = codes.len() / inputs;
+        let constant = layer.spec.constant_row.then(|| self.hardware.drive_bits.code_max());
+        let drives = &mut self.registers[0].drives[Stream::P.index()];
+        drives.clear();
+        drives.resize(self.samples * stride, 0);
+        for (sample, codes) in drives.chunks_exact_mut(stride).zip(codes.chunks_exact(inputs)) {
+            sample[..inputs].copy_from_slice(codes);
+            if let Some(code) = constant {
+                sample[inputs] = code;
+            }
+        }
+    }
+
+    /// Drives of a source stream of a layer.
+    fn drives(&self, layer: usize, source: Stream) -> &[u8] {
+        let source = if layer == 0 { Stream::P } else { source };
+        &self.registers[layer].drives[source.index()]
+    }
+
+    fn charge(&mut self, layer: usize, pathway: u8, during: During, event: Event, count: u64) {
+        self.ledgers[self.phase as usize].add(layer, pathway, during, event, count);
+    }
+
+    /// Code of the pathway that carries a target's excitatory bank: units are charged there.
+    const fn code_of(wiring: Wiring, target: Stream) -> u8 {
+        wiring.pathways()[wiring.banks(target)[0]].code
+    }
+}

@@ -1,0 +1,88 @@
+//! Ranges of finite converters.
+//!
+//! ```text
+//! ash = headroom + least shift with at most 1 in 1,024 conversions on the rail          by layer, stream, slice
+//! ```
+//!
+//! The first 256 training samples are read with ideal converters in the whole network, and every current that a
+//! finite converter would have seen is noted. A conversion is on the rail when its code is the greatest one
+//! (or, of a difference, the least). See docs/MODEL.md, 2.
+#![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
+
+use super::forward::Mode;
+use super::{Engine, Operation, Phase};
+use crate::chip::hardware::{Adc, AdcRange};
+use crate::num::fixed::rsh;
+
+/// Samples read to find converter ranges.
+const SAMPLES: usize = 256;
+/// One conversion in so many may lie on the rail.
+const RARE: u64 = 1024;
+
+/// What a probe of the converters found.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Calibration {
+    /// Converter shifts in force, by layer, target stream and slice.
+    pub shifts: Vec<Vec<Vec<u32>>>,
+    /// Greatest code each layer's converters gave for the samples.
+    pub code_max: Vec<i64>,
+}
+
+impl Engine {
+    /// Reads up to 256 samples (`inputs` codes each) with ideal converters and, if the hardware calibrates, sets
+    /// the converter shifts. `None` when the converters are ideal.
+    pub fn calibrate(&mut self, codes: &[u8]) -> Option<Calibration> {
+        let Adc::Finite { range, .. } = self.hardware.adc else { return None };
+        let phase = self.phase;
+        self.set_phase(Phase::Calibration);
+        let inputs = self.layers[0].spec.inputs;
+        self.execute(&Operation::LoadDrives { codes: &codes[..codes.len().min(SAMPLES * inputs)] });
+        let mut calibration = Calibration { shifts: vec![], code_max: vec![] };
+        for layer in 0..self.layers.len() {
+            let histograms = self.forward_in(layer, Mode::Probe);
+            let mut code_max = 0;
+            for (target, histogram) in histograms.iter().enumerate() {
+                for (slice, (counts, current_max)) in histogram.iter().enumerate() {
+                    let shift = &mut self.layers[layer].adc_shifts[target][slice];
+                    if let AdcRange::Calibrated { headroom, .. } = range {
+                        *shift = least_shift(counts) + headroom;
+                    }
+                    code_max = code_max.max(rsh(*current_max, *shift));
+                }
+            }
+            calibration.shifts.push(self.layers[layer].adc_shifts.clone());
+            calibration.code_max.push(code_max);
+        }
+        self.set_phase(phase);
+        Some(calibration)
+    }
+}
+
+/// The least shift that leaves at most one conversion in 1,024 on the rail. `counts[s]` conversions need a shift of s.
+fn least_shift(counts: &[u64; 64]) -> u32 {
+    let total: u64 = counts.iter().sum();
+    let mut beyond = total;
+    for (shift, count) in (0..).zip(counts) {
+        beyond -= count;
+        if beyond * RARE <= total {
+            return shift;
+        }
+    }
+    unreachable!("no conversion needs more than the last shift")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::least_shift;
+
+    #[test]
+    fn one_conversion_in_1024_may_lie_on_the_rail() {
+        let mut counts = [0; 64];
+        counts[3] = 1023;
+        counts[7] = 1;
+        assert_eq!(least_shift(&counts), 3);
+        counts[7] = 2;
+        assert_eq!(least_shift(&counts), 7);
+        assert_eq!(least_shift(&[0; 64]), 0);
+    }
+}

@@ -1,0 +1,219 @@
+//! A dense layer: its arrays, its table, its taps and its converters; and the plan that proves it fits.
+//!
+//! Layers with cells are numbered from 0 at the input. A layer of K inputs and N units is one unsigned K x N array a
+//! pathway, cut into tiles of `tile_rows` x `tile_columns`. A constant row, if any, is the last row. See
+//! docs/MODEL.md, 1.
+#![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
+
+use std::ops::Range;
+
+use super::crossbar::Crossbar;
+use super::crossbar::layout::Layout;
+use super::hardware::{Adc, AdcRange, Hardware};
+use super::population::Wiring;
+use crate::num::tables::{Activation, Lut, Unit};
+
+/// What a layer is made of.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LayerSpec {
+    /// Units of the layer below, or features; without the constant row.
+    pub inputs: usize,
+    /// Units of each target stream.
+    pub units: usize,
+    /// How the arrays are wired.
+    pub wiring: Wiring,
+    /// Function of the units.
+    pub activation: Activation,
+    /// `log2(weight_max)`.
+    pub weight_max_log2: i32,
+    /// Initial gain of excitatory and of inhibitory arrays, in 64ths.
+    pub gain_64ths: [u32; 2],
+    /// Whether a constant row is driven at full code.
+    pub constant_row: bool,
+}
+
+/// Which error words a unit latches: a static tap, no matrix.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Taps {
+    /// Words on the bus.
+    pub width: usize,
+    /// Words a unit adds.
+    pub per_unit: usize,
+    /// `[unit][tap]` word numbers.
+    pub words: Vec<u16>,
+    /// Shift of the sum of more than one word.
+    pub shift: u32,
+}
+
+impl Taps {
+    /// Unit c takes word c.
+    #[must_use]
+    pub fn identity(units: usize) -> Self {
+        let words = (0..units).map(|unit| u16::try_from(unit).expect("checked by the plan"));
+        Self { width: units, per_unit: 1, words: words.collect(), shift: 0 }
+    }
+}
+
+/// A plan that cannot be built on this chip.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum PlanError {
+    /// Too many physical tiles.
+    #[error(
+        "the network needs {needed} tiles of {rows} x {columns} (layer by layer: {by_layer}), but the chip has \
+         {allowed}; raise `hw.tile.count`, use larger tiles or a smaller network"
+    )]
+    Tiles {
+        /// Tiles needed.
+        needed: usize,
+        /// Rows of a tile.
+        rows: usize,
+        /// Columns of a tile.
+        columns: usize,
+        /// Tiles of each layer.
+        by_layer: String,
+        /// Tiles the chip has.
+        allowed: usize,
+    },
+    /// A layer beyond what words and addresses can number.
+    #[error("layer {layer} is {rows} x {columns}; at most {max} rows and columns are supported")]
+    Size {
+        /// Which layer.
+        layer: usize,
+        /// Its rows.
+        rows: usize,
+        /// Its columns.
+        columns: usize,
+        /// Greatest number of either.
+        max: usize,
+    },
+    /// More layers than addresses.
+    #[error("the network has {found} layers; 1 to {max} are supported")]
+    Layers {
+        /// Layers found.
+        found: usize,
+        /// Greatest number.
+        max: usize,
+    },
+}
+
+/// Rows and columns an array may have: addresses of draws and taps stay inside their fields.
+pub const SIDE_MAX: usize = 65_535;
+/// Layers a network may have.
+pub const LAYERS_MAX: usize = 64;
+/// Blocks of 64 rows whose products of two bytes an `i32` holds for certain: 512 x 64 x 255 x 255 < 2^31.
+pub const CHUNK_BLOCKS: usize = 512;
+
+/// A layer on the chip.
+#[derive(Debug, Clone)]
+pub struct Layer {
+    /// Number in draws, ledger and hash.
+    pub index: u16,
+    /// What it is made of.
+    pub spec: LayerSpec,
+    /// Size of each array.
+    pub layout: Layout,
+    /// Activation and derivative.
+    pub lut: Lut,
+    /// Error taps.
+    pub taps: Taps,
+    /// The arrays, in the order of [`Wiring::pathways`].
+    pub arrays: Vec<Crossbar>,
+    /// Writes each array has had.
+    pub writes: Vec<u64>,
+    /// Converter shifts by target stream and slice; empty with ideal converters.
+    pub adc_shifts: Vec<Vec<u32>>,
+}
+
+impl Layer {
+    /// A layer with every cell on the floor.
+    #[must_use]
+    pub fn new(index: u16, spec: LayerSpec, taps: Taps, hardware: &Hardware) -> Self {
+        let rows = spec.inputs + usize::from(spec.constant_row);
+        let layout = Layout { rows, columns: spec.units };
+        let lut = Lut::new(spec.activation, hardware.lut_bits, unit(&spec, hardware));
+        let arrays: Vec<_> =
+            spec.wiring.pathways().iter().map(|_| Crossbar::new(layout, hardware)).collect();
+        let adc_shifts = match hardware.adc {
+            Adc::Ideal => vec![],
+            Adc::Finite { bits, subtract, range } => {
+                let shift = match range {
+                    AdcRange::Shift(shift) => shift,
+                    AdcRange::Full | AdcRange::Calibrated { .. } => {
+                        hardware.full_shift(bits, subtract, rows.min(hardware.tile_rows))
+                    }
+                };
+                vec![vec![shift; hardware.slices() as usize]; spec.wiring.targets().len()]
+            }
+        };
+        let writes = vec![0; arrays.len()];
+        Self { index, spec, layout, lut, taps, arrays, writes, adc_shifts }
+    }
+
+    /// Rows of each tile of a column, top to bottom.
+    pub fn row_tiles(&self, hardware: &Hardware) -> impl Iterator<Item = Range<usize>> + use<> {
+        let (rows, step) = (self.layout.rows, hardware.tile_rows);
+        (0..rows).step_by(step).map(move |start| start..(start + step).min(rows))
+    }
+
+    /// Tiles of one array: down, across.
+    #[must_use]
+    pub fn tiles(&self, hardware: &Hardware) -> [usize; 2] {
+        tiles(self.layout, hardware)
+    }
+}
+
+/// What one accumulator unit of a layer stands for.
+#[must_use]
+pub const fn unit(spec: &LayerSpec, hardware: &Hardware) -> Unit {
+    Unit {
+        weight_max_log2: spec.weight_max_log2,
+        level_bits: hardware.level_bits,
+        drive_bits: hardware.drive_bits,
+    }
+}
+
+fn tiles(layout: Layout, hardware: &Hardware) -> [usize; 2] {
+    [layout.rows.div_ceil(hardware.tile_rows), layout.columns.div_ceil(hardware.tile_columns)]
+}
+
+/// Proves that a network fits: addresses, words and physical tiles. A tile holds the two banks of one target.
+///
+/// # Errors
+/// When it does not, with what is needed and what there is.
+pub fn check(specs: &[LayerSpec], hardware: &Hardware) -> Result<(), PlanError> {
+    if !(1..=LAYERS_MAX).contains(&specs.len()) {
+        return Err(PlanError::Layers { found: specs.len(), max: LAYERS_MAX });
+    }
+    let mut by_layer = Vec::new();
+    for (layer, spec) in specs.iter().enumerate() {
+        let layout =
+            Layout { rows: spec.inputs + usize::from(spec.constant_row), columns: spec.units };
+        let Layout { rows, columns } = layout;
+        if !(1..=SIDE_MAX).contains(&rows) || !(1..=SIDE_MAX).contains(&columns) {
+            return Err(PlanError::Size { layer, rows, columns, max: SIDE_MAX });
+        }
+        let [down, across] = tiles(layout, hardware);
+        by_layer.push(down * across * spec.wiring.targets().len());
+    }
+    let needed = by_layer.iter().sum();
+    match hardware.tiles_max {
+        Some(allowed) if needed > allowed => Err(PlanError::Tiles {
+            needed,
+            rows: hardware.tile_rows,
+            columns: hardware.tile_columns,
+            by_layer: by_layer.iter().map(ToString::to_string).collect::<Vec<_>>().join(" + "),
+            allowed,
+        }),
+        _ => Ok(()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_chunk_of_full_bytes_fits_32_bits() {
+        assert!(CHUNK_BLOCKS * 64 * 255 * 255 < 1 << 31);
+    }
+}

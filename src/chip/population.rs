@@ -1,0 +1,155 @@
+//! Streams, pathways and polarity: how unsigned arrays make a signed sum.
+//!
+//! ```text
+//! dual stream     target p: E = pp, I = np        target n: E = nn, I = pn
+//! single stream   W = E - I of two unsigned cells (codes 0 and 4): breaks Dale's law, for baselines
+//! ```
+//!
+//! A pathway is written source then target. `pp` and `nn` excite, `np` and `pn` inhibit; polarity belongs to
+//! the pathway, never to a cell. The I cell of a differential pair adds 4 to the code. See docs/MODEL.md, 1.
+#![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
+
+/// Activity of the excitatory (`P`) or inhibitory (`N`) population.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+#[repr(u8)]
+pub enum Stream {
+    /// Excitatory neurons.
+    P = 0,
+    /// Inhibitory neurons.
+    N = 1,
+}
+
+impl Stream {
+    /// Place in an array of streams.
+    #[must_use]
+    pub const fn index(self) -> usize {
+        self as usize
+    }
+}
+
+/// Whether a pathway's current adds or subtracts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Polarity {
+    /// Adds.
+    Excites,
+    /// Subtracts.
+    Inhibits,
+}
+
+/// One array of a layer: where its drives come from, where its current goes, with which sign.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Pathway {
+    /// Number in draws, ledger and hash.
+    pub code: u8,
+    /// Name in reports.
+    pub name: &'static str,
+    /// Whose activity drives the rows.
+    pub source: Stream,
+    /// Whose units the columns are.
+    pub target: Stream,
+    /// Sign of the contribution.
+    pub polarity: Polarity,
+}
+
+const fn pathway(
+    code: u8,
+    name: &'static str,
+    source: Stream,
+    target: Stream,
+    polarity: Polarity,
+) -> Pathway {
+    Pathway { code, name, source, target, polarity }
+}
+
+use Polarity::{Excites, Inhibits};
+use Stream::{N, P};
+
+const PP: Pathway = pathway(0, "pp", P, P, Excites);
+const NP: Pathway = pathway(1, "np", N, P, Inhibits);
+const NN: Pathway = pathway(2, "nn", N, N, Excites);
+const PN: Pathway = pathway(3, "pn", P, N, Inhibits);
+const PLUS: Pathway = pathway(0, "e", P, P, Excites);
+const MINUS: Pathway = pathway(4, "i", P, P, Inhibits);
+
+/// How a layer's arrays are wired.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Wiring {
+    /// Two populations, four arrays.
+    Dual,
+    /// Two populations read, one read out: `pp` and `np` only.
+    DualReadout,
+    /// One signed stream of differential pairs.
+    Single,
+}
+
+impl Wiring {
+    /// The arrays, in code order.
+    #[must_use]
+    pub const fn pathways(self) -> &'static [Pathway] {
+        match self {
+            Self::Dual => &[PP, NP, NN, PN],
+            Self::DualReadout => &[PP, NP],
+            Self::Single => &[PLUS, MINUS],
+        }
+    }
+
+    /// Populations whose units the columns are.
+    #[must_use]
+    pub const fn targets(self) -> &'static [Stream] {
+        match self {
+            Self::Dual => &[P, N],
+            Self::DualReadout | Self::Single => &[P],
+        }
+    }
+
+    /// Populations that drive the rows.
+    #[must_use]
+    pub const fn sources(self) -> &'static [Stream] {
+        match self {
+            Self::Dual | Self::DualReadout => &[P, N],
+            Self::Single => &[P],
+        }
+    }
+
+    /// Places, in [`Wiring::pathways`], of the excitatory and the inhibitory bank of a target.
+    #[must_use]
+    pub const fn banks(self, target: Stream) -> [usize; 2] {
+        match target {
+            P => [0, 1],
+            N => [2, 3],
+        }
+    }
+
+    /// Bits added to the rate's shift: a differential pair moves by two cells.
+    #[must_use]
+    pub const fn shift_extra(self) -> u32 {
+        match self {
+            Self::Dual | Self::DualReadout => 0,
+            Self::Single => 1,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_banks_of_a_target_excite_and_inhibit_it() {
+        for wiring in [Wiring::Dual, Wiring::DualReadout, Wiring::Single] {
+            for &target in wiring.targets() {
+                let [e, i] = wiring.banks(target).map(|at| wiring.pathways()[at]);
+                assert_eq!((e.target, i.target), (target, target));
+                assert_eq!((e.polarity, i.polarity), (Excites, Inhibits));
+            }
+            assert!(wiring.pathways().is_sorted_by_key(|pathway| pathway.code));
+        }
+    }
+
+    #[test]
+    fn a_pathway_excites_exactly_when_source_and_target_agree() {
+        for pathway in Wiring::Dual.pathways() {
+            assert_eq!(pathway.polarity == Excites, pathway.source == pathway.target);
+        }
+    }
+}

@@ -1,0 +1,1 @@
+//! Reports: pages and tables made from records. Nothing here changes a result.

@@ -1,0 +1,211 @@
+//! Carries out updates: puts numbers into a rule's steps and hands them to the engine.
+//!
+//! The driver owns what learning keeps beside the chip: the error unit and the number of updates done. It is
+//! driven with drive codes and labels, or, by other tasks, with drive codes and errors.
+#![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
+
+use super::error::ErrorUnit;
+use super::route::Delivery;
+use super::rule::{Rule, Step, UpdateMode, Words};
+use crate::chip::engine::{Engine, Operation, Side, Write};
+use crate::chip::ledger::{During, Event};
+use crate::num::fixed::{ErrorBits, rsh, sat};
+
+/// How a network learns.
+#[derive(Debug, Clone)]
+pub struct Learning {
+    /// The rule.
+    pub rule: Rule,
+    /// When a batch is written.
+    pub mode: UpdateMode,
+    /// How errors reach each layer.
+    pub deliveries: Vec<Delivery>,
+    /// Shifts of each layer: `(first update, k)`, in order.
+    pub shifts: Vec<Vec<(u64, u32)>>,
+}
+
+/// Learning in progress on an engine.
+#[derive(Debug)]
+pub struct Driver {
+    engine: Engine,
+    learning: Learning,
+    unit: ErrorUnit,
+    updates: u64,
+}
+
+impl Driver {
+    /// Starts learning on an engine.
+    #[must_use]
+    pub fn new(engine: Engine, learning: Learning, unit: ErrorUnit) -> Self {
+        Self { engine, learning, unit, updates: 0 }
+    }
+
+    /// The chip.
+    #[must_use]
+    pub const fn engine(&self) -> &Engine {
+        &self.engine
+    }
+
+    /// The chip, to read with or to restore.
+    pub const fn engine_mut(&mut self) -> &mut Engine {
+        &mut self.engine
+    }
+
+    /// The error unit.
+    #[must_use]
+    pub const fn unit(&self) -> &ErrorUnit {
+        &self.unit
+    }
+
+    /// The error unit, to restore.
+    pub const fn unit_mut(&mut self) -> &mut ErrorUnit {
+        &mut self.unit
+    }
+
+    /// Batches learnt from.
+    #[must_use]
+    pub const fn updates(&self) -> u64 {
+        self.updates
+    }
+
+    /// Restores the number of batches learnt from.
+    pub const fn set_updates(&mut self, updates: u64) {
+        self.updates = updates;
+    }
+
+    /// The shift of a layer for the update in progress.
+    #[must_use]
+    pub fn shift(&self, layer: usize) -> u32 {
+        let table = &self.learning.shifts[layer];
+        let after = table.partition_point(|&(first, _)| first <= self.updates);
+        table[after.max(1) - 1].1
+    }
+
+    /// Reads a batch of drive codes through all layers.
+    pub fn read(&mut self, codes: &[u8]) {
+        self.engine.execute(&Operation::LoadDrives { codes });
+        for layer in 0..self.engine.layers().len() {
+            self.engine.execute(&Operation::Forward { layer, side: Side::Rows });
+        }
+    }
+
+    /// One update from drive codes; `errors` gives the error of each output for a sample, `[sample][output]`,
+    /// once that sample has been read: it is handed the engine, the first sample's number in the batch and the
+    /// list to extend.
+    pub fn learn(&mut self, codes: &[u8], mut errors: impl FnMut(&Engine, usize, &mut Vec<i32>)) {
+        let inputs = self.engine.layers()[0].spec.inputs;
+        match self.learning.mode {
+            UpdateMode::Accumulate | UpdateMode::Replay => {
+                self.read(codes);
+                let mut list = Vec::new();
+                errors(&self.engine, 0, &mut list);
+                self.update(&list);
+            }
+            UpdateMode::Online => {
+                for (sample, codes) in codes.chunks_exact(inputs).enumerate() {
+                    self.read(codes);
+                    let mut list = Vec::new();
+                    errors(&self.engine, sample, &mut list);
+                    self.update(&list);
+                }
+            }
+        }
+        self.updates += 1;
+    }
+
+    /// Writes what the loaded samples' errors ask for.
+    fn update(&mut self, errors: &[i32]) {
+        let layers = self.engine.layers().len();
+        let outputs = self.engine.layers()[layers - 1].spec.units;
+        let (words, saturated) = self.unit.words(errors, outputs);
+        self.charge(layers - 1, Event::SaturatedErrors, saturated);
+        let samples = self.engine.samples();
+        for step in self.learning.rule.steps(self.learning.mode, layers, samples) {
+            match step {
+                Step::Error { layer, samples, words: Words::Routed } => {
+                    let delivery = &self.learning.deliveries[layer];
+                    let (routed, saturated, products) = delivery.words(&words, outputs);
+                    self.charge(layer, Event::SaturatedErrors, saturated);
+                    self.charge(layer, Event::Multiplies, products);
+                    self.engine.execute(&Operation::Error { layer, samples, words: &routed });
+                }
+                Step::Error { layer, samples, words: Words::Above } => {
+                    let (words, saturated) = self.backward(layer + 1);
+                    self.charge(layer, Event::SaturatedErrors, saturated);
+                    self.engine.execute(&Operation::Error { layer, samples, words: &words });
+                }
+                Step::ReadColumns { layer } => {
+                    self.engine.execute(&Operation::Forward { layer, side: Side::Columns });
+                }
+                Step::Update { layer, write, samples } => {
+                    let shift = if write == Write::Add { 0 } else { self.shift(layer) };
+                    self.engine.execute(&Operation::Update { layer, write, samples, shift });
+                }
+            }
+        }
+    }
+
+    /// Error words for the layer below `layer`: its row sums in units of an error word.
+    fn backward(&self, layer: usize) -> (Vec<i16>, u64) {
+        let hardware = self.engine.hardware();
+        let spec = &self.engine.layers()[layer].spec;
+        backward_words(
+            self.engine.backward(layer),
+            hardware.level_bits.get(),
+            spec.weight_max_log2,
+            hardware.error_bits,
+        )
+    }
+
+    fn charge(&mut self, layer: usize, event: Event, count: u64) {
+        let phase = self.engine.phase();
+        self.engine.ledger_mut(phase).add(layer, 0, During::Error, event, count);
+    }
+}
+
+/// Row sums of a transposed read as error words.
+///
+/// ```text
+/// S_below = sat_eb( rsh( d, level_bits - log2(weight_max) + 8 - error_bits ) )
+/// ```
+///
+/// A level is worth `weight_max / 2^level_bits` and a gate `2^(8 - error_bits)` of a word; a negative shift is a
+/// multiplication. The derivative's peak, `1 / (2 alpha)`, is left to the layer's rate.
+fn backward_words(
+    sums: &[i64],
+    level_bits: u32,
+    weight_max_log2: i32,
+    bits: ErrorBits,
+) -> (Vec<i16>, u64) {
+    let shift = i64::from(level_bits) - i64::from(weight_max_log2) + 8 - i64::from(bits.get());
+    let mut saturated = 0;
+    let words = sums
+        .iter()
+        .map(|&d| {
+            let scaled = match u32::try_from(shift) {
+                Ok(right) => rsh(d, right),
+                Err(_) => d << shift.unsigned_abs(),
+            };
+            let (word, changed) = sat(scaled, bits.get());
+            saturated += u64::from(changed);
+            word as i16
+        })
+        .collect();
+    (words, saturated)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn backward_sums_are_scaled_by_the_worth_of_a_level_and_bounded() {
+        let eight = ErrorBits::new(8).unwrap();
+        // 8 bits, weight_max 4: 64 levels are a weight of 1
+        let (words, saturated) =
+            backward_words(&[64, 32, -32, 31, 64 * 127, 64 * 128], 8, 2, eight);
+        assert_eq!((words, saturated), (vec![1, 1, 0, 0, 127, 127], 1));
+        // 1 bit, weight_max 4: a level is worth 2
+        assert_eq!(backward_words(&[3, -5], 1, 2, eight).0, [6, -10]);
+    }
+}

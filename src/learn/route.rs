@@ -1,0 +1,210 @@
+//! Error routes: which error word a hidden unit listens to.
+//!
+//! ```text
+//! modulo, T taps   unit j adds words (j + shift_t) mod CE,  q = j div CE:
+//!                  shift_0 = 0;  shift_1 = 1 + q mod (CE - 1);
+//!                  shift_t = free shift number (q div (CE - 1)^(t-1)) mod (free shifts), counted upward from 1
+//! random_sparse    one word, drawn once
+//! scalar_broadcast all units hear sat( rsh(sum of all words, ceil(log2 CE)) )
+//! random_dense     unit j hears sat( rsh(sum of +-words, shift) ), signs drawn once; computed in the error unit
+//! ```
+//!
+//! The first two are static taps on the tile and cost no product. See docs/MODEL.md, 3.2.
+#![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
+
+use crate::chip::layer::Taps;
+use crate::num::draw::{Place, Site, below};
+use crate::num::fixed::{ErrorBits, log2_ceil, rsh, sat};
+
+/// How errors reach hidden units.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Route {
+    /// Deterministic taps.
+    Modulo {
+        /// Words a unit adds, 1..=min(4, outputs).
+        taps: usize,
+        /// Shift of their sum; `None` is `ceil(log2 taps)`.
+        shift: Option<u32>,
+    },
+    /// One word a unit, drawn once.
+    RandomSparse,
+    /// One word for all.
+    ScalarBroadcast,
+    /// Random signs, as in direct feedback alignment.
+    RandomDense {
+        /// Shift of the sum; `None` is `ceil(log2(outputs) / 2)`, which keeps the variance.
+        shift: Option<u32>,
+    },
+}
+
+/// A route built for one layer: what the error unit computes, and what the tile taps.
+#[derive(Debug, Clone)]
+pub struct Delivery {
+    taps: Taps,
+    kind: Kind,
+    bits: ErrorBits,
+}
+
+#[derive(Debug, Clone)]
+enum Kind {
+    Bus,
+    Broadcast { shift: u32 },
+    Dense { negate: Vec<bool>, shift: u32 },
+    Own,
+}
+
+impl Delivery {
+    /// The output layer: unit c takes word c.
+    #[must_use]
+    pub fn output(outputs: usize, bits: ErrorBits) -> Self {
+        Self { taps: Taps::identity(outputs), kind: Kind::Bus, bits }
+    }
+
+    /// A layer whose units get a word each, made elsewhere (back-propagation).
+    #[must_use]
+    pub fn own(units: usize, bits: ErrorBits) -> Self {
+        Self { taps: Taps::identity(units), kind: Kind::Own, bits }
+    }
+
+    /// A hidden layer of `units` that hears `outputs` channels by `route`.
+    #[must_use]
+    pub fn hidden(
+        route: Route,
+        units: usize,
+        outputs: usize,
+        bits: ErrorBits,
+        seed: u64,
+        layer: u16,
+    ) -> Self {
+        let place = Place { layer, ..Place::global(seed, Site::Route, 0) };
+        let outputs_u32 = u32::try_from(outputs).expect("checked by the plan");
+        let word = |w: usize| u16::try_from(w).expect("checked by the plan");
+        let (taps, kind) = match route {
+            Route::Modulo { taps, shift } => {
+                let words = (0..units).flat_map(|unit| modulo(unit, outputs, taps)).map(word);
+                let shift = shift.unwrap_or(log2_ceil(taps as u64));
+                let words = words.collect();
+                (Taps { width: outputs, per_unit: taps, words, shift }, Kind::Bus)
+            }
+            Route::RandomSparse => {
+                let words = place.words().take(units).map(|w| word(below(w, outputs_u32) as usize));
+                let words = words.collect();
+                (Taps { width: outputs, per_unit: 1, words, shift: 0 }, Kind::Bus)
+            }
+            Route::ScalarBroadcast => {
+                let taps = Taps { width: 1, per_unit: 1, words: vec![0; units], shift: 0 };
+                (taps, Kind::Broadcast { shift: log2_ceil(outputs as u64) })
+            }
+            Route::RandomDense { shift } => {
+                let negate = place.words().take(units * outputs).map(|w| w >> 31 == 1).collect();
+                let shift = shift.unwrap_or(log2_ceil(outputs as u64).div_ceil(2));
+                (Taps::identity(units), Kind::Dense { negate, shift })
+            }
+        };
+        Self { taps, kind, bits }
+    }
+
+    /// The tile's part.
+    #[must_use]
+    pub const fn taps(&self) -> &Taps {
+        &self.taps
+    }
+
+    /// The words put on this layer's bus for output words `[sample][output]`; how many saturated and how many
+    /// products the error unit computed.
+    #[must_use]
+    pub fn words(&self, output: &[i16], outputs: usize) -> (Vec<i16>, u64, u64) {
+        let mut saturated = 0;
+        let mut bounded = |sum: i64, shift: u32| {
+            let (word, changed) = sat(rsh(sum, shift), self.bits.get());
+            saturated += u64::from(changed);
+            word as i16
+        };
+        match &self.kind {
+            Kind::Bus | Kind::Own => (output.to_vec(), 0, 0),
+            Kind::Broadcast { shift } => {
+                let sums =
+                    output.chunks_exact(outputs).map(|w| w.iter().map(|&w| i64::from(w)).sum());
+                (sums.map(|sum| bounded(sum, *shift)).collect(), saturated, 0)
+            }
+            Kind::Dense { negate, shift } => {
+                let mut words = Vec::new();
+                for sample in output.chunks_exact(outputs) {
+                    for negate in negate.chunks_exact(outputs) {
+                        let signed = sample.iter().zip(negate);
+                        let sum = signed.map(|(&w, &n)| i64::from(if n { -w } else { w })).sum();
+                        words.push(bounded(sum, *shift));
+                    }
+                }
+                let products = (words.len() * outputs) as u64;
+                (words, saturated, products)
+            }
+        }
+    }
+}
+
+/// Words unit `unit` adds.
+fn modulo(unit: usize, outputs: usize, taps: usize) -> Vec<usize> {
+    let q = unit / outputs;
+    let mut shifts = vec![0];
+    for tap in 1..taps {
+        let free: Vec<usize> = (1..outputs).filter(|shift| !shifts.contains(shift)).collect();
+        // (CE - 1)^(t - 1) beyond the address space leaves a quotient of 0
+        let power = u32::try_from(tap - 1).ok().and_then(|t| (outputs - 1).checked_pow(t));
+        shifts.push(free[power.map_or(0, |power| q / power) % free.len()]);
+    }
+    shifts.into_iter().map(|shift| (unit + shift) % outputs).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn bits() -> ErrorBits {
+        ErrorBits::new(8).unwrap()
+    }
+
+    #[test]
+    fn modulo_taps_follow_the_formula() {
+        assert_eq!([0, 9, 10, 13].map(|j| modulo(j, 10, 1)[0]), [0, 9, 0, 3]);
+        assert_eq!(modulo(0, 10, 3), [0, 1, 2]);
+        assert_eq!(modulo(10, 10, 3), [0, 2, 1]); // q = 1: shift 2; free 1,3,..: number 0
+        assert_eq!(modulo(95, 10, 3), [5, 6, 8]); // q = 9: shift 1 + 9 mod 9; free 2,3,..: number 1
+    }
+
+    #[test]
+    fn a_broadcast_is_one_word_and_a_dense_route_one_a_unit() {
+        let all = Delivery::hidden(Route::ScalarBroadcast, 7, 3, bits(), 1, 0);
+        assert_eq!(all.words(&[4, 4, 3, -1, 0, 0], 3), (vec![3, 0], 0, 0));
+        assert_eq!(all.taps().width, 1);
+        let dense = Delivery::hidden(Route::RandomDense { shift: Some(0) }, 7, 3, bits(), 1, 0);
+        let (words, saturated, products) = dense.words(&[100, 100, 100], 3);
+        assert!(words.iter().all(|w| [127, 100, -100, -127].contains(w)));
+        assert!(saturated > 0 && (words.len(), products) == (7, 21));
+    }
+
+    #[test]
+    fn random_routes_depend_on_seed_and_layer() {
+        let taps = |seed, layer| {
+            let made = Delivery::hidden(Route::RandomSparse, 200, 10, bits(), seed, layer);
+            made.taps().words.clone()
+        };
+        assert_eq!(taps(1, 0), taps(1, 0));
+        assert!(taps(1, 0) != taps(2, 0) && taps(1, 0) != taps(1, 1));
+        assert!((0..10).all(|c| taps(1, 0).contains(&c)));
+    }
+
+    proptest! {
+        #[test]
+        fn taps_of_a_unit_never_collide(unit in 0usize..5000, outputs in 1usize..40, taps in 1usize..=4) {
+            let taps = taps.min(outputs);
+            let mut words = modulo(unit, outputs, taps);
+            prop_assert_eq!(words[0], unit % outputs);
+            words.sort_unstable();
+            words.dedup();
+            prop_assert_eq!(words.len(), taps);
+            prop_assert!(words.iter().all(|&word| word < outputs));
+        }
+    }
+}

@@ -1,0 +1,152 @@
+//! Rules: makers of operation lists. A rule says in which order errors are delivered and layers written; it
+//! never touches a cell.
+
+use crate::chip::engine::Write;
+use std::ops::Range;
+
+mod bp;
+mod ed;
+
+/// Where the words of an `ERR` come from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Words {
+    /// The output error, by the layer's route.
+    Routed,
+    /// The transposed read of the layer above.
+    Above,
+}
+
+/// One step of an update, before numbers are put in.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Step {
+    /// `ERR` of a layer.
+    Error {
+        /// Which layer.
+        layer: usize,
+        /// Which samples.
+        samples: Range<usize>,
+        /// Whose words.
+        words: Words,
+    },
+    /// `FWD(columns)` of a layer.
+    ReadColumns {
+        /// Which layer.
+        layer: usize,
+    },
+    /// `UPD` of a layer.
+    Update {
+        /// Which layer.
+        layer: usize,
+        /// Which field.
+        write: Write,
+        /// Which samples.
+        samples: Range<usize>,
+    },
+}
+
+/// When a batch is written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum UpdateMode {
+    /// Sums over the batch in digital accumulators, written once.
+    Accumulate,
+    /// One forward pass fixes the gates; then one write a sample, in batch order.
+    Replay,
+    /// A forward pass and a write a sample.
+    Online,
+}
+
+/// A learning rule.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Rule {
+    /// Error diffusion: every layer hears the output error over its route.
+    Ed,
+    /// Kaneko's original: error diffusion that only potentiates.
+    Kaneko,
+    /// Direct feedback alignment on differential pairs: random dense route.
+    Dfa,
+    /// Back-propagation on differential pairs, by transposed reads.
+    Bp,
+}
+
+impl Rule {
+    /// Whether the rule keeps Dale's law.
+    #[must_use]
+    pub const fn is_dalean(self) -> bool {
+        matches!(self, Self::Ed | Self::Kaneko)
+    }
+
+    /// The steps of one update of `layers` layers over a batch whose forward pass is done.
+    #[must_use]
+    pub fn steps(self, mode: UpdateMode, layers: usize, samples: usize) -> Vec<Step> {
+        match self {
+            Self::Ed | Self::Kaneko | Self::Dfa => ed::steps(mode, layers, samples),
+            Self::Bp => bp::steps(mode, layers, samples),
+        }
+    }
+}
+
+/// The writes of a batch: all samples added and written once, or each written on its own.
+fn writes(mode: UpdateMode, layers: usize, samples: usize) -> Vec<Step> {
+    let update = |layer, write, samples| Step::Update { layer, write, samples };
+    let mut steps = Vec::new();
+    match mode {
+        UpdateMode::Accumulate => {
+            for layer in 0..layers {
+                steps.push(update(layer, Write::Add, 0..samples));
+                steps.push(update(layer, Write::Program, 0..0));
+            }
+        }
+        UpdateMode::Replay | UpdateMode::Online => {
+            for sample in 0..samples {
+                let each = (0..layers).map(|l| update(l, Write::Now, sample..sample + 1));
+                steps.extend(each);
+            }
+        }
+    }
+    steps
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ed_delivers_each_layer_once_and_never_reads_backwards() {
+        for rule in [Rule::Ed, Rule::Kaneko, Rule::Dfa] {
+            let steps = rule.steps(UpdateMode::Accumulate, 2, 5);
+            assert_eq!(
+                steps,
+                [
+                    Step::Error { layer: 0, samples: 0..5, words: Words::Routed },
+                    Step::Error { layer: 1, samples: 0..5, words: Words::Routed },
+                    Step::Update { layer: 0, write: Write::Add, samples: 0..5 },
+                    Step::Update { layer: 0, write: Write::Program, samples: 0..0 },
+                    Step::Update { layer: 1, write: Write::Add, samples: 0..5 },
+                    Step::Update { layer: 1, write: Write::Program, samples: 0..0 },
+                ]
+            );
+        }
+    }
+
+    #[test]
+    fn bp_reads_each_layer_above_before_it_is_written() {
+        let steps = Rule::Bp.steps(UpdateMode::Replay, 2, 2);
+        assert_eq!(
+            steps[..3],
+            [
+                Step::Error { layer: 1, samples: 0..2, words: Words::Routed },
+                Step::ReadColumns { layer: 1 },
+                Step::Error { layer: 0, samples: 0..2, words: Words::Above },
+            ]
+        );
+        assert_eq!(
+            steps[3..],
+            [
+                Step::Update { layer: 0, write: Write::Now, samples: 0..1 },
+                Step::Update { layer: 1, write: Write::Now, samples: 0..1 },
+                Step::Update { layer: 0, write: Write::Now, samples: 1..2 },
+                Step::Update { layer: 1, write: Write::Now, samples: 1..2 },
+            ]
+        );
+    }
+}
