@@ -55,7 +55,9 @@ impl Engine {
                 for (panel, latched) in latched.chunks(PANEL_COLUMNS).enumerate() {
                     let at = (panel * loaded + sample) * PANEL_COLUMNS;
                     let derivative = &registers.derivative[t][at..];
-                    let gates = &mut registers.gates[t][at..];
+                    let gates = &mut registers.gates[t][at..at + PANEL_COLUMNS];
+                    // columns beyond the last unit: registers of a batch of another size lay elsewhere
+                    gates[latched.len()..].fill(0);
                     for (gate, (&err, &slope)) in
                         gates.iter_mut().zip(latched.iter().zip(derivative))
                     {

@@ -175,11 +175,8 @@ impl Trainer {
             for (sample, example) in which.enumerate() {
                 let truth = usize::from(examples.labels()[example]);
                 let (guess, value) = predict(engine, sample);
-                let own = if outputs(engine) == 1 {
-                    0
-                } else {
-                    engine.output_accumulator(sample, truth)
-                };
+                let own =
+                    if outputs(engine) == 1 { 0 } else { engine.output_accumulator(sample, truth) };
                 correct += u64::from(guess == truth);
                 predictions.push(u8::try_from(guess).expect("at most 256 classes"));
                 margins.push(if guess == truth { 0 } else { (value - own).abs() });
