@@ -1,5 +1,6 @@
 //! Everything around a run: files in, files out.
 
+pub mod config;
 pub mod data;
 pub mod report;
 pub mod store;

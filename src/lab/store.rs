@@ -1,3 +1,22 @@
-//! A run on disk: folder, records, checkpoint, state hash, resume, verify.
+//! A run on disk: folder, records, checkpoint, state hash, receipt.
+//!
+//! ```text
+//! config.toml             the resolved configuration, self-contained
+//! metrics.jsonl           one record an epoch
+//! ledger.json             every count by phase, layer, pathway, operation, event
+//! checkpoint.safetensors  the state after the last finished epoch
+//! best-NNNNN.safetensors  the state with the best validation score
+//! receipt.json            hashes that let anyone do it again
+//! report.html             for people
+//! ```
+//!
+//! Every file is written beside its place and moved into it, records before the checkpoint, so that a run that is
+//! killed is loadable up to its last finished epoch.
 
+pub mod checkpoint;
+pub mod folder;
+pub mod hash;
 pub mod record;
+
+/// Version of the arithmetic. It rises when an equation moves; `verify` refuses another.
+pub const ARITHMETIC: u32 = 1;

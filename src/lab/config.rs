@@ -1,0 +1,56 @@
+//! Configuration: TOML text in, checked numbers out.
+//!
+//! An experiment file, a hardware model file and `--set key=value` all speak the same keys. Each text is read on its
+//! own, so an unknown key is reported with its line and a caret; then they are laid over one another and checked.
+//! The result is a [`Config`], which can be written back as one self-contained file.
+
+mod check;
+mod file;
+mod hardware;
+mod layers;
+
+pub use check::{Config, DataConfig, Select, TrainOn};
+pub use file::{ExperimentFile, HardwareFile};
+pub use hardware::{Model, builtin_models, load_model, model_names};
+pub use layers::{Sources, load};
+
+/// Why a configuration cannot be used. Each message says where, what was found, what is allowed.
+#[derive(Debug, thiserror::Error)]
+pub enum ConfigError {
+    /// The text is not TOML, or has keys or values of the wrong kind.
+    #[error("{place}:\n{error}")]
+    Text {
+        /// File name or option.
+        place: String,
+        /// Message with line, column and caret.
+        error: String,
+    },
+    /// A file cannot be read.
+    #[error("cannot read {path}: {error}; {hint}")]
+    Unreadable {
+        /// The file.
+        path: String,
+        /// What the system says.
+        error: std::io::Error,
+        /// What to try.
+        hint: String,
+    },
+    /// A number outside its range.
+    #[error("`{key}`: {error}")]
+    Range {
+        /// The key in full.
+        key: String,
+        /// What was found and what is allowed.
+        error: crate::num::fixed::OutOfRange,
+    },
+    /// A value that does not fit with the others.
+    #[error("`{key}` {found}; {allowed}")]
+    Value {
+        /// The key in full.
+        key: String,
+        /// What was found.
+        found: String,
+        /// What is allowed and what to try.
+        allowed: String,
+    },
+}

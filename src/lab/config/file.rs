@@ -1,0 +1,288 @@
+//! The keys of configuration files. Every key is optional here; defaults and ranges are in `check`.
+
+use std::collections::BTreeMap;
+use std::fmt;
+
+use serde::de::{self, Deserializer, MapAccess, Visitor};
+use serde::{Deserialize, Serialize};
+
+/// One value for all layers, or one for each.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(untagged, expecting = "a number, or a list with one number a layer")]
+pub enum PerLayer<T> {
+    /// The same everywhere.
+    All(T),
+    /// Input to output.
+    Each(Vec<T>),
+}
+
+macro_rules! keys {
+    ($($(#[$doc:meta])* $name:ident { $($(#[$field_doc:meta])* $field:ident: $kind:ty,)* })*) => {$(
+        $(#[$doc])*
+        #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+        #[serde(deny_unknown_fields)]
+        pub struct $name {
+            $($(#[$field_doc])* #[serde(skip_serializing_if = "Option::is_none")] pub $field: Option<$kind>,)*
+        }
+    )*};
+}
+
+keys! {
+    /// An experiment file.
+    ExperimentFile {
+        /// `classify`.
+        task: String,
+        /// Seed of all draws.
+        seed: u64,
+        /// What is learnt.
+        data: DataFile,
+        /// Layers and units.
+        network: NetworkFile,
+        /// Rule, rate, batch, epochs.
+        learning: LearningFile,
+        /// The chip: a model and what differs from it.
+        hw: HardwareFile,
+    }
+    /// `[data]`: a named set, or files of one's own.
+    DataFile {
+        /// `optdigits`, `mnist`, `fashion-mnist`, `cifar10`, `xor`, `parity-N`.
+        set: String,
+        /// `idx`, `npz`, `csv`: own files.
+        format: String,
+        /// Training examples (IDX: images).
+        train: String,
+        /// IDX labels of the training examples.
+        train_labels: String,
+        /// Validation examples; default: the last 1/12 of the training examples.
+        validation: String,
+        /// IDX labels of the validation examples.
+        validation_labels: String,
+        /// Test examples.
+        test: String,
+        /// IDX labels of the test examples.
+        test_labels: String,
+        /// Greatest value; default: 255, or 1 for floats.
+        full_scale: u8,
+        /// Number of classes; default: greatest label + 1.
+        classes: usize,
+        /// CSV: `first`, `last`, a number from 0, or a header.
+        label_column: String,
+        /// NPZ: name of the array of examples (default `x`).
+        examples_array: String,
+        /// NPZ: name of the array of labels (default `y`).
+        labels_array: String,
+    }
+    /// `[network]`.
+    NetworkFile {
+        /// Units of each hidden layer.
+        hidden: Vec<usize>,
+        /// Output units: the number of classes, or 1 for two classes.
+        outputs: usize,
+        /// `sigmoid`, `relu`, `identity`, of hidden layers; outputs are sigmoid.
+        activation: String,
+        /// Sigmoid width of each layer.
+        alpha: PerLayer<f64>,
+        /// Weight of the level after the greatest, a power of two, of each layer.
+        weight_max: PerLayer<f64>,
+        /// `none` or `rows`.
+        bias: String,
+        /// `p`.
+        readout: String,
+        /// Initial gain of excitatory and inhibitory arrays of hidden layers.
+        init_gain: [f64; 2],
+        /// The same of the output layer.
+        init_gain_output: [f64; 2],
+    }
+    /// `[learning]`.
+    LearningFile {
+        /// `ed`, `ed_seed`, `kaneko`, `dfa`, `bp`.
+        rule: String,
+        /// Passes over the training set.
+        epochs: u32,
+        /// Samples of an update.
+        batch: i64,
+        /// `accumulate`, `replay`, `online`.
+        mode: String,
+        /// Rate, before multipliers.
+        rate: f64,
+        /// Factor of the rate of each layer.
+        rate_multipliers: PerLayer<f64>,
+        /// Small factor beside the shift.
+        rate_mantissa: i64,
+        /// `cosine` or `constant`.
+        decay: String,
+        /// `none`, `batch`, `running`.
+        centre: String,
+        /// `modulo`, `random_sparse`, `scalar_broadcast`, `random_dense`.
+        route: String,
+        /// Words a hidden unit adds (modulo).
+        taps: usize,
+        /// Shift of the sum of words.
+        tap_shift: u32,
+        /// Training images move by up to so many pixels.
+        shift_pixels: u32,
+        /// `train`, or `all`: training and validation examples.
+        train_on: String,
+        /// `best_validation` or `last`: the epoch whose state reads the test set.
+        select: String,
+    }
+    /// A hardware model file, or `[hw]` of an experiment.
+    HardwareFile {
+        /// Name of a built-in model or path of a model file (experiments only).
+        model: String,
+        /// What it is called (model files).
+        name: String,
+        /// One sentence (model files).
+        summary: String,
+        /// Cells.
+        cell: CellFile,
+        /// Physical arrays.
+        tile: TileFile,
+        /// Row drivers.
+        drive: DriveFile,
+        /// Column converters.
+        adc: AdcFile,
+        /// Activation table.
+        lut: LutFile,
+        /// Error bus.
+        error: ErrorFile,
+        /// Programming.
+        write: WriteFile,
+        /// What the chip does and this program does not simulate: printed with every report.
+        not_simulated: BTreeMap<String, String>,
+    }
+    /// `[cell]`.
+    CellFile {
+        /// Bits of a stored level, 1..=12.
+        level_bits: i64,
+        /// Least level.
+        floor: i64,
+        /// Greatest level; default `2^level_bits - 1`.
+        ceiling: i64,
+        /// `recoverable` or `absorbing`.
+        floor_kind: String,
+        /// Where the numbers come from.
+        source: String,
+        /// `measured`, `fitted`, `assumed`.
+        kind: String,
+    }
+    /// `[tile]`.
+    TileFile {
+        /// Rows of a tile.
+        rows: i64,
+        /// Columns of a tile.
+        columns: i64,
+        /// Tiles on the chip; default: as many as it takes.
+        count: i64,
+        /// Whether rows can be read while columns are driven.
+        transposed_read: bool,
+        /// Where the numbers come from.
+        source: String,
+        /// `measured`, `fitted`, `assumed`.
+        kind: String,
+    }
+    /// `[drive]`.
+    DriveFile {
+        /// Bits of a drive code, 1..=8.
+        bits: i64,
+        /// Bits a DAC applies at a time.
+        dac_bits: i64,
+        /// Where the numbers come from.
+        source: String,
+        /// `measured`, `fitted`, `assumed`.
+        kind: String,
+    }
+    /// `[lut]`.
+    LutFile {
+        /// Bits of the table index.
+        bits: i64,
+        /// Where the numbers come from.
+        source: String,
+        /// `measured`, `fitted`, `assumed`.
+        kind: String,
+    }
+    /// `[error]`.
+    ErrorFile {
+        /// Bits of an error word, 2..=9.
+        bits: i64,
+        /// Where the numbers come from.
+        source: String,
+        /// `measured`, `fitted`, `assumed`.
+        kind: String,
+    }
+    /// `[write]`.
+    WriteFile {
+        /// Most pulses a write gives a cell, 1..=127.
+        increment_max: i64,
+        /// Random bits of rounding: 0 (half-up), 8, 16.
+        dither_bits: i64,
+        /// `per_cell` or `separable`.
+        dither: String,
+        /// Bits of the digital remainder behind a cell.
+        residual_bits: i64,
+        /// Where the numbers come from.
+        source: String,
+        /// `measured`, `fitted`, `assumed`.
+        kind: String,
+    }
+    /// `[adc]` of finite converters.
+    AdcTable {
+        /// Resolution, 2..=16.
+        bits: i64,
+        /// `calibrated`, `full`, or a shift.
+        range: RangeFile,
+        /// Shift added to the calibrated one.
+        headroom: i64,
+        /// `never` or `epoch`.
+        recalibrate: String,
+        /// `digital` or `current`.
+        subtract: String,
+        /// Where the numbers come from.
+        source: String,
+        /// `measured`, `fitted`, `assumed`.
+        kind: String,
+    }
+}
+
+/// `adc = "ideal"` or a table.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[serde(untagged)]
+pub enum AdcFile {
+    /// `"ideal"`.
+    Ideal(String),
+    /// Finite converters.
+    Finite(AdcTable),
+}
+
+impl<'de> Deserialize<'de> for AdcFile {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct Either;
+        impl<'de> Visitor<'de> for Either {
+            type Value = AdcFile;
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str("\"ideal\" or a table with `bits`")
+            }
+            fn visit_str<E: de::Error>(self, text: &str) -> Result<AdcFile, E> {
+                match text {
+                    "ideal" => Ok(AdcFile::Ideal(text.into())),
+                    other => Err(E::invalid_value(de::Unexpected::Str(other), &self)),
+                }
+            }
+            fn visit_map<M: MapAccess<'de>>(self, map: M) -> Result<AdcFile, M::Error> {
+                AdcTable::deserialize(de::value::MapAccessDeserializer::new(map))
+                    .map(AdcFile::Finite)
+            }
+        }
+        deserializer.deserialize_any(Either)
+    }
+}
+
+/// `range = "calibrated"`, `"full"` or a shift.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(untagged, expecting = "\"calibrated\", \"full\" or a shift (a whole number)")]
+pub enum RangeFile {
+    /// By name.
+    Named(String),
+    /// Explicit.
+    Shift(i64),
+}

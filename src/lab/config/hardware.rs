@@ -1,0 +1,151 @@
+//! Hardware models: the built-in ones, and files.
+
+use super::file::HardwareFile;
+use super::{ConfigError, check};
+use crate::chip::hardware::Hardware;
+
+/// The built-in models, by name, as their files are.
+const BUILTIN: [(&str, &str); 3] = [
+    ("ideal", include_str!("../../../hw_models/ideal.toml")),
+    ("prime", include_str!("../../../hw_models/prime.toml")),
+    ("isaac", include_str!("../../../hw_models/isaac.toml")),
+];
+
+/// A checked hardware model.
+#[derive(Debug, Clone)]
+pub struct Model {
+    /// What it is called.
+    pub name: String,
+    /// One sentence.
+    pub summary: String,
+    /// Its text.
+    pub text: String,
+    /// The chip.
+    pub hardware: Hardware,
+    /// What is not simulated.
+    pub not_simulated: Vec<(String, String)>,
+}
+
+/// Names of the built-in models.
+#[must_use]
+pub fn model_names() -> Vec<&'static str> {
+    BUILTIN.iter().map(|(name, _)| *name).collect()
+}
+
+/// The built-in models.
+///
+/// # Panics
+/// When one of our own files is wrong: a test reads them all.
+#[must_use]
+pub fn builtin_models() -> Vec<Model> {
+    let load = |(name, _): &(&str, &str)| load_model(name).expect("built-in models are valid");
+    BUILTIN.iter().map(load).collect()
+}
+
+/// Text of a model: a built-in name, or the path of a file.
+pub(super) fn model_text(name: &str) -> Result<String, ConfigError> {
+    if let Some((_, text)) = BUILTIN.iter().find(|(builtin, _)| *builtin == name) {
+        return Ok((*text).to_owned());
+    }
+    let hint = format!("built-in models are {}", model_names().join(", "));
+    #[expect(clippy::disallowed_methods, reason = "models live in files")]
+    std::fs::read_to_string(name)
+        .map_err(|error| ConfigError::Unreadable { path: name.into(), error, hint })
+}
+
+/// Reads a model file: every key known, every table with a source.
+pub(super) fn model_file(name: &str, text: &str) -> Result<HardwareFile, ConfigError> {
+    let file: HardwareFile = toml::from_str(text)
+        .map_err(|e| ConfigError::Text { place: name.into(), error: e.to_string() })?;
+    let wrong = |key: &str, found: &str, allowed: &str| ConfigError::Value {
+        key: key.into(),
+        found: found.into(),
+        allowed: allowed.into(),
+    };
+    if file.model.is_some() {
+        let allowed = "a model stands for itself; remove the key";
+        return Err(wrong("model", "names another model", allowed));
+    }
+    if file.name.is_none() {
+        return Err(wrong("name", "is missing", "give the model a name"));
+    }
+    for (table, source, kind) in provenance(&file) {
+        let key = format!("{table}.source");
+        if source.is_none_or(|text| text.trim().is_empty()) {
+            let allowed = "every table of a hardware model says where its numbers come from";
+            return Err(wrong(&key, "is missing", allowed));
+        }
+        let key = format!("{table}.kind");
+        match kind {
+            Some("measured" | "fitted" | "assumed") => {}
+            Some(other) => {
+                let found = format!("is \"{other}\"");
+                return Err(wrong(&key, &found, "it is measured, fitted or assumed"));
+            }
+            None => return Err(wrong(&key, "is missing", "it is measured, fitted or assumed")),
+        }
+    }
+    Ok(file)
+}
+
+/// `(table, source, kind)` of every table that is there.
+fn provenance(file: &HardwareFile) -> Vec<(&'static str, Option<&str>, Option<&str>)> {
+    let mut all = Vec::new();
+    macro_rules! table {
+        ($($name:ident)*) => {$(
+            if let Some(table) = &file.$name {
+                all.push((stringify!($name), table.source.as_deref(), table.kind.as_deref()));
+            }
+        )*};
+    }
+    table!(cell tile drive lut error write);
+    if let Some(super::file::AdcFile::Finite(table)) = &file.adc {
+        all.push(("adc", table.source.as_deref(), table.kind.as_deref()));
+    }
+    all
+}
+
+/// Loads and checks a model by built-in name or path.
+///
+/// # Errors
+/// When it cannot be read, has unknown keys, lacks a source or holds impossible numbers.
+pub fn load_model(name: &str) -> Result<Model, ConfigError> {
+    let text = model_text(name)?;
+    let file = model_file(name, &text)?;
+    let hardware = check::hardware(&file, "")?;
+    Ok(Model {
+        name: file.name.clone().unwrap_or_default(),
+        summary: file.summary.clone().unwrap_or_default(),
+        hardware,
+        not_simulated: file.not_simulated.unwrap_or_default().into_iter().collect(),
+        text,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_built_in_models_are_valid_and_named_like_their_files() {
+        let models = builtin_models();
+        assert!(models.iter().map(|model| model.name.as_str()).eq(model_names()));
+        assert!(models.iter().all(|model| !model.summary.is_empty()));
+    }
+
+    #[test]
+    fn a_table_without_a_source_is_refused() {
+        let error = model_file("x.toml", "name = \"x\"\n[cell]\nlevel_bits = 4\n").unwrap_err();
+        assert!(error.to_string().contains("`cell.source` is missing"), "{error}");
+        let text = "name = \"x\"\n[cell]\nlevel_bits = 4\nsource = \"s\"\nkind = \"guess\"\n";
+        let error = model_file("x.toml", text).unwrap_err().to_string();
+        assert!(error.contains("`cell.kind` is \"guess\""), "{error}");
+    }
+
+    #[test]
+    fn an_unknown_key_is_shown_with_a_caret_and_the_keys_there_are() {
+        let error = model_file("x.toml", "name = \"x\"\n[adc]\nadc-bit = 8\n").unwrap_err().to_string();
+        assert!(error.contains("unknown field `adc-bit`, expected one of `bits`"), "{error}");
+        assert!(error.contains("line 3") && error.contains('^'), "{error}");
+    }
+}
