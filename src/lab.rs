@@ -3,4 +3,5 @@
 pub mod config;
 pub mod data;
 pub mod report;
+pub mod run;
 pub mod store;

@@ -5,6 +5,7 @@
 //! The result is a [`Config`], which can be written back as one self-contained file.
 
 mod check;
+mod data;
 mod file;
 mod hardware;
 mod layers;

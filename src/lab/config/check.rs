@@ -522,6 +522,12 @@ impl Config {
         })
     }
 
+    /// The rule as it was written.
+    #[must_use]
+    pub fn rule_name(&self) -> &str {
+        self.resolved.learning.as_ref().and_then(|l| l.rule.as_deref()).unwrap_or("ed")
+    }
+
     /// What may go wrong with these numbers, before anything runs.
     #[must_use]
     pub fn warnings(&self) -> Vec<String> {

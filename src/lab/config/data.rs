@@ -1,0 +1,75 @@
+//! `[data]` as a source of examples.
+
+use std::path::PathBuf;
+
+use super::{Config, ConfigError};
+use crate::lab::data::{FileSet, PartFile, Source};
+
+impl Config {
+    /// Where the examples come from.
+    ///
+    /// # Errors
+    /// When the set is unknown or a key is missing.
+    pub fn source(&self) -> Result<Source, ConfigError> {
+        let data = &self.data;
+        let wrong = |key: &str, found: String, allowed: &str| ConfigError::Value {
+            key: format!("data.{key}"),
+            found,
+            allowed: allowed.into(),
+        };
+        let Some(format) = &data.format else {
+            let name = data.set.as_deref().unwrap_or("optdigits");
+            let set = name.parse().map_err(|error| wrong("set", format!("is \"{name}\""), &format!("{error}")))?;
+            return Ok(Source::Named(set));
+        };
+        if data.set.is_some() {
+            return Err(wrong("format", "is given beside data.set".into(), "name a set or files, not both"));
+        }
+        let part = |name: &str, values: &Option<String>, labels: &Option<String>| {
+            let Some(path) = values else { return Ok(None) };
+            let path = PathBuf::from(path);
+            Ok(Some(match format.as_str() {
+                "idx" => {
+                    let labels = labels.as_ref().ok_or_else(|| {
+                        let key = format!("{name}_labels");
+                        wrong(&key, "is missing".into(), "IDX keeps labels in a file of their own")
+                    })?;
+                    PartFile::Idx { values: path, labels: labels.into() }
+                }
+                "npz" => PartFile::Npz {
+                    path,
+                    values: data.examples_array.clone().unwrap_or_else(|| "x".into()),
+                    labels: data.labels_array.clone().unwrap_or_else(|| "y".into()),
+                },
+                "csv" => {
+                    let column = data.label_column.as_deref().unwrap_or("last");
+                    let label = column.parse().map_err(|_| {
+                        let allowed = "it is first, last, a number from 0, or a header";
+                        wrong("label_column", format!("is \"{column}\""), allowed)
+                    })?;
+                    PartFile::Csv { path, label }
+                }
+                other => {
+                    return Err(wrong("format", format!("is \"{other}\""), "it is idx, npz or csv"));
+                }
+            }))
+        };
+        let train = part("train", &data.train, &data.train_labels)?
+            .ok_or_else(|| wrong("train", "is missing".into(), "give the file of training examples"))?;
+        Ok(Source::Files(Box::new(FileSet {
+            train,
+            validation: part("validation", &data.validation, &data.validation_labels)?,
+            test: part("test", &data.test, &data.test_labels)?,
+            full_scale: data.full_scale,
+            classes: data.classes,
+            image: None,
+        })))
+    }
+
+    /// The data in one word, for folder names and titles.
+    #[must_use]
+    pub fn data_name(&self) -> String {
+        let own = || self.data.format.clone().unwrap_or_else(|| "data".into());
+        self.data.set.clone().unwrap_or_else(own)
+    }
+}

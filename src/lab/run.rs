@@ -1,0 +1,91 @@
+//! Carrying out a configuration: train, continue, verify, evaluate.
+//!
+//! A [`Session`] is a training in memory that makes records; [`train`] keeps it in a folder, [`verify()`] compares it with
+//! one. Neither prints: callers get [`Event`]s.
+
+mod session;
+mod train;
+mod verify;
+
+pub use session::{Machine, Session};
+pub use train::{Event, Outcome, evaluate, resume, train, view};
+pub use verify::{Verdict, verify};
+
+use crate::chip::layer::PlanError;
+use crate::lab::config::ConfigError;
+use crate::lab::data::DataError;
+use crate::lab::store::checkpoint::CheckpointError;
+use crate::lab::store::folder::FolderError;
+
+/// Why a run could not be carried out.
+#[derive(Debug, thiserror::Error)]
+pub enum RunError {
+    /// The configuration.
+    #[error(transparent)]
+    Config(#[from] ConfigError),
+    /// The data.
+    #[error(transparent)]
+    Data(#[from] DataError),
+    /// The network does not fit the chip.
+    #[error(transparent)]
+    Plan(#[from] PlanError),
+    /// The folder.
+    #[error(transparent)]
+    Folder(#[from] FolderError),
+    /// The checkpoint.
+    #[error("{path}: {error}")]
+    Checkpoint {
+        /// Which file.
+        path: String,
+        /// What is wrong.
+        error: CheckpointError,
+    },
+    /// The data is not what the run was made with.
+    #[error("the data has the hash {found}, but the run was made with {wanted}; get the same data again (`dalean data list`)")]
+    DataChanged {
+        /// Hash now.
+        found: String,
+        /// Hash in the receipt.
+        wanted: String,
+    },
+    /// The configuration is not what the run was made with.
+    #[error("config.toml has the hash {found}, but receipt.json says {wanted}; one of them was changed")]
+    ConfigChanged {
+        /// Hash now.
+        found: String,
+        /// Hash in the receipt.
+        wanted: String,
+    },
+    /// The run was made with other arithmetic.
+    #[error(
+        "the run was made with arithmetic {found}, this program has {wanted}; use the version of dalean that made it"
+    )]
+    Arithmetic {
+        /// In the receipt.
+        found: u32,
+        /// Of this program.
+        wanted: u32,
+    },
+    /// The run is finished.
+    #[error("{path} is finished; there is nothing to continue (see `dalean verify`)")]
+    Finished {
+        /// Which folder.
+        path: String,
+    },
+    /// The caller asked to stop.
+    #[error("stopped in epoch {}; continue with --resume {path}", .epoch + 1)]
+    Stopped {
+        /// Epochs finished.
+        epoch: u32,
+        /// Folder of the run.
+        path: String,
+    },
+    /// Too little data.
+    #[error("the {part} part of the data has no examples; {hint}")]
+    Empty {
+        /// Which part.
+        part: &'static str,
+        /// What to try.
+        hint: &'static str,
+    },
+}

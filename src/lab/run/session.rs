@@ -1,0 +1,300 @@
+//! A training in memory: data, trainer, and the records they give.
+#![expect(clippy::disallowed_types, reason = "wall-clock seconds are shown to people, never compared")]
+
+use std::collections::BTreeMap;
+use std::time::Instant;
+
+use super::RunError;
+use crate::chip::crossbar::kernel::Backend;
+use crate::chip::engine::{Calibration, Currents, Phase};
+use crate::chip::hardware::{Adc, AdcRange};
+use crate::chip::ledger::{Event, Ledger};
+use crate::lab::config::{Config, Select, TrainOn};
+use crate::lab::data::Loaded;
+use crate::lab::store::checkpoint::{self, CheckpointError, Identity};
+use crate::lab::store::hash;
+use crate::lab::store::record::{EpochRecord, LayerRecord, PathwayRecord, Score, TestRecord};
+use crate::task::classify::{Evaluation, Examples, Progress, Trainer};
+
+/// Wrong answers kept for the report.
+const MISTAKES: usize = 24;
+
+/// What a run is carried out with; none of it changes a result.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Machine {
+    /// Which loops run.
+    pub backend: Backend,
+    /// Threads.
+    pub threads: usize,
+}
+
+/// A training in memory.
+#[derive(Debug)]
+pub struct Session {
+    trainer: Trainer,
+    pool: rayon::ThreadPool,
+    train: Examples,
+    validation: Examples,
+    test: Examples,
+    select: Select,
+    config_hash: String,
+    data_hash: String,
+    warnings: Vec<String>,
+}
+
+impl Session {
+    /// Builds the network, loads its initial levels and calibrates its converters.
+    ///
+    /// # Errors
+    /// When the configuration does not fit the data or the chip.
+    ///
+    /// # Panics
+    /// When threads cannot be started.
+    pub fn new(config: &Config, data: Loaded, machine: Machine) -> Result<Self, RunError> {
+        let image = data.image.map(|shape| [shape.height, shape.width, shape.channels]);
+        let split = data.split;
+        if split.train.is_empty() {
+            let hint = "give it at least one example";
+            return Err(RunError::Empty { part: "training", hint });
+        }
+        let experiment =
+            config.experiment(split.train.features(), split.train.classes(), image)?;
+        let train = match config.train_on {
+            TrainOn::Train => split.train,
+            TrainOn::All => split.train.joined(&split.validation),
+        };
+        let validation = match config.train_on {
+            TrainOn::Train => split.validation,
+            TrainOn::All => split.validation.split_at(0).0,
+        };
+        if config.select == Select::BestValidation && validation.is_empty() {
+            let hint = "choose the last epoch with learning.select = \"last\"";
+            return Err(RunError::Empty { part: "validation", hint });
+        }
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(machine.threads)
+            .build()
+            .expect("threads can be started");
+        let seeded = experiment.build(machine.backend, train.len())?;
+        let trainer = Trainer::new(experiment, seeded);
+        let mut session = Self {
+            trainer,
+            pool,
+            train,
+            validation,
+            test: split.test,
+            select: config.select,
+            config_hash: hash::text(&config.to_toml()),
+            data_hash: data.hash,
+            warnings: config.warnings(),
+        };
+        if let Some(calibration) = session.calibrate() {
+            session.warn_of_low_codes(&calibration);
+        }
+        Ok(session)
+    }
+
+    fn calibrate(&mut self) -> Option<Calibration> {
+        let Self { trainer, pool, train, .. } = self;
+        pool.install(|| trainer.calibrate(train))
+    }
+
+    fn warn_of_low_codes(&mut self, calibration: &Calibration) {
+        for (layer, &code) in calibration.code_max.iter().enumerate() {
+            if code <= 3 {
+                self.warnings.push(format!(
+                    "layer {layer}: converters never read above code {code} on the first training examples; set \
+                     hw.adc.range = \"calibrated\" or use more hw.adc.bits"
+                ));
+            }
+        }
+    }
+
+    /// Hash of the resolved configuration.
+    #[must_use]
+    pub fn config_hash(&self) -> &str {
+        &self.config_hash
+    }
+
+    /// Hash of the data.
+    #[must_use]
+    pub fn data_hash(&self) -> &str {
+        &self.data_hash
+    }
+
+    /// What the user should know.
+    #[must_use]
+    pub fn warnings(&self) -> &[String] {
+        &self.warnings
+    }
+
+    /// The training.
+    #[must_use]
+    pub const fn trainer(&self) -> &Trainer {
+        &self.trainer
+    }
+
+    /// The test examples.
+    #[must_use]
+    pub const fn test_examples(&self) -> &Examples {
+        &self.test
+    }
+
+    /// Examples an epoch learns from.
+    #[must_use]
+    pub fn train_len(&self) -> usize {
+        self.train.len()
+    }
+
+    /// The state as a checkpoint.
+    #[must_use]
+    pub fn checkpoint(&self) -> Vec<u8> {
+        checkpoint::write(&self.trainer, self.identity())
+    }
+
+    /// Restores a state.
+    ///
+    /// # Errors
+    /// When the checkpoint is damaged or another run's.
+    pub fn restore(&mut self, bytes: &[u8]) -> Result<(), CheckpointError> {
+        let (config, data) = (self.config_hash.clone(), self.data_hash.clone());
+        checkpoint::read(bytes, &mut self.trainer, Identity { config: &config, data: &data })
+    }
+
+    fn identity(&self) -> Identity<'_> {
+        Identity { config: &self.config_hash, data: &self.data_hash }
+    }
+
+    /// The record of the state before the first update.
+    pub fn start(&mut self) -> EpochRecord {
+        let (validation, currents) = self.validate();
+        self.record(None, validation, &currents, 0.0)
+    }
+
+    /// One epoch and its record. `None` when `go_on` said to stop.
+    pub fn epoch(&mut self, go_on: &mut (dyn FnMut(Progress) -> bool + Send)) -> Option<EpochRecord> {
+        let started = Instant::now();
+        let again = matches!(
+            self.trainer.experiment().hardware.adc,
+            Adc::Finite { range: AdcRange::Calibrated { every_epoch: true, .. }, .. }
+        );
+        if again && self.trainer.epoch() > 0 {
+            let _ = self.calibrate();
+        }
+        let Self { trainer, pool, train, .. } = self;
+        let correct = pool.install(|| trainer.learn(train, go_on)).ok()?;
+        let seconds = started.elapsed().as_secs_f64();
+        let total = self.train.len() as u64;
+        let (validation, currents) = self.validate();
+        Some(self.record(Some(Score { correct, total }), validation, &currents, seconds))
+    }
+
+    fn validate(&mut self) -> (Option<Score>, Vec<Currents>) {
+        let Self { trainer, pool, validation, .. } = self;
+        if validation.is_empty() {
+            return (None, vec![[[0; 2]; 2]; trainer.driver().engine().layers().len()]);
+        }
+        let Evaluation { correct, currents, .. } = pool.install(|| trainer.evaluate(validation));
+        (Some(Score { correct, total: validation.len() as u64 }), currents)
+    }
+
+    /// Reads the test set with the present state.
+    pub fn test(&mut self) -> TestRecord {
+        let Self { trainer, pool, test, .. } = self;
+        let found = pool.install(|| trainer.evaluate(test));
+        let classes = test.classes();
+        let mut confusion = vec![vec![0; classes]; classes];
+        let mut wrong = Vec::new();
+        for (example, (&guess, &truth)) in found.predictions.iter().zip(test.labels()).enumerate() {
+            confusion[usize::from(truth)][usize::from(guess)] += 1;
+            if guess != truth {
+                wrong.push((found.margins[example], example as u64, truth, guess));
+            }
+        }
+        wrong.sort_by_key(|&(margin, example, ..)| (std::cmp::Reverse(margin), example));
+        let mistakes = wrong.into_iter().take(MISTAKES);
+        TestRecord {
+            epoch: self.trainer.epoch(),
+            select: match self.select {
+                Select::BestValidation => "best_validation".into(),
+                Select::Last => "last".into(),
+            },
+            score: Score { correct: found.correct, total: self.test.len() as u64 },
+            confusion,
+            mistakes: mistakes.map(|(_, e, t, g)| [e, u64::from(t), u64::from(g)]).collect(),
+        }
+    }
+
+    fn record(
+        &self,
+        train: Option<Score>,
+        validation: Option<Score>,
+        currents: &[Currents],
+        train_seconds: f64,
+    ) -> EpochRecord {
+        let driver = self.trainer.driver();
+        let engine = driver.engine();
+        let statistics = self.trainer.statistics();
+        let ledger = engine.ledger(Phase::Training);
+        let layers = engine.layers().iter().enumerate().map(|(layer, this)| LayerRecord {
+            layer,
+            levels: crate::learn::statistics::balance(&statistics, layer),
+            currents: currents[layer],
+            adc_shifts: this.adc_shifts.clone(),
+            rate_shift: driver.shift(layer),
+        });
+        let layers = layers.collect();
+        let pathways = statistics.into_iter().map(|s| {
+            let layout = engine.layers()[s.layer].layout;
+            let events = Event::ALL.into_iter().filter_map(|event| {
+                let count = ledger.of_pathway(s.layer, s.code, event);
+                (count > 0).then(|| (event.name().to_owned(), count))
+            });
+            PathwayRecord {
+                layer: s.layer,
+                pathway: s.name.into(),
+                excites: s.excites,
+                shape: [layout.rows, layout.columns],
+                cells: s.cells,
+                floor: s.floor,
+                zero: s.zero,
+                pruned: s.pruned,
+                births: s.births,
+                deaths: s.deaths,
+                levels: s.levels,
+                idle: s.idle,
+                histogram: s.histogram,
+                training: events.collect(),
+            }
+        });
+        let pathways = pathways.collect();
+        let totals = |ledger: &Ledger| -> BTreeMap<String, u64> {
+            let of = |event: Event| (event.name().to_owned(), ledger.total(event));
+            Event::ALL.into_iter().map(of).filter(|(_, count)| *count > 0).collect()
+        };
+        let events = Phase::ALL.map(|phase| (phase.name().to_owned(), totals(engine.ledger(phase))));
+        EpochRecord {
+            epoch: self.trainer.epoch(),
+            updates: driver.updates(),
+            train,
+            validation,
+            state_hash: hash::state(driver),
+            layers,
+            pathways,
+            events: events.into_iter().collect(),
+            train_seconds,
+        }
+    }
+}
+
+/// The epoch whose state reads the test set, given the records so far.
+pub(super) fn chosen(select: Select, records: &[EpochRecord]) -> Option<u32> {
+    let learnt = records.iter().filter(|record| record.epoch > 0);
+    match select {
+        Select::Last => learnt.last().map(|record| record.epoch),
+        Select::BestValidation => {
+            let score = |r: &EpochRecord| r.validation.map_or(0, |score| score.correct);
+            learnt.max_by_key(|r| (score(r), std::cmp::Reverse(r.epoch))).map(|r| r.epoch)
+        }
+    }
+}

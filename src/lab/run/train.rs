@@ -1,0 +1,324 @@
+//! Training in a folder, and continuing.
+
+use std::path::Path;
+
+use super::session::chosen;
+use super::{Machine, RunError, Session};
+use crate::chip::engine::Phase;
+use crate::lab::config::{self, Config, Select, Sources};
+use crate::lab::data::{self, DataRoot, ImageShape};
+use crate::lab::report::{self, Heat, Picture, RunView};
+use crate::lab::store::ARITHMETIC;
+use crate::lab::store::folder::{self, RunFolder, names};
+use crate::lab::store::hash;
+use crate::lab::store::record::{EpochRecord, Receipt, TestRecord};
+use crate::task::classify::{Examples, Progress};
+
+/// What happens while a run is carried out.
+#[derive(Debug)]
+pub enum Event<'a> {
+    /// The run is about to start.
+    Started {
+        /// Its folder.
+        folder: &'a Path,
+        /// The data, in one line.
+        data: &'a str,
+        /// What the user should know.
+        warnings: &'a [String],
+        /// Epochs finished before (0 unless continued).
+        epoch: u32,
+        /// Epochs in all.
+        epochs: u32,
+    },
+    /// A batch was learnt from. Returning false stops the run.
+    Batch(Progress),
+    /// An epoch is finished and on disk.
+    Epoch(&'a EpochRecord),
+}
+
+/// A finished run.
+#[derive(Debug)]
+pub struct Outcome {
+    /// Its receipt.
+    pub receipt: Receipt,
+    /// Its records.
+    pub records: Vec<EpochRecord>,
+    /// The summary table.
+    pub summary: String,
+}
+
+/// Trains a configuration in a new folder below `root`.
+///
+/// # Errors
+/// When something does not fit, the disk refuses, or the caller stops it.
+pub fn train(
+    config: &Config,
+    data_root: &DataRoot,
+    root: &Path,
+    machine: Machine,
+    on_event: &mut (dyn FnMut(Event<'_>) -> bool + Send),
+) -> Result<Outcome, RunError> {
+    let loaded = data::load(&config.source()?, data_root)?;
+    let (description, image) = (loaded.description.clone(), loaded.image);
+    let session = Session::new(config, loaded, machine)?;
+    let name = format!("{}-{}-seed{}", config.data_name(), config.rule_name(), config.seed);
+    let folder = RunFolder::create(root, &name)?;
+    folder.write(names::CONFIG, config.to_toml().as_bytes())?;
+    let run = Run { config, folder, machine, description, image, session, records: vec![] };
+    run.carry_out(on_event)
+}
+
+/// Continues a run from its last finished epoch.
+///
+/// # Errors
+/// When the run is finished or damaged, its data is not the same, or as [`train`].
+pub fn resume(
+    path: &Path,
+    data_root: &DataRoot,
+    machine: Machine,
+    on_event: &mut (dyn FnMut(Event<'_>) -> bool + Send),
+) -> Result<Outcome, RunError> {
+    let folder = RunFolder::open(path)?;
+    let config = read_config(path)?;
+    let loaded = data::load(&config.source()?, data_root)?;
+    let (description, image) = (loaded.description.clone(), loaded.image);
+    let mut session = Session::new(&config, loaded, machine)?;
+    let mut records = vec![];
+    if path.join(names::CHECKPOINT).exists() {
+        if let Ok(receipt) = folder::read_receipt(path) {
+            if receipt.status == "finished" {
+                return Err(RunError::Finished { path: path.display().to_string() });
+            }
+            check_receipt(&receipt, &session)?;
+        }
+        restore(&mut session, path, names::CHECKPOINT)?;
+        records = folder::read_metrics(path)?;
+        let finished = session.trainer().epoch() as usize;
+        if records.len() <= finished {
+            let found = format!("has {} records, but epoch {finished} is finished", records.len());
+            return Err(folder::FolderError::Content { path: path.join(names::METRICS), found }.into());
+        }
+        records.truncate(finished + 1);
+    }
+    let run = Run { config: &config, folder, machine, description, image, session, records };
+    run.carry_out(on_event)
+}
+
+/// The configuration a run was made with.
+pub(super) fn read_config(path: &Path) -> Result<Config, RunError> {
+    let text = folder::read_text(path, names::CONFIG)?;
+    let name = path.join(names::CONFIG).display().to_string();
+    Ok(config::load(&Sources { experiment: Some((&name, &text)), ..Sources::default() })?)
+}
+
+pub(super) fn check_receipt(receipt: &Receipt, session: &Session) -> Result<(), RunError> {
+    if receipt.arithmetic != ARITHMETIC {
+        return Err(RunError::Arithmetic { found: receipt.arithmetic, wanted: ARITHMETIC });
+    }
+    if receipt.data_hash != session.data_hash() {
+        let (found, wanted) = (session.data_hash().into(), receipt.data_hash.clone());
+        return Err(RunError::DataChanged { found, wanted });
+    }
+    if receipt.config_hash != session.config_hash() {
+        let (found, wanted) = (session.config_hash().into(), receipt.config_hash.clone());
+        return Err(RunError::ConfigChanged { found, wanted });
+    }
+    Ok(())
+}
+
+fn restore(session: &mut Session, path: &Path, name: &str) -> Result<(), RunError> {
+    let bytes = folder::read_checkpoint(path, name)?;
+    session.restore(&bytes).map_err(|error| RunError::Checkpoint {
+        path: path.join(name).display().to_string(),
+        error,
+    })
+}
+
+/// Reads the test set with the chosen state of a run.
+///
+/// # Errors
+/// When the run is damaged or its data is not the same.
+pub fn evaluate(
+    path: &Path,
+    data_root: &DataRoot,
+    machine: Machine,
+) -> Result<(TestRecord, String), RunError> {
+    let config = read_config(path)?;
+    let mut session = Session::new(&config, data::load(&config.source()?, data_root)?, machine)?;
+    check_receipt(&folder::read_receipt(path)?, &session)?;
+    let records = folder::read_metrics(path)?;
+    let best = chosen(config.select, &records).map(RunFolder::best_name);
+    let name = best.filter(|name| path.join(name).exists());
+    restore(&mut session, path, name.as_deref().unwrap_or(names::CHECKPOINT))?;
+    let state = hash::state(session.trainer().driver());
+    Ok((session.test(), state))
+}
+
+struct Run<'a> {
+    config: &'a Config,
+    folder: RunFolder,
+    machine: Machine,
+    description: String,
+    image: Option<ImageShape>,
+    session: Session,
+    records: Vec<EpochRecord>,
+}
+
+impl Run<'_> {
+    fn carry_out(
+        mut self,
+        on_event: &mut (dyn FnMut(Event<'_>) -> bool + Send),
+    ) -> Result<Outcome, RunError> {
+        let path = self.folder.path().to_path_buf();
+        let epochs = self.config.epochs;
+        on_event(Event::Started {
+            folder: &path,
+            data: &self.description,
+            warnings: self.session.warnings(),
+            epoch: self.session.trainer().epoch(),
+            epochs,
+        });
+        if self.records.is_empty() {
+            let record = self.session.start();
+            self.keep(record)?;
+        }
+        while self.session.trainer().epoch() < epochs {
+            let epoch = self.session.trainer().epoch();
+            let record = self.session.epoch(&mut |progress| on_event(Event::Batch(progress)));
+            let Some(record) = record else {
+                return Err(RunError::Stopped { epoch, path: path.display().to_string() });
+            };
+            self.keep(record)?;
+            on_event(Event::Epoch(self.records.last().expect("just kept")));
+        }
+        self.finish()
+    }
+
+    /// Puts a finished epoch on disk: best state and records first, the checkpoint that makes them count last.
+    fn keep(&mut self, record: EpochRecord) -> Result<(), RunError> {
+        self.records.push(record);
+        let epoch = self.session.trainer().epoch();
+        let state = self.session.checkpoint();
+        let best = chosen(self.config.select, &self.records);
+        if self.config.select == Select::BestValidation && best == Some(epoch) {
+            self.folder.write(&RunFolder::best_name(epoch), &state)?;
+        }
+        self.folder.write_metrics(&self.records)?;
+        self.folder.write(names::CHECKPOINT, &state)?;
+        self.folder.write_receipt(&self.receipt("running", None))?;
+        self.folder.tidy(best);
+        Ok(())
+    }
+
+    fn receipt(&self, status: &str, test: Option<TestRecord>) -> Receipt {
+        Receipt {
+            version: env!("CARGO_PKG_VERSION").into(),
+            arithmetic: ARITHMETIC,
+            config_hash: self.session.config_hash().into(),
+            data: self.description.clone(),
+            data_hash: self.session.data_hash().into(),
+            tables_hash: hash::tables(self.session.trainer().driver()),
+            epoch_hashes: self.records.iter().map(|r| r.state_hash.clone()).collect(),
+            status: status.into(),
+            test,
+            kernel: self.machine.backend.name().into(),
+            threads: self.machine.threads,
+            train_seconds: self.records.iter().map(|r| r.train_seconds).sum(),
+            warnings: self.session.warnings().to_vec(),
+        }
+    }
+
+    fn finish(mut self) -> Result<Outcome, RunError> {
+        let ledger = ledger_json(&self.session);
+        self.folder.write(names::LEDGER, ledger.as_bytes())?;
+        let epoch = self.session.trainer().epoch();
+        let best = chosen(self.config.select, &self.records).unwrap_or(epoch);
+        let path = self.folder.path().to_path_buf();
+        if best != epoch {
+            restore(&mut self.session, &path, &RunFolder::best_name(best))?;
+        }
+        let test = (!self.session.test_examples().is_empty()).then(|| self.session.test());
+        let receipt = self.receipt("finished", test);
+        let heats = heats(&self.session);
+        let pictures = pictures(&receipt, self.session.test_examples(), self.image);
+        let view = view(self.config, &receipt, &self.records, &heats, &pictures);
+        let text = self.config.to_toml();
+        let view = RunView { config: &text, ..view };
+        let summary = report::text::summary(&view);
+        self.folder.write(names::REPORT, report::html(&view).as_bytes())?;
+        self.folder.write_receipt(&receipt)?;
+        Ok(Outcome { receipt, records: self.records, summary })
+    }
+}
+
+/// What a report shows of a run.
+#[must_use]
+pub fn view<'a>(
+    config: &'a Config,
+    receipt: &'a Receipt,
+    records: &'a [EpochRecord],
+    heats: &'a [Heat],
+    pictures: &'a [Picture],
+) -> RunView<'a> {
+    let hidden: Vec<_> = config.hidden.iter().map(|units| format!("{units}-")).collect();
+    let title = format!(
+        "{} by {}: {}{} on {}",
+        config.data_name(),
+        config.rule_name(),
+        hidden.concat(),
+        config.outputs.map_or_else(|| "classes".into(), |n| n.to_string()),
+        config.hardware_name
+    );
+    RunView { title, config: "", receipt, epochs: records, heats, pictures, class_names: &[] }
+}
+
+fn heats(session: &Session) -> Vec<Heat> {
+    let engine = session.trainer().driver().engine();
+    let level_max = engine.hardware().level_bits.level_max();
+    let layers = engine.layers().iter();
+    let all = layers.flat_map(|l| l.arrays.iter().zip(l.spec.wiring.pathways()).map(move |p| (l, p)));
+    all.map(|(layer, (array, pathway))| Heat {
+        layer: usize::from(layer.index),
+        pathway: pathway.name.into(),
+        rows: layer.layout.rows,
+        columns: layer.layout.columns,
+        level_max,
+        levels: array.levels().collect(),
+    })
+    .collect()
+}
+
+fn pictures(receipt: &Receipt, test: &Examples, image: Option<ImageShape>) -> Vec<Picture> {
+    let Some(ImageShape { height, width, channels }) = image else { return vec![] };
+    let mistakes = receipt.test.iter().flat_map(|test| &test.mistakes);
+    mistakes
+        .filter_map(|&[example, truth, guess]| {
+            let values = test.values(usize::try_from(example).ok()?).to_vec();
+            let full_scale = test.full_scale();
+            Some(Picture { example, truth, guess, height, width, channels, full_scale, values })
+        })
+        .collect()
+}
+
+/// Every count of a run, as JSON.
+fn ledger_json(session: &Session) -> String {
+    let engine = session.trainer().driver().engine();
+    let mut lines = Vec::new();
+    for phase in Phase::ALL {
+        for (layer, pathway, during, event, count) in engine.ledger(phase).entries() {
+            let pathways = engine.layers()[layer].spec.wiring.pathways();
+            let name = pathways.iter().find(|p| p.code == pathway).map_or("-", |p| p.name);
+            lines.push(serde_json::json!({
+                "phase": phase.name(),
+                "layer": layer,
+                "pathway": name,
+                "operation": during.name(),
+                "event": event.name(),
+                "count": count,
+            }));
+        }
+    }
+    let mut text = serde_json::to_string_pretty(&lines).expect("counts have a JSON form");
+    text.push('\n');
+    text
+}
