@@ -122,7 +122,11 @@ fn every_mistake_names_the_file_and_the_way_out() {
     let cases = [
         (only(gone), "cannot open", "check the path"),
         (only(folder), "cannot read", "directory"),
-        (FileSet { test: other("narrow.csv", "0,1\n"), ..only(train()) }, "narrow.csv has 1 values", "has 2"),
+        (
+            FileSet { test: other("narrow.csv", "0,1\n"), ..only(train()) },
+            "narrow.csv has 1 values",
+            "has 2",
+        ),
         (
             FileSet { test: other("bright.csv", "0,1,99\n"), ..only(train()) },
             "bright.csv: example 0 holds the value 99",

@@ -26,9 +26,9 @@ use crate::lab::data::{
 /// How the network is used.
 pub(super) struct Network {
     agent: ureq::Agent,
-    /// Connections tried for one file before its mirror is given up.
-    tries: u32,
-    /// Wait before the second try; it doubles with each further one.
+    /// Connections in a row that bring nothing before a mirror is given up.
+    idle_tries: u32,
+    /// Wait after a connection that brought something; it doubles with each that did not.
     pause: Duration,
 }
 
@@ -36,10 +36,10 @@ impl Network {
     /// Patient, and through the proxy that the environment names.
     pub(super) fn new() -> Self {
         let proxy = ureq::Proxy::try_from_env();
-        Self::with(proxy, 6, Duration::from_secs(1))
+        Self::with(proxy, 3, Duration::from_secs(1))
     }
 
-    pub(super) fn with(proxy: Option<ureq::Proxy>, tries: u32, pause: Duration) -> Self {
+    pub(super) fn with(proxy: Option<ureq::Proxy>, idle_tries: u32, pause: Duration) -> Self {
         let agent = ureq::Agent::config_builder()
             .proxy(proxy)
             .accept_encoding("identity")
@@ -48,7 +48,7 @@ impl Network {
             .timeout_per_read(Some(Duration::from_secs(60)))
             .build()
             .new_agent();
-        Self { agent, tries, pause }
+        Self { agent, idle_tries, pause }
     }
 }
 
@@ -133,17 +133,14 @@ fn download(
     name: &str,
     part: &Path,
 ) -> Result<(), Trouble> {
-    let mut why = String::new();
-    for attempt in 0..network.tries {
-        if attempt > 0 {
-            thread::sleep(network.pause * 2u32.saturating_pow(attempt - 1));
-        }
+    let mut idle = 0;
+    loop {
         let have = size(part);
         let mut request = network.agent.get(url);
         if have > 0 {
             request = request.header("Range", format!("bytes={have}-"));
         }
-        why = match request.call() {
+        let why = match request.call() {
             Ok(response) => match receive(stage, response, have, name, part) {
                 Err(Trouble::Network(why)) => why,
                 end => return end,
@@ -155,8 +152,12 @@ fn download(
             }
             Err(other) => other.to_string(),
         };
+        idle = if size(part) > have { 0 } else { idle + 1 };
+        if idle == network.idle_tries {
+            return Err(Trouble::Network(why));
+        }
+        thread::sleep(network.pause * 2u32.saturating_pow(idle));
     }
-    Err(Trouble::Network(why))
 }
 
 /// Takes in one response; an error of the network leaves what has arrived.
