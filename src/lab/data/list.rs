@@ -73,6 +73,7 @@ fn entry(set: NamedSet, root: &DataRoot) -> Entry {
 }
 
 #[cfg(test)]
+#[expect(clippy::disallowed_methods, reason = "data sets live in files")]
 mod tests {
     use super::*;
 

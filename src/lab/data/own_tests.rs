@@ -1,4 +1,5 @@
 //! Tests of the user's own files: every format, every part, every mistake.
+#![expect(clippy::disallowed_methods, reason = "data sets live in files")]
 
 use std::{fs, io::Write, path::PathBuf};
 

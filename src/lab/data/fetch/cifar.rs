@@ -101,7 +101,40 @@ fn records(name: &str, source: impl BufRead + Seek, labels: &[u8]) -> Result<Vec
     let mut records = Vec::with_capacity(IMAGES * CIFAR_RECORD);
     for (row, &label) in rows.chunks_exact(PIXELS * 3).zip(labels) {
         records.push(label);
-        records.extend((0..3).flat_map(|plane| row.iter().skip(plane).step_by(3)));
+        records.extend(planes(row));
     }
     Ok(records)
+}
+
+/// All red, then all green, then all blue of pixels whose colours stand side by side.
+fn planes(row: &[u8]) -> impl Iterator<Item = u8> {
+    (0..3).flat_map(|plane| row.iter().skip(plane).step_by(3)).copied()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn colours_are_put_plane_after_plane() {
+        assert!(planes(&[1, 2, 3, 4, 5, 6]).eq([1, 4, 2, 5, 3, 6]));
+    }
+
+    #[test]
+    fn another_picture_or_another_number_of_labels_is_an_error() {
+        let mut small = Vec::new();
+        let mut encoder = png::Encoder::new(&mut small, 2, 2);
+        encoder.set_color(png::ColorType::Rgb);
+        encoder.write_header().unwrap().write_image_data(&[0; 12]).unwrap();
+        let refused =
+            |bytes: &[u8]| records("a.png", Cursor::new(bytes), &[0]).unwrap_err().to_string();
+        assert!(
+            refused(&small).contains("a.png is ((2, 2), (Rgb, Eight)) in place of 1024 x 10000")
+        );
+        assert!(refused(b"GIF89a").contains("a.png is no PNG"));
+        let refused = |text: &str| labels("l", text.as_bytes(), 2).unwrap_err().to_string();
+        assert_eq!(labels("l", b"[1, 2]", 2).unwrap(), [1, 2]);
+        assert!(refused("[1,2,3]").contains("has 3 labels in place of 2"));
+        assert!(refused("[1,256]").contains("is no list"));
+    }
 }

