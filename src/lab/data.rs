@@ -1,1 +1,29 @@
 //! Data sets, and the door from files to [`crate::task::classify::Examples`].
+//!
+//! [`load`] takes a [`Source`], a known set by name or files of one's own, and gives the three parts of a
+//! split with a hash over their content. [`fetch`] gets a known set and puts it below a [`DataRoot`] as
+//! the authors' own files, nothing half-written; [`list`] says what is there. The readers [`idx`],
+//! [`npy`], [`npz`] and [`csv`] are functions on bytes that allocate no more than they are given.
+
+mod builtin;
+mod catalog;
+pub mod csv;
+mod error;
+mod fetch;
+pub mod idx;
+mod inflate;
+mod list;
+mod load;
+mod md5;
+pub mod npy;
+mod npy_header;
+pub mod npz;
+mod own;
+mod source;
+
+pub use catalog::{CATALOG, CatalogEntry, CatalogFile, MirrorForm, NpmForm};
+pub use error::DataError;
+pub use fetch::{FetchError, FetchEvent, Origin, fetch};
+pub use list::{Entry, State, list};
+pub use load::{Loaded, content_hash, load};
+pub use source::{DataRoot, FileSet, ImageShape, NamedSet, ParityBits, PartFile, Source};

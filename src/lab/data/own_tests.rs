@@ -1,0 +1,149 @@
+//! Tests of the user's own files: every format, every part, every mistake.
+#![expect(clippy::disallowed_methods, reason = "data sets live in files")]
+
+use std::{fs, io::Write, path::PathBuf};
+
+use super::*;
+use crate::lab::data::{
+    npy::tests::file as npy,
+    source::{DataRoot, Source},
+};
+
+struct Files(tempfile::TempDir);
+
+impl Files {
+    fn new() -> Self {
+        Self(tempfile::tempdir().unwrap())
+    }
+
+    fn put(&self, name: &str, bytes: &[u8]) -> PathBuf {
+        let path = self.0.path().join(name);
+        fs::write(&path, bytes).unwrap();
+        path
+    }
+
+    fn csv(&self, name: &str, text: &str) -> PartFile {
+        PartFile::Csv { path: self.put(name, text.as_bytes()), label: csv::LabelColumn::First }
+    }
+
+    fn idx(&self, name: &str, dims: &[u8], values: &[u8], labels: &[u8]) -> PartFile {
+        let file = |dims: &[u8], data: &[u8]| {
+            let mut bytes = vec![0, 0, 8, u8::try_from(dims.len()).unwrap()];
+            bytes.extend(dims.iter().flat_map(|&d| [0, 0, 0, d]));
+            bytes.extend_from_slice(data);
+            bytes
+        };
+        let count = u8::try_from(labels.len()).unwrap();
+        PartFile::Idx {
+            values: self.put(&format!("{name}-values"), &file(dims, values)),
+            labels: self.put(&format!("{name}-labels"), &file(&[count], labels)),
+        }
+    }
+
+    fn npz(&self, arrays: &[(&str, Vec<u8>)]) -> PathBuf {
+        let mut zip = zip::ZipWriter::new(std::io::Cursor::new(Vec::new()));
+        for (name, bytes) in arrays {
+            let options = zip::write::SimpleFileOptions::default();
+            zip.start_file(format!("{name}.npy"), options).unwrap();
+            zip.write_all(bytes).unwrap();
+        }
+        self.put("own.npz", &zip.finish().unwrap().into_inner())
+    }
+}
+
+fn only(train: PartFile) -> FileSet {
+    FileSet { train, validation: None, test: None, full_scale: None, classes: None, image: None }
+}
+
+fn loaded(files: FileSet) -> Result<Loaded, String> {
+    crate::lab::data::load(&Source::Files(Box::new(files)), &DataRoot::new("unused"))
+        .map_err(|e| e.to_string())
+}
+
+fn rows(count: u8) -> String {
+    (0..count).map(|e| format!("{},{e},{}\n", e / 12, 2 * e)).collect()
+}
+
+#[test]
+fn one_table_is_cut_evenly_even_when_sorted_by_class() {
+    let files = Files::new();
+    let set = loaded(only(files.csv("all.csv", &rows(36)))).unwrap();
+    let Split { train, validation, test } = &set.split;
+    assert_eq!((train.len(), validation.len(), test.len()), (28, 2, 6));
+    assert_eq!(test.labels(), [0, 0, 1, 1, 2, 2]);
+    assert_eq!((test.values(0), train.full_scale(), train.classes()), (&[5, 10][..], 70, 3));
+    assert_eq!(validation.values(0), [13, 26]);
+    assert!(set.description.ends_with(
+        "all.csv: 28 training, 2 validation, 6 test examples of 2 values 0 to 70, 3 classes; test is \
+         every 6th example of the file; validation is every 12th example of the training part"
+    ));
+}
+
+#[test]
+fn parts_of_three_formats_make_one_split() {
+    let files = Files::new();
+    let floats: Vec<u8> = [0.0f32, 1.0, 0.5, 0.25].iter().flat_map(|x| x.to_le_bytes()).collect();
+    let path = files.npz(&[
+        ("x", npy("'<f4'", "False", "(2, 1, 2)", &floats)),
+        ("y", npy("'<i8'", "False", "(2, 1)", &[[2u8, 0, 0, 0, 0, 0, 0, 0], [0; 8]].concat())),
+    ]);
+    let set = loaded(FileSet {
+        validation: Some(files.csv("v.csv", "label,a,b\n1,3,4\n")),
+        test: Some(PartFile::Npz { path, values: "x".into(), labels: "y".into() }),
+        full_scale: Some(16),
+        ..only(files.idx("t", &[2, 1, 2], &[1, 2, 3, 4], &[0, 1]))
+    })
+    .unwrap();
+    assert_eq!(set.split.test.all_values(), [0, 16, 8, 4]);
+    assert_eq!(set.split.test.labels(), [2, 0]);
+    assert_eq!((set.split.train.classes(), set.split.validation.len()), (3, 1));
+    assert_eq!(set.image, Some(ImageShape { height: 1, width: 2, channels: 1 }));
+    assert!(set.description.ends_with("3 classes"), "{}", set.description);
+}
+
+#[test]
+fn colours_side_by_side_become_planes() {
+    let files = Files::new();
+    let values: Vec<u8> = (0..24).collect();
+    let part = files.idx("t", &[2, 2, 2, 3], &values, &[0, 1]);
+    let Part { values, image, .. } = read_part(&part, 255).unwrap();
+    assert_eq!(values[..12], [0, 3, 6, 9, 1, 4, 7, 10, 2, 5, 8, 11]);
+    assert_eq!(image, Some(ImageShape { height: 2, width: 2, channels: 3 }));
+}
+
+#[test]
+fn every_mistake_names_the_file_and_the_way_out() {
+    let files = Files::new();
+    let train = || files.csv("train.csv", &rows(36));
+    let other = |name, text| Some(files.csv(name, text));
+    let gone =
+        PartFile::Csv { path: files.0.path().join("gone.csv"), label: csv::LabelColumn::Last };
+    let folder = PartFile::Csv { path: files.0.path().to_owned(), label: csv::LabelColumn::Last };
+    let image = Some(ImageShape { height: 3, width: 3, channels: 1 });
+    let cases = [
+        (only(gone), "cannot open", "check the path"),
+        (only(folder), "cannot read", "directory"),
+        (
+            FileSet { test: other("narrow.csv", "0,1\n"), ..only(train()) },
+            "narrow.csv has 1 values",
+            "has 2",
+        ),
+        (
+            FileSet { test: other("bright.csv", "0,1,99\n"), ..only(train()) },
+            "bright.csv: example 0 holds the value 99",
+            "raise `full_scale`",
+        ),
+        (FileSet { classes: Some(2), ..only(train()) }, "the label 2", "raise"),
+        (FileSet { classes: Some(257), ..only(train()) }, "`classes` is 257", "1 to 256"),
+        (FileSet { full_scale: Some(0), ..only(train()) }, "`full_scale` is 0", "1 to 255"),
+        (FileSet { image, ..only(train()) }, "3 x 3 x 1", "examples of 2 values"),
+        (only(files.csv("few.csv", &rows(5))), "few.csv has 5 examples", "at least 6"),
+        (only(files.csv("bad.csv", "0,x1\n0,1\n0\n")), "bad.csv line 1", "if the line is a header"),
+        (only(files.idx("i", &[3, 1], &[0; 3], &[0; 2])), "shape [2]", "3 examples need"),
+        (only(files.idx("j", &[3], &[0; 3], &[0; 3])), "j-values has 3 examples", "at least 6"),
+    ];
+    for (set, found, advice) in cases {
+        let error = loaded(set).unwrap_err();
+        assert!(error.contains(found) && error.contains(advice), "{error}");
+    }
+}
