@@ -2,6 +2,7 @@
 //!
 //! ```text
 //! read        v[c]   = sum_r level[r][c] * x[r]
+//! transposed  v[r]   = sum_c level[r][c] * g[c]
 //! sums        s[r,c] = sum_b x[b][r] * u[b][c],  negated for inhibitory pathways
 //! pulses      p = clamp( SR(s * mantissa, k), -d_max, +d_max )
 //! SR(s, k)    = (q + r) >> D,  q = rsh(s, k - D) or s << (D - k),  r uniform in 0..2^D-1;  D = 0: rsh(s, k)
@@ -15,7 +16,7 @@
 use std::ops::Range;
 
 use super::{Cells, Dither, Half, Write, WriteCounts};
-use crate::chip::crossbar::layout::{BLOCK_CELLS, HALF_CELLS, HALF_COLUMNS, in_half};
+use crate::chip::crossbar::layout::{BLOCK_CELLS, HALF_CELLS, HALF_COLUMNS, Layout, in_half};
 use crate::num::draw::Place;
 use crate::num::fixed::rsh;
 
@@ -38,6 +39,18 @@ pub(super) fn read(
                             i32::from(cells[in_half(row, column)]) * drive;
                     }
                 }
+            }
+        }
+    }
+}
+
+pub(super) fn read_columns(plane: &[u8], layout: Layout, gates: &[u8], out: &mut [i32]) {
+    let gates = gates.chunks_exact(layout.columns_padded());
+    for (gates, out) in gates.zip(out.chunks_exact_mut(layout.rows_padded())) {
+        for (row, out) in out.iter_mut().enumerate() {
+            *out = 0;
+            for (column, gate) in gates.iter().enumerate() {
+                *out += i32::from(plane[layout.index(row, column)]) * i32::from(*gate);
             }
         }
     }
