@@ -188,6 +188,9 @@ impl Backend {
         assert!(plane.len() >= blocks.end * BLOCK_CELLS, "the panel has the blocks");
         assert!(stride >= blocks.end * BLOCK_ROWS, "every row has a drive");
         assert_eq!(drives.len() / stride * PANEL_COLUMNS, out.len(), "32 sums a sample");
+        if out.is_empty() {
+            return;
+        }
         match self {
             Self::Scalar => scalar::read(plane, blocks, drives, stride, out),
             #[cfg(target_arch = "x86_64")]
@@ -207,6 +210,9 @@ impl Backend {
         assert!(gates.len().is_multiple_of(columns), "one gate a column");
         assert_eq!(gates.len() / columns * rows, out.len(), "one sum a row");
         debug_assert!(gates.iter().all(|gate| *gate < 128), "gates have 7 bits");
+        if out.is_empty() {
+            return;
+        }
         match self {
             Self::Scalar => scalar::read_columns(plane, layout, gates, out),
             #[cfg(target_arch = "x86_64")]
@@ -219,9 +225,8 @@ impl Backend {
     /// Sums of a half block: `sums[r][c] = sum over b of drives[r][b] * gates[b][c]`. `drives` holds 64 rows of
     /// `stride` samples (a multiple of 4, padded with 0), `gates` lies `[stride / 4][16 columns][4 samples]`.
     pub fn accumulate(self, drives: &[u8], stride: usize, gates: &[i8], sums: &mut Half<i32>) {
-        assert!(
-            stride.is_multiple_of(4) && drives.len() == 64 * stride && gates.len() == 16 * stride
-        );
+        assert!(stride > 0 && stride.is_multiple_of(4), "samples are padded to words of four");
+        assert!(drives.len() == 64 * stride && gates.len() == 16 * stride, "64 rows, 16 columns");
         match self {
             Self::Scalar => scalar::accumulate(drives, stride, gates, sums),
             #[cfg(target_arch = "x86_64")]

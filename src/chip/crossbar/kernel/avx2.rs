@@ -207,8 +207,8 @@ fn dots_batch<const SIGNED: bool>(
 #[target_feature(enable = "avx2")]
 fn read(plane: &[u8], blocks: Range<usize>, drives: &[u8], stride: usize, out: &mut [i32]) {
     let (from, to) = (blocks.start.min(blocks.end), blocks.end);
-    let samples = (drives.len() / stride).min(out.len() / 32);
-    out[..32 * samples].fill(0);
+    let samples = out.len() / 32;
+    out.fill(0);
     let walk = Walk { runs: to - from, quads: 16, run: BLOCK_CELLS, stride, out: 32 };
     for half in 0..2 {
         let plane = &plane[from * BLOCK_CELLS..];
