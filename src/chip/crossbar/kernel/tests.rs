@@ -65,18 +65,20 @@ fn check_accumulate(stride: usize, seed: u64) {
     }
 }
 
-/// What a write does to levels, under one back end.
+/// Levels and remainders after a write, under one back end.
 fn programmed(
     backend: Backend,
     levels: &Half<u8>,
+    residual: &Half<u16>,
     sums: &Half<i32>,
     write: &Write,
     dither: Dither<'_>,
-) -> (Half<u8>, WriteCounts) {
-    let mut low = *levels;
-    let cells = Cells { low: &mut low, high: None, residual: None, pruned: None };
+) -> (Half<u8>, Half<u16>, WriteCounts) {
+    let (mut low, mut left) = (*levels, *residual);
+    let residual = (write.residual_bits > 0).then_some(&mut left);
+    let cells = Cells { low: &mut low, high: None, residual, pruned: None };
     let counts = backend.program(cells, sums, write, dither);
-    (low, counts)
+    (low, left, counts)
 }
 
 fn check_program(levels: &Half<u8>, sums: &Half<i32>, write: &Write, seed: u64) {
@@ -84,12 +86,15 @@ fn check_program(levels: &Half<u8>, sums: &Half<i32>, write: &Write, seed: u64) 
     let byte_words = half(&words[..HALF_CELLS]);
     let words: Vec<_> = words.as_chunks().0.iter().map(|word| u16::from_le_bytes(*word)).collect();
     let words = half(&words);
+    let mut residual = words;
+    residual.reverse();
+    residual.iter_mut().for_each(|left| *left &= (1 << write.residual_bits) - 1);
     for dither in [Dither::Nearest, Dither::Byte(&byte_words), Dither::Word(&words)] {
-        let (law, law_counts) = programmed(Backend::Scalar, levels, sums, write, dither);
+        let law = programmed(Backend::Scalar, levels, &residual, sums, write, dither);
         for backend in others() {
-            let (low, counts) = programmed(backend, levels, sums, write, dither);
-            assert_eq!(counts, law_counts, "{} {write:?}", backend.name());
-            assert!(low == law, "{} {write:?}", backend.name());
+            let got = programmed(backend, levels, &residual, sums, write, dither);
+            assert_eq!(got.2, law.2, "{} {write:?}", backend.name());
+            assert!(got == law, "{} {write:?}", backend.name());
         }
     }
 }
@@ -173,8 +178,10 @@ fn a_zero_sum_moves_nothing_whatever_the_word() {
             for negate in [false, true] {
                 let write = Write { shift, negate, ..PLAIN };
                 for dither in [Dither::Nearest, Dither::Byte(&greatest), Dither::Word(&words)] {
-                    let got = programmed(backend, &levels, &[0; HALF_CELLS], &write, dither);
-                    assert!(got == (levels, WriteCounts::default()), "{} {shift}", backend.name());
+                    let (none, sums) = ([0; HALF_CELLS], [0; HALF_CELLS]);
+                    let got = programmed(backend, &levels, &none, &sums, &write, dither);
+                    let still = (levels, none, WriteCounts::default());
+                    assert!(got == still, "{} {shift}", backend.name());
                 }
             }
         }
@@ -188,14 +195,15 @@ fn the_edges_of_the_bounds_round_and_count_the_same() {
         let sums = std::array::from_fn(|i| {
             let (near, by) = (i / 8, i as i64 % 8 - 4);
             let edge = [0, 1, 125, 126, 127, 128, 129, 254, 255, 256, 32767, 32768];
-            let at =
-                (edge[near as usize % 12] << shift >> (near / 12 % 2)) + by * (1 << shift >> 2);
+            let at = (edge[near % 12] << shift >> (near / 12 % 2)) + by * (1 << shift >> 2);
             let at = at.clamp(-GREATEST + 4, GREATEST - 4) + by;
             i32::try_from(if near / 24 % 2 == 0 { at } else { -at }).expect("fits")
         });
         for increment_max in [1, 2, 64, 125, 126, 127] {
             for negate in [false, true] {
                 let write = Write { shift, increment_max, negate, ..PLAIN };
+                check_program(&half(&bytes(3, HALF_CELLS)), &sums, &write, 3);
+                let write = Write { residual_bits: 1 + shift % 15, ..write };
                 check_program(&half(&bytes(1, HALF_CELLS)), &sums, &write, 4);
                 check_program(&half(&bytes(2, HALF_CELLS)), &sums, &write, 5);
             }
@@ -211,8 +219,11 @@ fn the_largest_sums_saturate_alike() {
     for shift in 0..=31 {
         for mantissa in [1, 2, 15] {
             for negate in [false, true] {
-                for increment_max in [1, 126, 127] {
-                    let write = Write { shift, mantissa, negate, increment_max, ..PLAIN };
+                for (increment_max, residual_bits) in
+                    [(1, 0), (126, 0), (127, 0), (127, 15), (2, 6)]
+                {
+                    let write =
+                        Write { shift, mantissa, negate, increment_max, residual_bits, ..PLAIN };
                     check_program(&[128; HALF_CELLS], &sums, &write, 1 + u64::from(shift));
                 }
             }
@@ -237,15 +248,15 @@ fn a_name_says_whether_it_is_unknown_or_absent() {
 
 fn write() -> impl Strategy<Value = Write> {
     let window = (0u16..=255, 0u16..=255);
-    (0u32..=31, 1i32..=15, any::<bool>(), 1i32..=127, window, 0..4).prop_map(
-        |(shift, mantissa, negate, increment_max, (a, b), kind)| Write {
+    (0u32..=31, 1i32..=15, any::<bool>(), 1i32..=127, window, 0..4, 0u32..=15).prop_map(
+        |(shift, mantissa, negate, increment_max, (a, b), kind, residual_bits)| Write {
             shift,
             mantissa: if kind < 2 { 1 } else { mantissa },
             negate,
             increment_max,
             floor: if kind == 0 { 0 } else { a.min(b) },
             ceiling: if kind == 0 { 255 } else { a.max(b) },
-            residual_bits: 0,
+            residual_bits: if kind % 2 == 0 { 0 } else { residual_bits },
         },
     )
 }

@@ -10,6 +10,16 @@
 //! Sums are 32-bit: at most 4096 * 255 * 127 * 15 < 2^31 - 2^27 in size, so adding `half <= 2^22` or a word
 //! cannot wrap. Where the law shifts left by `less = bits - shift`, it is
 //! `(s * 2^less + word) >> bits = (s + (word >> less)) >> shift`, as `word >> less` is the floor.
+//!
+//! With a remainder of `F` bits, `shift` is `k - F`, and
+//!
+//! ```text
+//! total   residual + rounded;  wanted = total >> F;  residual = clamp( total - (pulses << F), 0, 2^F - 1 )
+//! ```
+//!
+//! For `k < F` the law shifts left by `n = F - k` and no word matters: `(s * 2^(D+n) + word) >> D = s * 2^n`.
+//! The product is first held to `+-2^(30-n)`: beyond `+-2^30` pulses and residual rest at their ends anyway,
+//! as `2^30` is above `128 * 2^15`. Otherwise `rounded` is at most the sum, and a residual of 16 bits fits above it.
 //! Packing to 16 bits saturates far outside the bounds, so it moves no comparison with them.
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
@@ -33,9 +43,9 @@ pub(super) fn program(
     dither: Dither<'_>,
 ) -> WriteCounts {
     let plain = cells.high.is_none()
-        && cells.residual.is_none()
         && cells.pruned.is_none()
-        && write.residual_bits == 0
+        && cells.residual.is_some() == (write.residual_bits > 0)
+        && write.residual_bits <= 15
         && write.shift <= 31
         && (1..=127).contains(&write.increment_max)
         && (1..=15).contains(&write.mantissa);
@@ -45,11 +55,28 @@ pub(super) fn program(
         return scalar::program(cells, sums, write, dither);
     };
     let window = (floor, ceiling);
-    let low = cells.low;
-    match dither {
-        Dither::Nearest => self::cells::<NEAREST>(low, sums, write, window, &[0; _], &[0; _]),
-        Dither::Byte(words) => self::cells::<BYTE>(low, sums, write, window, words, &[0; _]),
-        Dither::Word(words) => self::cells::<WORD>(low, sums, write, window, &[0; _], words),
+    // Without a remainder nothing reads or keeps these words.
+    let mut none = [0; _];
+    let (low, left) = (cells.low, cells.residual);
+    match (dither, left) {
+        (Dither::Nearest, None) => {
+            self::cells::<NEAREST, false>(low, &mut none, sums, write, window, &[0; _], &[0; _])
+        }
+        (Dither::Byte(words), None) => {
+            self::cells::<BYTE, false>(low, &mut none, sums, write, window, words, &[0; _])
+        }
+        (Dither::Word(words), None) => {
+            self::cells::<WORD, false>(low, &mut none, sums, write, window, &[0; _], words)
+        }
+        (Dither::Nearest, Some(left)) => {
+            self::cells::<NEAREST, true>(low, left, sums, write, window, &[0; _], &[0; _])
+        }
+        (Dither::Byte(words), Some(left)) => {
+            self::cells::<BYTE, true>(low, left, sums, write, window, words, &[0; _])
+        }
+        (Dither::Word(words), Some(left)) => {
+            self::cells::<WORD, true>(low, left, sums, write, window, &[0; _], words)
+        }
     }
 }
 
@@ -61,11 +88,17 @@ struct Scale {
     right: __m256i,
     less: __m256i,
     last: __m256i,
+    /// Left shift of the product, for remainders finer than the shift.
+    up: __m256i,
+    /// The product is held to this on both sides.
+    reach: __m256i,
 }
 
 #[target_feature(enable = "avx2")]
 fn scale<const DITHER: u8>(write: &Write) -> Scale {
-    let shift = i32::try_from(write.shift).expect("checked: at most 31");
+    let up = write.residual_bits.saturating_sub(write.shift);
+    let reach = if up == 0 { i32::MAX } else { 1 << (30 - up) };
+    let shift = write.shift.saturating_sub(write.residual_bits).cast_signed();
     let bits = match DITHER {
         NEAREST => 0,
         BYTE => 8,
@@ -82,8 +115,11 @@ fn scale<const DITHER: u8>(write: &Write) -> Scale {
         mantissa: _mm256_set1_epi32(if write.negate { -write.mantissa } else { write.mantissa }),
         half: _mm256_set1_epi32(half),
         right: _mm256_set1_epi32(right),
-        less: _mm256_set1_epi32((bits - shift).max(0)),
+        // Where the product is shifted left, no word matters: all its bits go.
+        less: _mm256_set1_epi32(if up > 0 { 31 } else { (bits - shift).max(0) }),
         last: _mm256_set1_epi32(last),
+        up: _mm256_set1_epi32(up.cast_signed()),
+        reach: _mm256_set1_epi32(reach),
     }
 }
 
@@ -126,11 +162,36 @@ fn dither_rows<const DITHER: u8>(bytes: &[u8; 32], words: &[u16; 32]) -> [__m256
     }
 }
 
-/// `wanted` of 8 cells.
+/// Writes four rows of 16-bit numbers in the order of levels.
 #[inline]
 #[target_feature(enable = "avx2")]
-fn wanted<const DITHER: u8>(sums: &[i32; 8], word: __m256i, scale: Scale) -> __m256i {
-    let v = _mm256_mullo_epi32(load_sums(sums), scale.mantissa);
+fn store_rows(words: &mut [u16; 32], rows: [__m256i; 4]) {
+    let a = _mm256_or_si256(rows[0], _mm256_slli_epi32::<16>(rows[1]));
+    let b = _mm256_or_si256(rows[2], _mm256_slli_epi32::<16>(rows[3]));
+    // Columns 0 1 4 5 and 2 3 6 7.
+    let (outer, inner) = (_mm256_unpacklo_epi32(a, b), _mm256_unpackhi_epi32(a, b));
+    let left = _mm256_permute2x128_si256::<0x20>(outer, inner);
+    let right = _mm256_permute2x128_si256::<0x31>(outer, inner);
+    // SAFETY: the reference covers 32 words, 64 bytes; this writes the first 32.
+    unsafe { _mm256_storeu_si256(words.as_mut_ptr().cast(), left) }
+    // SAFETY: the reference covers 32 words, 64 bytes; this writes the last 32.
+    unsafe { _mm256_storeu_si256(words[16..].as_mut_ptr().cast(), right) }
+}
+
+/// The rounded product of 8 cells.
+#[inline]
+#[target_feature(enable = "avx2")]
+fn rounded<const DITHER: u8, const RESIDUAL: bool>(
+    sums: &[i32; 8],
+    word: __m256i,
+    scale: Scale,
+) -> __m256i {
+    let mut v = _mm256_mullo_epi32(load_sums(sums), scale.mantissa);
+    if RESIDUAL {
+        let least = _mm256_sub_epi32(_mm256_setzero_si256(), scale.reach);
+        v = _mm256_max_epi32(_mm256_min_epi32(v, scale.reach), least);
+        v = _mm256_sllv_epi32(v, scale.up);
+    }
     if DITHER == NEAREST {
         let twice = _mm256_add_epi32(_mm256_srav_epi32(v, scale.right), scale.half);
         return _mm256_srav_epi32(twice, scale.last);
@@ -155,8 +216,9 @@ fn zeros(v: __m256i) -> u32 {
 }
 
 #[target_feature(enable = "avx2")]
-fn cells<const DITHER: u8>(
+fn cells<const DITHER: u8, const RESIDUAL: bool>(
     low: &mut Half<u8>,
+    left: &mut Half<u16>,
     sums: &Half<i32>,
     write: &Write,
     (floor, ceiling): (u8, u8),
@@ -176,19 +238,34 @@ fn cells<const DITHER: u8>(
     // Levels less 128, so that the signed saturating addition ends at 0 and 255.
     let floor = _mm256_set1_epi8((floor ^ 0x80).cast_signed());
     let ceiling = _mm256_set1_epi8((ceiling ^ 0x80).cast_signed());
+    let fraction = _mm256_set1_epi32(write.residual_bits.cast_signed());
+    let most_left = _mm256_set1_epi32((1 << write.residual_bits) - 1);
+    let most_wide = _mm256_set1_epi32(write.increment_max);
+    let least_wide = _mm256_set1_epi32(-write.increment_max);
     let (mut quiet, mut held) = (0, 0);
     let (mut attempted, mut effective) = (zero, zero);
     let groups = sums.as_chunks::<64>().0.iter().zip(low.as_chunks_mut::<64>().0);
     let dithers = bytes.as_chunks::<64>().0.iter().zip(words.as_chunks::<64>().0);
-    for ((sums, low), (bytes, words)) in groups.zip(dithers) {
+    let groups = groups.zip(left.as_chunks_mut::<64>().0);
+    for (((sums, low), left), (bytes, words)) in groups.zip(dithers) {
         let (sums, _) = sums.as_chunks::<8>();
         let dithers = bytes.as_chunks::<32>().0.iter().zip(words.as_chunks::<32>().0);
-        for (h, (low, (bytes, words))) in
-            low.as_chunks_mut::<32>().0.iter_mut().zip(dithers).enumerate()
-        {
+        let halves = low.as_chunks_mut::<32>().0.iter_mut().zip(left.as_chunks_mut::<32>().0);
+        for (h, ((low, left), (bytes, words))) in halves.zip(dithers).enumerate() {
             let mut w = dither_rows::<DITHER>(bytes, words);
             for (row, w) in w.iter_mut().enumerate() {
-                *w = wanted::<DITHER>(&sums[2 * row + h], *w, scale);
+                *w = rounded::<DITHER, RESIDUAL>(&sums[2 * row + h], *w, scale);
+            }
+            if RESIDUAL {
+                let mut remainder = dither_rows::<WORD>(&[0; 32], left);
+                for (w, remainder) in w.iter_mut().zip(&mut remainder) {
+                    let total = _mm256_add_epi32(*remainder, *w);
+                    *w = _mm256_srav_epi32(total, fraction);
+                    let pulses = _mm256_max_epi32(_mm256_min_epi32(*w, most_wide), least_wide);
+                    let rest = _mm256_sub_epi32(total, _mm256_sllv_epi32(pulses, fraction));
+                    *remainder = _mm256_max_epi32(_mm256_min_epi32(rest, most_left), zero);
+                }
+                store_rows(left, remainder);
             }
             let (a, b) = (_mm256_packs_epi32(w[0], w[1]), _mm256_packs_epi32(w[2], w[3]));
             let pulses_a = _mm256_max_epi16(_mm256_min_epi16(a, most), least);

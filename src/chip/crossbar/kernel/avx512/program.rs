@@ -24,8 +24,11 @@
 
 use std::arch::x86_64::*;
 
+use self::residual::residual;
 use super::{load, load_sums, store};
 use crate::chip::crossbar::kernel::{Cells, Dither, Half, Write, WriteCounts, scalar};
+
+mod residual;
 
 /// Half-up.
 const NEAREST: u8 = 0;
@@ -51,9 +54,9 @@ pub(super) fn program(
     dither: Dither<'_>,
 ) -> WriteCounts {
     let plain = cells.high.is_none()
-        && cells.residual.is_none()
         && cells.pruned.is_none()
-        && write.residual_bits == 0
+        && cells.residual.is_some() == (write.residual_bits > 0)
+        && write.residual_bits <= 15
         && write.shift <= 31
         && (1..=127).contains(&write.increment_max)
         && (1..=15).contains(&write.mantissa);
@@ -64,6 +67,15 @@ pub(super) fn program(
     };
     let window = (floor, ceiling);
     let low = cells.low;
+    if let Some(left) = cells.residual {
+        return match dither {
+            Dither::Nearest => {
+                residual::<NEAREST>(low, left, sums, write, window, &[0; _], &[0; _])
+            }
+            Dither::Byte(words) => residual::<WIDE>(low, left, sums, write, window, words, &[0; _]),
+            Dither::Word(words) => residual::<WORD>(low, left, sums, write, window, &[0; _], words),
+        };
+    }
     match dither {
         Dither::Nearest => scaled::<NEAREST>(low, sums, write, window, &[0; _], &[0; _]),
         Dither::Byte(words) if write.increment_max < 127 => {
@@ -102,9 +114,10 @@ struct Scale {
     last: __m512i,
 }
 
+/// Rounding to units of `2^shift`.
 #[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi")]
-fn scale<const DITHER: u8>(write: &Write) -> Scale {
-    let shift = i32::try_from(write.shift).expect("checked: at most 31");
+fn scale<const DITHER: u8>(write: &Write, shift: u32) -> Scale {
+    let shift = i32::try_from(shift).expect("checked: at most 31");
     let bits = match DITHER {
         NEAREST => 0,
         WORD => 16,
@@ -134,8 +147,7 @@ fn scale<const DITHER: u8>(write: &Write) -> Scale {
 /// `q` of one row.
 #[inline]
 #[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi")]
-fn quotient<const DITHER: u8, const SCALE: u8>(sums: &[i32; 16], scale: Scale) -> __m512i {
-    let sums = load_sums(sums);
+fn quotient<const DITHER: u8, const SCALE: u8>(sums: __m512i, scale: Scale) -> __m512i {
     if DITHER == NEAREST {
         let sums = match SCALE {
             PLUS => sums,
@@ -153,8 +165,8 @@ fn quotient<const DITHER: u8, const SCALE: u8>(sums: &[i32; 16], scale: Scale) -
     _mm512_srav_epi32(sums, scale.right)
 }
 
-/// A constant made of four equal quarters: pairs of bytes `[quarter / 4 of 2][4 columns]`, as 32-bit packing
-/// leaves them, from `[4 columns][4 rows]`; bytes with the top bit set become 0.
+/// 16-bit numbers of two rows x 4 columns, as packing leaves them, from bytes `[4 columns][4 rows]`; a position
+/// with the top bit set gives 0.
 const ROWS_01: [u8; 16] = pairs(0);
 const ROWS_23: [u8; 16] = pairs(2);
 
@@ -209,35 +221,94 @@ fn dither_rows<const DITHER: u8>(bytes: &[u8; 64], words: &[u16; 64]) -> [__m512
     }
 }
 
+/// The bounds of a write, and what has been counted of it.
+struct Tally {
+    most: __m512i,
+    least: __m512i,
+    /// Levels less 128, so that the signed saturating addition ends at 0 and 255.
+    floor: __m512i,
+    ceiling: __m512i,
+    /// A wanted 16-bit number above is bounded where 8 bits cannot tell.
+    over: __m512i,
+    levels: __m512i,
+    flip: __m512i,
+    requested: u32,
+    bounded: u32,
+    attempted: __m512i,
+    effective: __m512i,
+}
+
+#[inline]
+#[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi")]
+fn tally(write: &Write, (floor, ceiling): (u8, u8)) -> Tally {
+    let bound = i8::try_from(write.increment_max).expect("checked: at most 127");
+    Tally {
+        most: _mm512_set1_epi8(bound),
+        least: _mm512_set1_epi8(-bound),
+        floor: _mm512_set1_epi8((floor ^ 0x80).cast_signed()),
+        ceiling: _mm512_set1_epi8((ceiling ^ 0x80).cast_signed()),
+        // Below 127 the packed bytes tell; nothing is above the greatest number.
+        over: _mm512_set1_epi16(if bound == 127 { 127 } else { i16::MAX }),
+        levels: quarters(LEVELS),
+        flip: _mm512_set1_epi8(i8::MIN),
+        requested: 0,
+        bounded: 0,
+        attempted: _mm512_setzero_si512(),
+        effective: _mm512_setzero_si512(),
+    }
+}
+
+/// Bounds and programs 64 cells that want `a` (rows 0 and 1) and `b` (rows 2 and 3), of 16 bits.
+#[inline]
+#[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi")]
+fn settle<const BYTES_TELL: bool>(a: __m512i, b: __m512i, low: &mut [u8; 64], t: &mut Tally) {
+    if !BYTES_TELL {
+        t.bounded += _mm512_cmpgt_epi16_mask(a, t.over).count_ones();
+        t.bounded += _mm512_cmpgt_epi16_mask(b, t.over).count_ones();
+    }
+    let wanted = _mm512_shuffle_epi8(_mm512_packs_epi16(a, b), t.levels);
+    let pulses = _mm512_max_epi8(_mm512_min_epi8(wanted, t.most), t.least);
+    let before = load(low);
+    let level = _mm512_adds_epi8(_mm512_xor_si512(before, t.flip), pulses);
+    let level = _mm512_max_epi8(_mm512_min_epi8(level, t.ceiling), t.floor);
+    let level = _mm512_xor_si512(level, t.flip);
+    store(low, level);
+    t.requested += _mm512_test_epi8_mask(wanted, wanted).count_ones();
+    t.bounded += _mm512_cmpneq_epi8_mask(wanted, pulses).count_ones();
+    let size = _mm512_sad_epu8(_mm512_xor_si512(pulses, t.flip), t.flip);
+    t.attempted = _mm512_add_epi64(t.attempted, size);
+    t.effective = _mm512_add_epi64(t.effective, _mm512_sad_epu8(level, before));
+}
+
+#[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi")]
+fn counts(t: &Tally) -> WriteCounts {
+    WriteCounts {
+        requested: t.requested.into(),
+        bounded: t.bounded.into(),
+        attempted: _mm512_reduce_add_epi64(t.attempted).cast_unsigned(),
+        effective: _mm512_reduce_add_epi64(t.effective).cast_unsigned(),
+    }
+}
+
 #[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi")]
 fn cells<const DITHER: u8, const SCALE: u8>(
     low: &mut Half<u8>,
     sums: &Half<i32>,
     write: &Write,
-    (floor, ceiling): (u8, u8),
+    window: (u8, u8),
     bytes: &Half<u8>,
     words: &Half<u16>,
 ) -> WriteCounts {
-    let scale = scale::<DITHER>(write);
-    let (rows_01, rows_23, levels) = (quarters(ROWS_01), quarters(ROWS_23), quarters(LEVELS));
-    let zero = _mm512_setzero_si512();
-    let flip = _mm512_set1_epi8(i8::MIN);
-    let bound = i8::try_from(write.increment_max).expect("checked: at most 127");
-    let (most, least) = (_mm512_set1_epi8(bound), _mm512_set1_epi8(-bound));
-    // Levels less 128, so that the signed saturating addition ends at 0 and 255.
-    let floor = _mm512_set1_epi8((floor ^ 0x80).cast_signed());
-    let ceiling = _mm512_set1_epi8((ceiling ^ 0x80).cast_signed());
-    // Below 127 the packed bytes tell; nothing is above the greatest number.
-    let over = _mm512_set1_epi16(if bound == 127 { 127 } else { i16::MAX });
-    let (mut requested, mut bounded) = (0, 0);
-    let (mut attempted, mut effective) = (zero, zero);
+    let scale = scale::<DITHER>(write, write.shift);
+    let (rows_01, rows_23) = (quarters(ROWS_01), quarters(ROWS_23));
+    let mut tally = tally(write, window);
     let groups = sums.as_chunks::<64>().0.iter().zip(low.as_chunks_mut::<64>().0);
     let dithers = bytes.as_chunks::<64>().0.iter().zip(words.as_chunks::<64>().0);
     for ((sums, low), (bytes, words)) in groups.zip(dithers) {
         let (sums, _) = sums.as_chunks::<16>();
-        let mut q = [zero; 4];
+        let mut q = [_mm512_setzero_si512(); 4];
         for (q, sums) in q.iter_mut().zip(sums) {
-            *q = quotient::<DITHER, SCALE>(sums, scale);
+            *q = quotient::<DITHER, SCALE>(load_sums(sums), scale);
         }
         if DITHER == WIDE || DITHER == WORD {
             for (q, word) in q.iter_mut().zip(dither_rows::<DITHER>(bytes, words)) {
@@ -253,27 +324,10 @@ fn cells<const DITHER: u8, const SCALE: u8>(
             a = _mm512_srav_epi16(_mm512_adds_epi16(a, word), scale.last);
             let word = _mm512_srlv_epi16(_mm512_shuffle_epi8(words, rows_23), scale.less);
             b = _mm512_srav_epi16(_mm512_adds_epi16(b, word), scale.last);
+            settle::<true>(a, b, low, &mut tally);
         } else {
-            bounded += _mm512_cmpgt_epi16_mask(a, over).count_ones();
-            bounded += _mm512_cmpgt_epi16_mask(b, over).count_ones();
+            settle::<false>(a, b, low, &mut tally);
         }
-        let wanted = _mm512_shuffle_epi8(_mm512_packs_epi16(a, b), levels);
-        let pulses = _mm512_max_epi8(_mm512_min_epi8(wanted, most), least);
-        let before = load(low);
-        let level = _mm512_adds_epi8(_mm512_xor_si512(before, flip), pulses);
-        let level = _mm512_max_epi8(_mm512_min_epi8(level, ceiling), floor);
-        let level = _mm512_xor_si512(level, flip);
-        store(low, level);
-        requested += _mm512_test_epi8_mask(wanted, wanted).count_ones();
-        bounded += _mm512_cmpneq_epi8_mask(wanted, pulses).count_ones();
-        let size = _mm512_sad_epu8(_mm512_xor_si512(pulses, flip), flip);
-        attempted = _mm512_add_epi64(attempted, size);
-        effective = _mm512_add_epi64(effective, _mm512_sad_epu8(level, before));
     }
-    WriteCounts {
-        requested: requested.into(),
-        bounded: bounded.into(),
-        attempted: _mm512_reduce_add_epi64(attempted).cast_unsigned(),
-        effective: _mm512_reduce_add_epi64(effective).cast_unsigned(),
-    }
+    counts(&tally)
 }
