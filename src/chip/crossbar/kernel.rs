@@ -131,12 +131,12 @@ impl Backend {
     /// The back ends this machine has, slowest first.
     #[must_use]
     pub fn available() -> Vec<Self> {
-        let mut all = vec![Self::Scalar];
+        let all = [Self::Scalar].into_iter();
         #[cfg(target_arch = "x86_64")]
-        all.extend(Avx2::detect().map(Self::Avx2));
+        let all = all.chain(Avx2::detect().map(Self::Avx2));
         #[cfg(target_arch = "x86_64")]
-        all.extend(Avx512::detect().map(Self::Avx512));
-        all
+        let all = all.chain(Avx512::detect().map(Self::Avx512));
+        all.collect()
     }
 
     /// The fastest back end this machine has.

@@ -19,7 +19,7 @@ use crate::num::draw::Place;
 mod dither;
 mod program;
 
-/// Proof that the processor has AVX2.
+/// Proof that the processor has AVX2 and counts bits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Avx2(());
 
@@ -29,10 +29,11 @@ const TURNED_PANELS: usize = 8;
 const TURNED_QUADS: usize = TURNED_PANELS * 8;
 
 impl Avx2 {
-    /// The token, where the processor and the system have the feature.
+    /// The token, where the processor and the system have the features.
     #[must_use]
     pub fn detect() -> Option<Self> {
-        is_x86_feature_detected!("avx2").then_some(Self(()))
+        let there = is_x86_feature_detected!("avx2") && is_x86_feature_detected!("popcnt");
+        there.then_some(Self(()))
     }
 
     pub(super) fn read(
@@ -43,12 +44,12 @@ impl Avx2 {
         stride: usize,
         out: &mut [i32],
     ) {
-        // SAFETY: `self` exists only where `detect` found the feature the function is compiled for.
+        // SAFETY: `self` exists only where `detect` found every feature the function is compiled for.
         unsafe { read(plane, blocks, drives, stride, out) }
     }
 
     pub(super) fn read_columns(self, plane: &[u8], layout: Layout, gates: &[u8], out: &mut [i32]) {
-        // SAFETY: `self` exists only where `detect` found the feature the function is compiled for.
+        // SAFETY: `self` exists only where `detect` found every feature the function is compiled for.
         unsafe { read_columns(plane, layout, gates, out) }
     }
 
@@ -59,7 +60,7 @@ impl Avx2 {
         gates: &[i8],
         sums: &mut Half<i32>,
     ) {
-        // SAFETY: `self` exists only where `detect` found the feature the function is compiled for.
+        // SAFETY: `self` exists only where `detect` found every feature the function is compiled for.
         unsafe { accumulate(drives, stride, gates, sums) }
     }
 
@@ -71,7 +72,7 @@ impl Avx2 {
         block: usize,
         out: &mut Half<u8>,
     ) {
-        // SAFETY: `self` exists only where `detect` found the feature the function is compiled for.
+        // SAFETY: `self` exists only where `detect` found every feature the function is compiled for.
         unsafe { dither::dither(place, rows, column, block, out) }
     }
 
@@ -82,27 +83,27 @@ impl Avx2 {
         write: &Write,
         dither: Dither<'_>,
     ) -> WriteCounts {
-        // SAFETY: `self` exists only where `detect` found the feature the function is compiled for.
+        // SAFETY: `self` exists only where `detect` found every feature the function is compiled for.
         unsafe { program::program(cells, sums, write, dither) }
     }
 }
 
 #[inline]
-#[target_feature(enable = "avx2")]
+#[target_feature(enable = "avx2,popcnt")]
 fn load(bytes: &[u8; 32]) -> __m256i {
     // SAFETY: the reference covers the 32 bytes that an unaligned load reads.
     unsafe { _mm256_loadu_si256(bytes.as_ptr().cast()) }
 }
 
 #[inline]
-#[target_feature(enable = "avx2")]
+#[target_feature(enable = "avx2,popcnt")]
 fn store(bytes: &mut [u8; 32], v: __m256i) {
     // SAFETY: the reference covers the 32 bytes that an unaligned store writes.
     unsafe { _mm256_storeu_si256(bytes.as_mut_ptr().cast(), v) }
 }
 
 #[inline]
-#[target_feature(enable = "avx2")]
+#[target_feature(enable = "avx2,popcnt")]
 fn load_sums(sums: &[i32; 8]) -> __m256i {
     // SAFETY: the reference covers the 8 sums, 32 bytes, that an unaligned load reads.
     unsafe { _mm256_loadu_si256(sums.as_ptr().cast()) }
@@ -126,7 +127,7 @@ struct Walk {
 /// `out[i] += sum over runs and quads of dot4(stream i, vector)`, 16 lanes a vector and up to 4 streams.
 /// The bytes of vectors are gates when `SIGNED`, levels otherwise.
 #[inline]
-#[target_feature(enable = "avx2")]
+#[target_feature(enable = "avx2,popcnt")]
 fn dots<const SIGNED: bool, const N: usize>(
     walk: Walk,
     streams: &[u8],
@@ -184,7 +185,7 @@ fn dots<const SIGNED: bool, const N: usize>(
 }
 
 /// [`dots`] for any number of streams.
-#[target_feature(enable = "avx2")]
+#[target_feature(enable = "avx2,popcnt")]
 fn dots_batch<const SIGNED: bool>(
     walk: Walk,
     samples: usize,
@@ -204,7 +205,7 @@ fn dots_batch<const SIGNED: bool>(
     }
 }
 
-#[target_feature(enable = "avx2")]
+#[target_feature(enable = "avx2,popcnt")]
 fn read(plane: &[u8], blocks: Range<usize>, drives: &[u8], stride: usize, out: &mut [i32]) {
     let (from, to) = (blocks.start.min(blocks.end), blocks.end);
     let samples = out.len() / 32;
@@ -220,7 +221,7 @@ fn read(plane: &[u8], blocks: Range<usize>, drives: &[u8], stride: usize, out: &
     }
 }
 
-#[target_feature(enable = "avx2")]
+#[target_feature(enable = "avx2,popcnt")]
 fn accumulate(drives: &[u8], stride: usize, gates: &[i8], sums: &mut Half<i32>) {
     sums.fill(0);
     let walk = Walk { runs: 1, quads: stride / 4, run: 0, stride, out: HALF_COLUMNS };
@@ -230,7 +231,7 @@ fn accumulate(drives: &[u8], stride: usize, gates: &[i8], sums: &mut Half<i32>) 
 }
 
 /// The transposed read: levels are turned, 4 columns of a row to a word, once for all samples.
-#[target_feature(enable = "avx2")]
+#[target_feature(enable = "avx2,popcnt")]
 fn read_columns(plane: &[u8], layout: Layout, gates: &[u8], out: &mut [i32]) {
     out.fill(0);
     let samples = gates.len() / layout.columns_padded();
@@ -264,7 +265,7 @@ fn read_columns(plane: &[u8], layout: Layout, gates: &[u8], out: &mut [i32]) {
 
 /// Turns a half block: 4 columns x 4 rows at a time.
 #[inline]
-#[target_feature(enable = "avx2")]
+#[target_feature(enable = "avx2,popcnt")]
 fn turn(cells: &Half<u8>, quad: usize, turned: &mut [[[u8; 64]; TURNED_QUADS]; 4]) {
     let order = _mm_setr_epi8(0, 4, 8, 12, 1, 5, 9, 13, 2, 6, 10, 14, 3, 7, 11, 15);
     for (group, cells) in cells.as_chunks::<64>().0.iter().enumerate() {

@@ -22,7 +22,7 @@ use crate::num::draw::Place;
 mod dither;
 mod program;
 
-/// Proof that the processor has AVX-512 F, BW, VL, VNNI and VBMI.
+/// Proof that the processor has AVX-512 F, BW, VL, VNNI and VBMI, and counts bits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Avx512(());
 
@@ -39,7 +39,8 @@ impl Avx512 {
             && is_x86_feature_detected!("avx512bw")
             && is_x86_feature_detected!("avx512vl")
             && is_x86_feature_detected!("avx512vnni")
-            && is_x86_feature_detected!("avx512vbmi");
+            && is_x86_feature_detected!("avx512vbmi")
+            && is_x86_feature_detected!("popcnt");
         there.then_some(Self(()))
     }
 
@@ -120,21 +121,21 @@ struct Walk {
 }
 
 #[inline]
-#[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi")]
+#[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi,popcnt")]
 fn load(bytes: &[u8; 64]) -> __m512i {
     // SAFETY: the reference covers the 64 bytes that an unaligned load reads.
     unsafe { _mm512_loadu_si512(bytes.as_ptr().cast()) }
 }
 
 #[inline]
-#[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi")]
+#[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi,popcnt")]
 fn store(bytes: &mut [u8; 64], v: __m512i) {
     // SAFETY: the reference covers the 64 bytes that an unaligned store writes.
     unsafe { _mm512_storeu_si512(bytes.as_mut_ptr().cast(), v) }
 }
 
 #[inline]
-#[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi")]
+#[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi,popcnt")]
 fn load_sums(sums: &[i32; 16]) -> __m512i {
     // SAFETY: the reference covers the 16 sums, 64 bytes, that an unaligned load reads.
     unsafe { _mm512_loadu_si512(sums.as_ptr().cast()) }
@@ -145,7 +146,7 @@ fn load_sums(sums: &[i32; 16]) -> __m512i {
 /// `CHAINS` sums a lane hide the latency of the instruction where there are few streams; the quads
 /// must divide by it.
 #[inline]
-#[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi")]
+#[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi,popcnt")]
 fn dots<const KIND: u8, const N: usize, const H: usize, const CHAINS: usize>(
     walk: Walk,
     streams: &[u8],
@@ -218,7 +219,7 @@ fn dots<const KIND: u8, const N: usize, const H: usize, const CHAINS: usize>(
 }
 
 /// [`dots`] with two vectors side by side for any number of samples, in even groups of at most 12.
-#[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi")]
+#[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi,popcnt")]
 fn dots_batch<const KIND: u8>(
     walk: Walk,
     samples: usize,
@@ -250,7 +251,7 @@ fn dots_batch<const KIND: u8>(
 }
 
 /// Sum of bytes, a multiple of 64 of them.
-#[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi")]
+#[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi,popcnt")]
 fn byte_sum(bytes: &[u8]) -> i32 {
     let mut sum = _mm512_setzero_si512();
     for bytes in bytes.as_chunks().0 {
@@ -259,7 +260,7 @@ fn byte_sum(bytes: &[u8]) -> i32 {
     i32::try_from(_mm512_reduce_add_epi64(sum)).expect("at most 33,025 drives of a byte")
 }
 
-#[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi")]
+#[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi,popcnt")]
 fn read(plane: &[u8], blocks: Range<usize>, drives: &[u8], stride: usize, out: &mut [i32]) {
     let (from, to) = (blocks.start.min(blocks.end), blocks.end);
     let samples = out.len() / 32;
@@ -277,7 +278,7 @@ fn read(plane: &[u8], blocks: Range<usize>, drives: &[u8], stride: usize, out: &
     );
 }
 
-#[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi")]
+#[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi,popcnt")]
 fn accumulate(drives: &[u8], stride: usize, gates: &[i8], sums: &mut Half<i32>) {
     let walk = Walk { runs: 1, quads: stride / 4, run: 0, half: 0, stride, out: HALF_COLUMNS };
     // SAFETY: i8 and u8 have the same size and every bit pattern is valid for both.
@@ -289,7 +290,7 @@ fn accumulate(drives: &[u8], stride: usize, gates: &[i8], sums: &mut Half<i32>) 
 }
 
 /// The transposed read: levels are turned, 4 columns of a row to a word, once for all samples.
-#[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi")]
+#[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi,popcnt")]
 fn read_columns(plane: &[u8], layout: Layout, gates: &[u8], out: &mut [i32]) {
     out.fill(0);
     let samples = gates.len() / layout.columns_padded();
@@ -325,7 +326,7 @@ fn read_columns(plane: &[u8], layout: Layout, gates: &[u8], out: &mut [i32]) {
 
 /// Turns a half block: `[4 rows, 4 columns each]` of four vectors become 16 rows of 4 columns.
 #[inline]
-#[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi")]
+#[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi,popcnt")]
 fn turn(cells: &Half<u8>, quad: usize, turned: &mut [[[u8; 64]; TURNED_QUADS]; 4]) {
     // Byte [quarter of 4 columns][row][column] of a vector comes from its byte [column][row].
     let mut order = [0u8; 64];

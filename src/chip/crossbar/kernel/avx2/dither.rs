@@ -14,13 +14,13 @@ use crate::num::draw::Place;
 
 /// Turns the 32-bit lanes left; `LEFT + RIGHT` is 32.
 #[inline]
-#[target_feature(enable = "avx2")]
+#[target_feature(enable = "avx2,popcnt")]
 fn rotate<const LEFT: i32, const RIGHT: i32>(v: __m256i) -> __m256i {
     _mm256_or_si256(_mm256_slli_epi32::<LEFT>(v), _mm256_srli_epi32::<RIGHT>(v))
 }
 
 #[inline]
-#[target_feature(enable = "avx2")]
+#[target_feature(enable = "avx2,popcnt")]
 fn quarter(s: &mut [__m256i; 16], a: usize, b: usize, c: usize, d: usize) {
     // Turning by whole bytes is one shuffle.
     let by_16 = _mm256_setr_epi8(
@@ -41,7 +41,7 @@ fn quarter(s: &mut [__m256i; 16], a: usize, b: usize, c: usize, d: usize) {
     s[b] = rotate::<7, 25>(_mm256_xor_si256(s[b], s[c]));
 }
 
-#[target_feature(enable = "avx2")]
+#[target_feature(enable = "avx2,popcnt")]
 pub(super) fn dither(place: &Place, rows: usize, column: usize, block: usize, out: &mut Half<u8>) {
     let (start, step) = chacha::start(place, rows, column, block);
     let mut lane = _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7);

@@ -35,7 +35,7 @@ const BYTE: u8 = 1;
 /// 16 bits a cell.
 const WORD: u8 = 2;
 
-#[target_feature(enable = "avx2")]
+#[target_feature(enable = "avx2,popcnt")]
 pub(super) fn program(
     cells: Cells<'_>,
     sums: &Half<i32>,
@@ -94,7 +94,7 @@ struct Scale {
     reach: __m256i,
 }
 
-#[target_feature(enable = "avx2")]
+#[target_feature(enable = "avx2,popcnt")]
 fn scale<const DITHER: u8>(write: &Write) -> Scale {
     let up = write.residual_bits.saturating_sub(write.shift);
     let reach = if up == 0 { i32::MAX } else { 1 << (30 - up) };
@@ -125,7 +125,7 @@ fn scale<const DITHER: u8>(write: &Write) -> Scale {
 
 /// The dither words of the four rows of a group of 8 columns.
 #[inline]
-#[target_feature(enable = "avx2")]
+#[target_feature(enable = "avx2,popcnt")]
 fn dither_rows<const DITHER: u8>(bytes: &[u8; 32], words: &[u16; 32]) -> [__m256i; 4] {
     if DITHER == WORD {
         // SAFETY: the reference covers 32 words, 64 bytes; this reads the first 32.
@@ -164,7 +164,7 @@ fn dither_rows<const DITHER: u8>(bytes: &[u8; 32], words: &[u16; 32]) -> [__m256
 
 /// Writes four rows of 16-bit numbers in the order of levels.
 #[inline]
-#[target_feature(enable = "avx2")]
+#[target_feature(enable = "avx2,popcnt")]
 fn store_rows(words: &mut [u16; 32], rows: [__m256i; 4]) {
     let a = _mm256_or_si256(rows[0], _mm256_slli_epi32::<16>(rows[1]));
     let b = _mm256_or_si256(rows[2], _mm256_slli_epi32::<16>(rows[3]));
@@ -180,7 +180,7 @@ fn store_rows(words: &mut [u16; 32], rows: [__m256i; 4]) {
 
 /// The rounded product of 8 cells.
 #[inline]
-#[target_feature(enable = "avx2")]
+#[target_feature(enable = "avx2,popcnt")]
 fn rounded<const DITHER: u8, const RESIDUAL: bool>(
     sums: &[i32; 8],
     word: __m256i,
@@ -201,7 +201,7 @@ fn rounded<const DITHER: u8, const RESIDUAL: bool>(
     _mm256_srav_epi32(_mm256_add_epi32(q, word), scale.last)
 }
 
-#[target_feature(enable = "avx2")]
+#[target_feature(enable = "avx2,popcnt")]
 fn total(v: __m256i) -> u64 {
     let v = _mm_add_epi64(_mm256_castsi256_si128(v), _mm256_extracti128_si256::<1>(v));
     let v = _mm_add_epi64(v, _mm_unpackhi_epi64(v, v));
@@ -210,12 +210,12 @@ fn total(v: __m256i) -> u64 {
 
 /// Zeros among the 32 bytes.
 #[inline]
-#[target_feature(enable = "avx2")]
+#[target_feature(enable = "avx2,popcnt")]
 fn zeros(v: __m256i) -> u32 {
     _mm256_movemask_epi8(_mm256_cmpeq_epi8(v, _mm256_setzero_si256())).count_ones()
 }
 
-#[target_feature(enable = "avx2")]
+#[target_feature(enable = "avx2,popcnt")]
 fn cells<const DITHER: u8, const RESIDUAL: bool>(
     low: &mut Half<u8>,
     left: &mut Half<u16>,

@@ -15,7 +15,7 @@ use crate::chip::crossbar::kernel::{Half, chacha};
 use crate::num::draw::Place;
 
 #[inline]
-#[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi")]
+#[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi,popcnt")]
 fn quarter(s: &mut [__m512i; 16], a: usize, b: usize, c: usize, d: usize) {
     s[a] = _mm512_add_epi32(s[a], s[b]);
     s[d] = _mm512_rol_epi32::<16>(_mm512_xor_si512(s[d], s[a]));
@@ -27,7 +27,7 @@ fn quarter(s: &mut [__m512i; 16], a: usize, b: usize, c: usize, d: usize) {
     s[b] = _mm512_rol_epi32::<7>(_mm512_xor_si512(s[b], s[c]));
 }
 
-#[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi")]
+#[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi,popcnt")]
 pub(super) fn dither(place: &Place, rows: usize, column: usize, block: usize, out: &mut Half<u8>) {
     let (start, step) = chacha::start(place, rows, column, block);
     let mut first = [_mm512_setzero_si512(); 16];

@@ -46,7 +46,7 @@ const MINUS: u8 = 1;
 /// `sum * (+-mantissa)`.
 const TIMES: u8 = 2;
 
-#[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi")]
+#[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi,popcnt")]
 pub(super) fn program(
     cells: Cells<'_>,
     sums: &Half<i32>,
@@ -86,7 +86,7 @@ pub(super) fn program(
     }
 }
 
-#[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi")]
+#[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi,popcnt")]
 fn scaled<const DITHER: u8>(
     low: &mut Half<u8>,
     sums: &Half<i32>,
@@ -115,7 +115,7 @@ struct Scale {
 }
 
 /// Rounding to units of `2^shift`.
-#[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi")]
+#[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi,popcnt")]
 fn scale<const DITHER: u8>(write: &Write, shift: u32) -> Scale {
     let shift = i32::try_from(shift).expect("checked: at most 31");
     let bits = match DITHER {
@@ -146,7 +146,7 @@ fn scale<const DITHER: u8>(write: &Write, shift: u32) -> Scale {
 
 /// `q` of one row.
 #[inline]
-#[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi")]
+#[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi,popcnt")]
 fn quotient<const DITHER: u8, const SCALE: u8>(sums: __m512i, scale: Scale) -> __m512i {
     if DITHER == NEAREST {
         let sums = match SCALE {
@@ -180,7 +180,7 @@ const fn pairs(row: u8) -> [u8; 16] {
 const LEVELS: [u8; 16] = [0, 4, 8, 12, 1, 5, 9, 13, 2, 6, 10, 14, 3, 7, 11, 15];
 
 #[inline]
-#[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi")]
+#[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi,popcnt")]
 fn quarters(bytes: [u8; 16]) -> __m512i {
     let mut all = [[0; 16]; 4];
     all.fill(bytes);
@@ -189,7 +189,7 @@ fn quarters(bytes: [u8; 16]) -> __m512i {
 
 /// The 32-bit dither words of the four rows of a group.
 #[inline]
-#[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi")]
+#[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi,popcnt")]
 fn dither_rows<const DITHER: u8>(bytes: &[u8; 64], words: &[u16; 64]) -> [__m512i; 4] {
     if DITHER == WORD {
         // SAFETY: the reference covers 64 words, 128 bytes; this reads the first 64.
@@ -239,7 +239,7 @@ struct Tally {
 }
 
 #[inline]
-#[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi")]
+#[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi,popcnt")]
 fn tally(write: &Write, (floor, ceiling): (u8, u8)) -> Tally {
     let bound = i8::try_from(write.increment_max).expect("checked: at most 127");
     Tally {
@@ -260,7 +260,7 @@ fn tally(write: &Write, (floor, ceiling): (u8, u8)) -> Tally {
 
 /// Bounds and programs 64 cells that want `a` (rows 0 and 1) and `b` (rows 2 and 3), of 16 bits.
 #[inline]
-#[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi")]
+#[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi,popcnt")]
 fn settle<const BYTES_TELL: bool>(a: __m512i, b: __m512i, low: &mut [u8; 64], t: &mut Tally) {
     if !BYTES_TELL {
         t.bounded += _mm512_cmpgt_epi16_mask(a, t.over).count_ones();
@@ -280,7 +280,7 @@ fn settle<const BYTES_TELL: bool>(a: __m512i, b: __m512i, low: &mut [u8; 64], t:
     t.effective = _mm512_add_epi64(t.effective, _mm512_sad_epu8(level, before));
 }
 
-#[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi")]
+#[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi,popcnt")]
 fn counts(t: &Tally) -> WriteCounts {
     WriteCounts {
         requested: t.requested.into(),
@@ -290,7 +290,7 @@ fn counts(t: &Tally) -> WriteCounts {
     }
 }
 
-#[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi")]
+#[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi,popcnt")]
 fn cells<const DITHER: u8, const SCALE: u8>(
     low: &mut Half<u8>,
     sums: &Half<i32>,

@@ -17,7 +17,7 @@ use super::{NEAREST, PLUS, WORD, counts, dither_rows, quotient, scale, settle, t
 use crate::chip::crossbar::kernel::avx512::load_sums;
 use crate::chip::crossbar::kernel::{Half, Write, WriteCounts};
 
-#[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi")]
+#[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi,popcnt")]
 pub(super) fn residual<const DITHER: u8>(
     low: &mut Half<u8>,
     left: &mut Half<u16>,
@@ -74,7 +74,7 @@ pub(super) fn residual<const DITHER: u8>(
 
 /// Writes four rows of 16-bit numbers in the order of levels.
 #[inline]
-#[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi")]
+#[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi,popcnt")]
 fn store_rows(words: &mut [u16; 64], rows: [__m512i; 4]) {
     let a = _mm512_or_si512(rows[0], _mm512_slli_epi32::<16>(rows[1]));
     let b = _mm512_or_si512(rows[2], _mm512_slli_epi32::<16>(rows[3]));
