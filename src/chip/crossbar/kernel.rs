@@ -7,10 +7,21 @@
 
 use std::ops::Range;
 
-use super::layout::{HALF_CELLS, Layout};
+use super::layout::{BLOCK_CELLS, BLOCK_ROWS, HALF_CELLS, Layout, PANEL_COLUMNS};
 use crate::num::draw::Place;
 
+#[cfg(target_arch = "x86_64")]
+mod avx2;
+#[cfg(target_arch = "x86_64")]
+mod avx512;
+#[cfg(target_arch = "x86_64")]
+mod chacha;
 mod scalar;
+#[cfg(test)]
+mod tests;
+
+#[cfg(target_arch = "x86_64")]
+pub use self::{avx2::Avx2, avx512::Avx512};
 
 /// Sums, or levels, of a half block. Sums lie row-major, `[64 rows][16 columns]`; levels, residuals
 /// and dither words lie as [`super::layout::in_half`] says.
@@ -21,7 +32,35 @@ pub type Half<T> = [T; HALF_CELLS];
 pub enum Backend {
     /// Plain loops: the definition.
     Scalar,
+    /// 256-bit loops.
+    #[cfg(target_arch = "x86_64")]
+    Avx2(Avx2),
+    /// 512-bit loops with 8-bit dot products.
+    #[cfg(target_arch = "x86_64")]
+    Avx512(Avx512),
 }
+
+/// Why a back end cannot be had by its name.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum UnknownBackend {
+    /// No back end has this name on any machine.
+    #[error("there is no kernel `{name}`; say one of {}", NAMES.join(", "))]
+    Name {
+        /// What was asked for.
+        name: String,
+    },
+    /// The name is right, but the processor lacks the feature.
+    #[error("this processor cannot run the kernel `{name}`; it has {}", there.join(", "))]
+    Absent {
+        /// What was asked for.
+        name: String,
+        /// Names of the back ends of this machine.
+        there: Vec<&'static str>,
+    },
+}
+
+/// Names of all back ends of all machines, slowest first.
+const NAMES: [&str; 3] = ["scalar", "avx2", "avx512"];
 
 /// Rounding of a sum to pulses.
 #[derive(Debug, Clone, Copy)]
@@ -92,7 +131,12 @@ impl Backend {
     /// The back ends this machine has, slowest first.
     #[must_use]
     pub fn available() -> Vec<Self> {
-        vec![Self::Scalar]
+        let all = [Self::Scalar].into_iter();
+        #[cfg(target_arch = "x86_64")]
+        let all = all.chain(Avx2::detect().map(Self::Avx2));
+        #[cfg(target_arch = "x86_64")]
+        let all = all.chain(Avx512::detect().map(Self::Avx512));
+        all.collect()
     }
 
     /// The fastest back end this machine has.
@@ -106,7 +150,28 @@ impl Backend {
     pub const fn name(self) -> &'static str {
         match self {
             Self::Scalar => "scalar",
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx2(_) => "avx2",
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx512(_) => "avx512",
         }
+    }
+
+    /// The back end called `name`.
+    ///
+    /// # Errors
+    /// When no back end has that name, or this processor lacks it.
+    pub fn named(name: &str) -> Result<Self, UnknownBackend> {
+        let available = Self::available();
+        if let Some(backend) = available.iter().find(|backend| backend.name() == name) {
+            return Ok(*backend);
+        }
+        let name = name.to_owned();
+        if NAMES.contains(&name.as_str()) {
+            let there = available.into_iter().map(Self::name).collect();
+            return Err(UnknownBackend::Absent { name, there });
+        }
+        Err(UnknownBackend::Name { name })
     }
 
     /// Reads one panel: `out[b][c] = sum of level[r][c] * drives[b][r]` over the rows of `blocks`, for the 32
@@ -120,33 +185,54 @@ impl Backend {
         stride: usize,
         out: &mut [i32],
     ) {
-        assert!(
-            plane.len() >= blocks.end * super::layout::BLOCK_CELLS && stride >= blocks.end * 64
-        );
-        assert_eq!(drives.len() / stride * 32, out.len(), "32 sums a sample");
+        assert!(plane.len() >= blocks.end * BLOCK_CELLS, "the panel has the blocks");
+        assert!(stride >= blocks.end * BLOCK_ROWS, "every row has a drive");
+        assert_eq!(drives.len() / stride * PANEL_COLUMNS, out.len(), "32 sums a sample");
+        if out.is_empty() {
+            return;
+        }
         match self {
             Self::Scalar => scalar::read(plane, blocks, drives, stride, out),
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx2(avx2) => avx2.read(plane, blocks, drives, stride, out),
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx512(avx512) => avx512.read(plane, blocks, drives, stride, out),
         }
     }
 
-    /// The transposed read: `out[b][r] = sum over c of level[r][c] * gates[b][c]`, gates 0..=127, over a whole
-    /// plane. `gates` holds `columns_padded` gates a sample, `out` `rows_padded` sums.
+    /// Reads a whole array from its columns: `out[b][r] = sum of level[r][c] * gates[b][c]` over all columns.
+    /// `plane` is one byte plane of the array, `gates` (0..=127) holds the padded columns a sample, `out` the
+    /// padded rows.
     pub fn read_columns(self, plane: &[u8], layout: Layout, gates: &[u8], out: &mut [i32]) {
-        assert_eq!(plane.len(), layout.cells_padded());
-        assert_eq!(gates.len() / layout.columns_padded() * layout.rows_padded(), out.len());
+        let (rows, columns) = (layout.rows_padded(), layout.columns_padded());
+        assert_eq!(plane.len(), layout.cells_padded(), "one byte a cell");
+        assert!(rows > 0 && columns > 0, "an array has cells");
+        assert!(gates.len().is_multiple_of(columns), "one gate a column");
+        assert_eq!(gates.len() / columns * rows, out.len(), "one sum a row");
+        debug_assert!(gates.iter().all(|gate| *gate < 128), "gates have 7 bits");
+        if out.is_empty() {
+            return;
+        }
         match self {
             Self::Scalar => scalar::read_columns(plane, layout, gates, out),
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx2(avx2) => avx2.read_columns(plane, layout, gates, out),
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx512(avx512) => avx512.read_columns(plane, layout, gates, out),
         }
     }
 
     /// Sums of a half block: `sums[r][c] = sum over b of drives[r][b] * gates[b][c]`. `drives` holds 64 rows of
     /// `stride` samples (a multiple of 4, padded with 0), `gates` lies `[stride / 4][16 columns][4 samples]`.
     pub fn accumulate(self, drives: &[u8], stride: usize, gates: &[i8], sums: &mut Half<i32>) {
-        assert!(
-            stride.is_multiple_of(4) && drives.len() == 64 * stride && gates.len() == 16 * stride
-        );
+        assert!(stride > 0 && stride.is_multiple_of(4), "samples are padded to words of four");
+        assert!(drives.len() == 64 * stride && gates.len() == 16 * stride, "64 rows, 16 columns");
         match self {
             Self::Scalar => scalar::accumulate(drives, stride, gates, sums),
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx2(avx2) => avx2.accumulate(drives, stride, gates, sums),
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx512(avx512) => avx512.accumulate(drives, stride, gates, sums),
         }
     }
 
@@ -162,6 +248,10 @@ impl Backend {
     ) {
         match self {
             Self::Scalar => scalar::dither(place, rows, column, block, out),
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx2(avx2) => avx2.dither(place, rows, column, block, out),
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx512(avx512) => avx512.dither(place, rows, column, block, out),
         }
     }
 
@@ -173,8 +263,13 @@ impl Backend {
         write: &Write,
         dither: Dither<'_>,
     ) -> WriteCounts {
+        assert!(write.floor <= write.ceiling, "the window is not empty");
         match self {
             Self::Scalar => scalar::program(cells, sums, write, dither),
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx2(avx2) => avx2.program(cells, sums, write, dither),
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx512(avx512) => avx512.program(cells, sums, write, dither),
         }
     }
 }

@@ -2,6 +2,7 @@
 //!
 //! ```text
 //! read        v[c]   = sum_r level[r][c] * x[r]
+//! transposed  v[r]   = sum_c level[r][c] * g[c]
 //! sums        s[r,c] = sum_b x[b][r] * u[b][c],  negated for inhibitory pathways
 //! pulses      p = clamp( SR(s * mantissa, k), -d_max, +d_max )
 //! SR(s, k)    = (q + r) >> D,  q = rsh(s, k - D) or s << (D - k),  r uniform in 0..2^D-1;  D = 0: rsh(s, k)
@@ -44,21 +45,12 @@ pub(super) fn read(
 }
 
 pub(super) fn read_columns(plane: &[u8], layout: Layout, gates: &[u8], out: &mut [i32]) {
-    let samples = gates.chunks_exact(layout.columns_padded());
-    for (gates, out) in samples.zip(out.chunks_exact_mut(layout.rows_padded())) {
-        out.fill(0);
-        let panels = plane.chunks_exact(layout.panel_cells());
-        for (cells, gates) in panels.zip(gates.chunks_exact(32)) {
-            for (block, cells) in cells.chunks_exact(BLOCK_CELLS).enumerate() {
-                let halves = cells.chunks_exact(HALF_CELLS).zip(gates.chunks_exact(HALF_COLUMNS));
-                for (cells, gates) in halves {
-                    for row in 0..64 {
-                        for (column, &gate) in gates.iter().enumerate() {
-                            out[block * 64 + row] +=
-                                i32::from(cells[in_half(row, column)]) * i32::from(gate);
-                        }
-                    }
-                }
+    let gates = gates.chunks_exact(layout.columns_padded());
+    for (gates, out) in gates.zip(out.chunks_exact_mut(layout.rows_padded())) {
+        for (row, out) in out.iter_mut().enumerate() {
+            *out = 0;
+            for (column, gate) in gates.iter().enumerate() {
+                *out += i32::from(plane[layout.index(row, column)]) * i32::from(*gate);
             }
         }
     }
