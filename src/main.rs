@@ -1,1 +1,5 @@
-fn main() {}
+//! The `dalean` program.
+
+fn main() -> std::process::ExitCode {
+    dalean::cli::main()
+}

@@ -1,0 +1,211 @@
+//! Arguments, messages, exit codes, and the only clock.
+//!
+//! ```text
+//! 0  done                          1  the run, file or disk refused
+//! 2  arguments cannot be used      3  stopped by the user; the run can be continued
+//! 4  verify found a difference
+//! ```
+
+use std::io::IsTerminal;
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use clap::{Args, CommandFactory, Parser, Subcommand};
+
+use crate::chip::crossbar::kernel::Backend;
+use crate::lab::config::{self, Config, Sources};
+use crate::lab::data::DataRoot;
+use crate::lab::run::Machine;
+
+mod data;
+mod hw;
+mod progress;
+mod run;
+
+/// What stops a command.
+#[derive(Debug)]
+struct Failure {
+    code: u8,
+    message: String,
+}
+
+impl From<crate::lab::data::DataError> for Failure {
+    fn from(error: crate::lab::data::DataError) -> Self {
+        Self { code: 1, message: error.to_string() }
+    }
+}
+
+type Done = Result<(), Failure>;
+
+const ABOUT: &str = "Simulates neural networks that learn on an analog or photonic chip whose synapses can only be \
+non-negative: deterministic, all-integer, bit-identical on every machine.";
+
+const AFTER: &str = "\
+Start here:
+  dalean train                              train the built-in digits (seconds)
+  dalean data fetch mnist                   get MNIST
+  dalean train examples/mnist.toml          train it
+  dalean train examples/mnist.toml --set hw.cell.level_bits=4 --hw prime
+                                            4-bit cells, another chip
+  dalean verify runs/optdigits-ed-seed1     do a run again and compare every bit
+  dalean hw show isaac                      what a chip model says, with sources
+
+Exit codes: 0 done, 1 refused, 2 bad arguments, 3 stopped and resumable, 4 verify found a difference.";
+
+#[derive(Debug, Parser)]
+#[command(name = "dalean", version, about = ABOUT, after_help = AFTER, propagate_version = true)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Train a network on the chip; without a file, the built-in digits
+    Train(run::TrainArgs),
+    /// Read the test set with the state of a run
+    Eval(run::EvalArgs),
+    /// Do a run again and compare every state hash
+    Verify(run::VerifyArgs),
+    /// Show and fetch data sets
+    #[command(subcommand)]
+    Data(data::DataCommand),
+    /// Show and check hardware models
+    #[command(subcommand)]
+    Hw(hw::HwCommand),
+    /// Print completions for a shell
+    Completions {
+        /// Which shell
+        shell: clap_complete::Shell,
+    },
+}
+
+/// Options of every command that runs.
+#[derive(Debug, Clone, Args)]
+struct Shared {
+    /// Threads; results do not depend on it [default: all cores]
+    #[arg(long, value_name = "N")]
+    threads: Option<usize>,
+    /// Loops to use: scalar, avx2, avx512; results do not depend on it [default: the fastest there is]
+    #[arg(long, value_name = "NAME")]
+    kernel: Option<String>,
+    /// Folder of data sets [default: data, or DALEAN_DATA]
+    #[arg(long, value_name = "DIR")]
+    data_dir: Option<PathBuf>,
+    /// One JSON object a line on standard output, each with an `event`
+    #[arg(long)]
+    json: bool,
+    /// Print only the result
+    #[arg(long, short)]
+    quiet: bool,
+}
+
+#[expect(clippy::disallowed_methods, reason = "the command line reads the environment for the rest")]
+fn environment(name: &str) -> Option<String> {
+    std::env::var(name).ok().filter(|value| !value.is_empty())
+}
+
+impl Shared {
+    fn machine(&self) -> Result<Machine, Failure> {
+        let backend = match &self.kernel {
+            Some(name) => Backend::named(name).map_err(|e| usage(&e.to_string()))?,
+            None => Backend::best(),
+        };
+        let cores = || std::thread::available_parallelism().map_or(1, usize::from);
+        let threads = self.threads.unwrap_or_else(cores);
+        if !(1..=1024).contains(&threads) {
+            return Err(usage(&format!("--threads is {threads}, but must lie in 1..=1024")));
+        }
+        Ok(Machine { backend, threads })
+    }
+
+    fn data_root(&self) -> DataRoot {
+        data_root(self.data_dir.clone())
+    }
+}
+
+fn data_root(given: Option<PathBuf>) -> DataRoot {
+    let environment = || environment("DALEAN_DATA").map(PathBuf::from);
+    DataRoot::new(given.or_else(environment).unwrap_or_else(|| PathBuf::from("data")))
+}
+
+fn usage(message: &str) -> Failure {
+    Failure { code: 2, message: message.into() }
+}
+
+/// Reads the configuration a command names.
+fn configuration(
+    file: Option<&PathBuf>,
+    hw: Option<&str>,
+    settings: &[String],
+    seed: Option<u64>,
+) -> Result<Config, Failure> {
+    let (name, text) = match file {
+        None => {
+            ("the built-in example".to_owned(), include_str!("../examples/digits.toml").to_owned())
+        }
+        Some(path) => {
+            #[expect(clippy::disallowed_methods, reason = "the file the user named")]
+            let text = std::fs::read_to_string(path).map_err(|error| {
+                let hint = "name an experiment file, such as examples/mnist.toml";
+                usage(&format!("cannot read {}: {error}; {hint}", path.display()))
+            })?;
+            (path.display().to_string(), text)
+        }
+    };
+    let sources = Sources { experiment: Some((&name, &text)), hardware: hw, settings, seed };
+    config::load(&sources).map_err(|error| usage(&error.to_string()))
+}
+
+/// Prints a line to standard output; a reader that has gone away is no fault of ours.
+fn say(line: &str) {
+    use std::io::Write;
+    let _ = writeln!(std::io::stdout(), "{line}");
+}
+
+/// Runs the program and gives its exit code.
+#[must_use]
+pub fn main() -> ExitCode {
+    let cli = Cli::parse();
+    let json = std::env::args().any(|argument| argument == "--json");
+    let done = match cli.command {
+        Command::Train(args) => run::train(&args),
+        Command::Eval(args) => run::eval(&args),
+        Command::Verify(args) => run::verify(&args),
+        Command::Data(command) => data::execute(&command),
+        Command::Hw(command) => hw::execute(&command),
+        Command::Completions { shell } => {
+            let mut script = Vec::new();
+            clap_complete::generate(shell, &mut Cli::command(), "dalean", &mut script);
+            say(String::from_utf8_lossy(&script).trim_end());
+            Ok(())
+        }
+    };
+    match done {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(Failure { code, message }) => {
+            if json {
+                say(&serde_json::json!({"event": "error", "code": code, "message": message}).to_string());
+            }
+            let red = std::io::stderr().is_terminal();
+            let word = if red { "\u{1b}[31merror\u{1b}[0m" } else { "error" };
+            eprintln!("{word}: {message}");
+            ExitCode::from(code)
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn arguments_are_well_formed() {
+        Cli::command().debug_assert();
+    }
+
+    #[test]
+    fn the_built_in_example_is_valid() {
+        configuration(None, None, &[], None).unwrap();
+    }
+}

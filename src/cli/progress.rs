@@ -1,0 +1,130 @@
+//! Progress with rate and time to go: a bar on a terminal, plain lines elsewhere.
+#![expect(clippy::disallowed_types, reason = "progress is about wall-clock time")]
+
+use std::io::IsTerminal;
+use std::time::{Duration, Instant};
+
+use indicatif::{ProgressBar, ProgressStyle};
+
+use crate::lab::store::record::EpochRecord;
+use crate::task::classify::Progress;
+
+/// Seconds between plain lines within an epoch.
+const LINE_SECONDS: u64 = 10;
+
+/// Shows how far a run is.
+#[derive(Debug)]
+pub(super) struct Meter {
+    bar: Option<ProgressBar>,
+    quiet: bool,
+    epochs: u32,
+    started: Instant,
+    last_line: Instant,
+    samples: u64,
+}
+
+impl Meter {
+    /// A meter for `epochs` epochs; silent when `quiet`.
+    pub(super) fn new(quiet: bool, epochs: u32) -> Self {
+        let now = Instant::now();
+        let bar = (!quiet && std::io::stderr().is_terminal()).then(|| {
+            let bar = ProgressBar::new(0);
+            let template = "{prefix} {bar:30} {pos}/{len} images  {msg}";
+            bar.set_style(ProgressStyle::with_template(template).expect("a valid template"));
+            bar
+        });
+        Self { bar, quiet, epochs, started: now, last_line: now, samples: 0 }
+    }
+
+    /// Notes a batch.
+    pub(super) fn batch(&mut self, progress: Progress) {
+        let Progress { epoch, samples, samples_total, correct } = progress;
+        let done = u64::from(epoch) * samples_total as u64 + samples as u64;
+        if self.samples == 0 {
+            // a continued run has a past that this process did not spend time on
+            self.samples = done;
+            self.started = Instant::now();
+        }
+        if self.quiet {
+            return;
+        }
+        let seconds = self.started.elapsed().as_secs_f64();
+        let rate = (done - self.samples) as f64 / seconds.max(1e-3);
+        let total = u64::from(self.epochs) * samples_total as u64;
+        let left = Duration::from_secs_f64(((total - done.min(total)) as f64 / rate.max(1.0)).min(1e9));
+        let right = 100.0 * correct as f64 / samples as f64;
+        let message =
+            format!("train {right:.2} %  {rate:.0} images/s  {} to go", clock(left));
+        if let Some(bar) = &self.bar {
+            bar.set_length(samples_total as u64);
+            bar.set_prefix(format!("epoch {:>3}/{}", epoch + 1, self.epochs));
+            bar.set_position(samples as u64);
+            bar.set_message(message);
+        } else if self.last_line.elapsed() >= Duration::from_secs(LINE_SECONDS) {
+            self.last_line = Instant::now();
+            eprintln!("epoch {}/{}: {samples}/{samples_total} images, {message}", epoch + 1, self.epochs);
+        }
+    }
+
+    /// Notes a finished epoch.
+    pub(super) fn epoch(&mut self, record: &EpochRecord) {
+        if self.quiet {
+            return;
+        }
+        self.last_line = Instant::now();
+        let percent = |score: Option<crate::lab::store::record::Score>| {
+            score.map_or_else(|| "-".into(), |s| format!("{:.2} %", 100.0 * s.fraction()))
+        };
+        let (floor, cells) = record
+            .pathways
+            .iter()
+            .fold((0, 0), |(floor, cells), p| (floor + p.floor, cells + p.cells));
+        let line = format!(
+            "epoch {:>3}/{}  train {:>8}  validation {:>8}  floor {:>5.1} %  {:>7.2} s  {}",
+            record.epoch,
+            self.epochs,
+            percent(record.train),
+            percent(record.validation),
+            100.0 * floor as f64 / cells.max(1) as f64,
+            record.train_seconds,
+            &record.state_hash[..12],
+        );
+        self.line(&line);
+    }
+
+    /// Prints a line above the bar.
+    pub(super) fn line(&self, line: &str) {
+        match &self.bar {
+            Some(bar) => bar.println(line),
+            None => eprintln!("{line}"),
+        }
+    }
+
+    /// Takes the bar away.
+    pub(super) fn finish(&self) {
+        if let Some(bar) = &self.bar {
+            bar.finish_and_clear();
+        }
+    }
+}
+
+/// `1:02:03`, `2:03` or `3 s`.
+fn clock(time: Duration) -> String {
+    let seconds = time.as_secs();
+    match (seconds / 3600, seconds / 60 % 60, seconds % 60) {
+        (0, 0, s) => format!("{s} s"),
+        (0, m, s) => format!("{m}:{s:02}"),
+        (h, m, s) => format!("{h}:{m:02}:{s:02}"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn times_are_short() {
+        let show = |s| clock(Duration::from_secs(s));
+        assert_eq!([show(3), show(123), show(3723)], ["3 s", "2:03", "1:02:03"]);
+    }
+}

@@ -1,0 +1,224 @@
+//! `train`, `eval`, `verify`.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use clap::Args;
+use serde_json::json;
+
+use super::progress::Meter;
+use super::{Done, Failure, Shared, configuration, environment, say};
+use crate::lab::run::{self, Event, Outcome, RunError, Verdict};
+use crate::lab::store::record::TestRecord;
+
+#[derive(Debug, Args)]
+pub(super) struct TrainArgs {
+    /// Experiment file [default: the built-in digits]
+    file: Option<PathBuf>,
+    /// Hardware model: a built-in name or a file
+    #[arg(long, value_name = "FILE")]
+    hw: Option<String>,
+    /// Change a key, such as hw.cell.level_bits=4 (repeatable)
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    settings: Vec<String>,
+    /// Seed of all draws
+    #[arg(long, value_name = "N")]
+    seed: Option<u64>,
+    /// Folder that gets the run's folder [default: runs, or DALEAN_RUNS]
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Continue a run from its last finished epoch
+    #[arg(long, value_name = "RUN", conflicts_with_all = ["file", "hw", "settings", "seed", "out"])]
+    resume: Option<PathBuf>,
+    #[command(flatten)]
+    shared: Shared,
+}
+
+#[derive(Debug, Args)]
+pub(super) struct EvalArgs {
+    /// Folder of a run
+    run: PathBuf,
+    #[command(flatten)]
+    shared: Shared,
+}
+
+#[derive(Debug, Args)]
+pub(super) struct VerifyArgs {
+    /// Folder of a run
+    run: PathBuf,
+    /// Compare only the first N epochs
+    #[arg(long, value_name = "N")]
+    epochs: Option<u32>,
+    #[command(flatten)]
+    shared: Shared,
+}
+
+impl From<RunError> for Failure {
+    fn from(error: RunError) -> Self {
+        let code = match error {
+            RunError::Stopped { .. } => 3,
+            RunError::Config(_) | RunError::Plan(_) => 2,
+            _ => 1,
+        };
+        Self { code, message: error.to_string() }
+    }
+}
+
+/// Set when the user asks to stop; the run then ends after the batch in progress.
+fn stop_flag() -> Arc<AtomicBool> {
+    let flag = Arc::new(AtomicBool::new(false));
+    let set = Arc::clone(&flag);
+    // a second request ends the process at once
+    let _ = ctrlc::set_handler(move || {
+        if set.swap(true, Ordering::SeqCst) {
+            std::process::exit(3);
+        }
+    });
+    flag
+}
+
+pub(super) fn train(args: &TrainArgs) -> Done {
+    let shared = &args.shared;
+    let machine = shared.machine()?;
+    let stop = stop_flag();
+    let config = match &args.resume {
+        Some(_) => None,
+        None => {
+            Some(configuration(args.file.as_ref(), args.hw.as_deref(), &args.settings, args.seed)?)
+        }
+    };
+    let (quiet, json) = (shared.quiet || shared.json, shared.json);
+    let mut meter = Meter::new(quiet, 0);
+    let mut folder = PathBuf::new();
+    let mut on_event = |event: Event<'_>| {
+        match event {
+            Event::Started { folder: path, data, warnings, epoch, epochs } => {
+                folder = path.into();
+                meter = Meter::new(quiet, epochs);
+                if json {
+                    let run = path.display().to_string();
+                    say(&json!({"event": "started", "run": run, "data": data, "epoch": epoch,
+                        "epochs": epochs, "warnings": warnings}).to_string());
+                } else if !quiet {
+                    meter.line(data);
+                    meter.line(&format!(
+                        "run {}  kernel {}  threads {}",
+                        path.display(),
+                        machine.backend.name(),
+                        machine.threads
+                    ));
+                    if epoch > 0 {
+                        meter.line(&format!("continuing after epoch {epoch}"));
+                    }
+                    for warning in warnings {
+                        meter.line(&format!("warning: {warning}"));
+                    }
+                }
+            }
+            Event::Batch(progress) => meter.batch(progress),
+            Event::Epoch(record) => {
+                meter.epoch(record);
+                if json {
+                    say(&json!({"event": "epoch", "record": record}).to_string());
+                }
+            }
+        }
+        !stop.load(Ordering::SeqCst)
+    };
+    let data = shared.data_root();
+    let outcome = match (&args.resume, &config) {
+        (Some(path), _) => run::resume(path, &data, machine, &mut on_event),
+        (None, Some(config)) => {
+            let named = || environment("DALEAN_RUNS").map(PathBuf::from);
+            let out = args.out.clone().or_else(named).unwrap_or_else(|| PathBuf::from("runs"));
+            run::train(config, &data, &out, machine, &mut on_event)
+        }
+        (None, None) => unreachable!("a run is new or continued"),
+    };
+    meter.finish();
+    let outcome = outcome?;
+    if json {
+        say(&done(&folder.display().to_string(), &outcome).to_string());
+    } else {
+        say(&outcome.summary);
+        say(&format!("report   {}", folder.join("report.html").display()));
+        say(&format!("verify   dalean verify {}", folder.display()));
+    }
+    Ok(())
+}
+
+fn done(run: &str, outcome: &Outcome) -> serde_json::Value {
+    let receipt = &outcome.receipt;
+    let last = outcome.records.last();
+    let images: u64 = outcome.records.iter().filter_map(|r| r.train).map(|score| score.total).sum();
+    json!({
+        "event": "done",
+        "run": run,
+        "test_accuracy": receipt.test.as_ref().map(|test| test.score.fraction()),
+        "test_epoch": receipt.test.as_ref().map(|test| test.epoch),
+        "validation_accuracy": last.and_then(|r| r.validation).map(|score| score.fraction()),
+        "state_hash": last.map(|record| record.state_hash.clone()),
+        "epochs": last.map(|record| record.epoch),
+        "train_seconds": receipt.train_seconds,
+        "images_per_second": images as f64 / receipt.train_seconds.max(1e-9),
+    })
+}
+
+pub(super) fn eval(args: &EvalArgs) -> Done {
+    let shared = &args.shared;
+    let (test, state_hash) = run::evaluate(&args.run, &shared.data_root(), shared.machine()?)?;
+    let TestRecord { epoch, ref select, score, .. } = test;
+    if shared.json {
+        say(&json!({
+            "event": "done",
+            "run": args.run.display().to_string(),
+            "test_accuracy": score.fraction(),
+            "state_hash": state_hash,
+            "epochs": epoch,
+            "train_seconds": 0.0,
+            "images_per_second": null,
+        })
+        .to_string());
+    } else {
+        say(&format!(
+            "test {:.2} % ({} of {}), state after epoch {epoch} ({select}), {state_hash}",
+            100.0 * score.fraction(),
+            score.correct,
+            score.total,
+        ));
+    }
+    Ok(())
+}
+
+pub(super) fn verify(args: &VerifyArgs) -> Done {
+    let shared = &args.shared;
+    let stop = stop_flag();
+    let machine = shared.machine()?;
+    let total = args.epochs.unwrap_or(0);
+    let mut meter = Meter::new(shared.quiet || shared.json, total);
+    let verdict =
+        run::verify(&args.run, &shared.data_root(), machine, args.epochs, &mut |progress| {
+            meter.batch(progress);
+            !stop.load(Ordering::SeqCst)
+        });
+    meter.finish();
+    match verdict? {
+        Verdict::Same { epochs, state_hash, test } => {
+            if shared.json {
+                say(&json!({"event": "done", "verified": true, "epochs": epochs.saturating_sub(1),
+                    "state_hash": state_hash, "test": test}).to_string());
+            } else {
+                let test = if test { " and the test result" } else { "" };
+                say(&format!(
+                    "verified: {epochs} state hashes{test} are the same, up to {state_hash}"
+                ));
+            }
+            Ok(())
+        }
+        Verdict::Different { what, wanted, found } => Err(Failure {
+            code: 4,
+            message: format!("{what} differs: the run says {wanted}, this machine finds {found}"),
+        }),
+    }
+}
