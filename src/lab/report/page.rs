@@ -154,15 +154,14 @@ fn keys(view: &RunView<'_>) -> String {
 }
 
 fn hash(view: &RunView<'_>) -> String {
-    let hash = match view.last() {
-        Some(last) => escape(&last.state_hash),
-        None => return String::new(),
-    };
+    let Some(last) = view.last() else { return String::new() };
+    let hash = escape(&last.state_hash);
     format!(
-        "<div class=\"hash\"><div><div class=\"name\">state hash</div><code class=\"head\">{}</code></div>\
+        "<div class=\"hash\"><div><div class=\"name\">state hash after epoch {}</div><code class=\"head\">{}</code></div>\
          <input readonly value=\"{hash}\" aria-label=\"State hash after the last epoch\" size=\"64\">\
          <button type=\"button\" id=\"copy\" hidden>copy</button><p>Same bits on any machine. \
          <code>dalean verify RUN</code> runs it again and compares.</p></div>",
+        last.epoch,
         hash_head(&hash)
     )
 }

@@ -69,7 +69,7 @@ fn record(layers: &[(usize, usize, &[&str])], epoch: u32) -> EpochRecord {
     for (layer, &(rows, columns, names)) in layers.iter().enumerate() {
         for name in names {
             let cells = (rows * columns) as u64;
-            let floor = cells * (10 + e) / 40;
+            let floor = cells * (10 + e.min(20)) / 40;
             let mut histogram = vec![0; 16];
             (histogram[0], histogram[3]) = (floor, cells - floor);
             pathways.push(PathwayRecord {

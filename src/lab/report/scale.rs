@@ -103,7 +103,7 @@ impl Axis {
     pub(super) fn root_percent(high: f64, label: &str) -> Self {
         let to = high.clamp(0.1, 100.0);
         let ticks = [0.0, 0.1, 1.0, 5.0, 10.0, 20.0, 40.0, 60.0, 80.0, 100.0];
-        let mut last = -1.0;
+        let mut last = f64::NEG_INFINITY;
         let mut kept = Vec::new();
         for tick in ticks {
             if tick <= to && tick.sqrt() - last >= 0.13 * to.sqrt() {

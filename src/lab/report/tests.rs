@@ -97,26 +97,28 @@ fn the_page_shows_the_numbers_of_the_records() {
     let sample = Sample::new(&[(64, 20, DALE), (20, 10, READOUT)], 3, 10);
     let page = html(&sample.view());
     let last = &sample.epochs[2];
-    for value in [
-        "97.33<small>",                       // 1749 / 1797
-        "1\u{202f}749 of 1\u{202f}797 right", // the same as counts
-        "82.00\u{202f}%",                     // validation of epoch 2
-        "30.0\u{202f}%",                      // floor: 12 / 40
-        "1.21",                               // E/I: 1206 / 1000
-        "154 updates",                        // 2 * 77
-        "12.3\u{202f}s",
-        last.state_hash.as_str(),
-        "dalean verify",
-        "8000",          // requested in an epoch and phase: 4 * 1000 * 2
-        "10.0\u{202f}%", // bounded of requested
-        "80.2\u{202f}%", // effective of attempted
-        "&lt;one&gt;",
-        "digits &amp; &quot;dales&quot;",
-        "drift = &quot;&lt;5 %&quot;",
-        "5120", // cells of the first layer's four pathways, and
-    ] {
-        let plain = value.replace("8000", "8\u{202f}000").replace("5120", "5\u{202f}520");
-        assert!(page.contains(&plain), "{plain}");
+    let wanted = [
+        ("1749 / 1797", "97.33<small>"),
+        ("right of how many", "1 749 of 1 797 right"),
+        ("validation after epoch 2", "82.00 %"),
+        ("updates", "154 updates"),
+        ("cells on the floor", "<div class=\"value\">30.0 %</div>"),
+        ("cells of all six pathways", "of 5 520 cells"),
+        ("E/I of a layer", "<b>1.21</b>"),
+        ("time", "12.3 s"),
+        ("state", last.state_hash.as_str()),
+        ("cells asked to change", "<td>8 000</td>"),
+        ("bounded of requested", "<td>10.0 %</td>"),
+        ("effective of attempted", "<td>80.2 %</td>"),
+        ("saturated conversions in the last epoch", "<td>28</td>"),
+        ("class name, escaped", "&lt;one&gt;"),
+        ("title, escaped", "digits &amp; &quot;dales&quot;"),
+        ("what is not simulated", "drift = &quot;&lt;5 %&quot;"),
+        ("how to check", "dalean verify"),
+    ];
+    let page = page.replace('\u{202f}', " ");
+    for (what, text) in wanted {
+        assert!(page.contains(text), "{what}: {text}");
     }
 }
 
@@ -135,7 +137,21 @@ fn summary_is_narrow_aligned_and_dashes_where_nothing_can_be_divided() {
         assert!(!table.contains("NaN") && !table.contains("inf"));
     }
     let sample = Sample::new(&[(64, 20, DALE), (20, 10, READOUT)], 3, 10);
-    expect_test::expect![[""]].assert_eq(&text::summary(&sample.view()));
+    expect_test::expect![[r#"
+        layer     cells floor %  zero %    E/I  pulses effective bounded % adc sat  table  error   gate
+        0  pp      1280    30.0    30.0   1.21    3000      2406      10.0      14      0      0      0
+           np      1280    30.0    30.0           3000      2406      10.0      14      0      0      0
+           nn      1280    30.0    30.0           3000      2406      10.0      14      0      0      0
+           pn      1280    30.0    30.0           3000      2406      10.0      14      0      0      0
+        1  pp       200    30.0    30.0   1.21    3000      2406      10.0      14      0      0      0
+           np       200    30.0    30.0           3000      2406      10.0      14      0      0      0
+        all        5520    30.0    30.0          12.0k      9624      10.0      56      0      0      0
+
+        train        80.20 %  802 of 1000 right, while learning in epoch 2
+        validation   82.00 %  82 of 100 right, after epoch 2
+        test         97.33 %  1749 of 1797 right, after epoch 2 (best validation)
+        state       0000000000000000000000000000000000000000000000000000000000abcdf1
+    "#]].assert_eq(&text::summary(&sample.view()));
     let hollow = &samples()[3];
     assert!(text::summary(&hollow.view()).lines().nth(1).unwrap().contains(" - "));
 }

@@ -38,8 +38,8 @@ pub(super) fn draw(view: &RunView<'_>) -> Option<Figure> {
         id: "confusion",
         title: "Confusion matrix",
         caption: format!(
-            "{most} Test set; shade is the share of the true class, on a square root \
-             (blue right, orange wrong)."
+            "{most} Test set. Blue: share of the true class. Orange: mistakes, compared with the most \
+             frequent one."
         ),
         body: drawing,
         wide: false,
@@ -47,7 +47,7 @@ pub(super) fn draw(view: &RunView<'_>) -> Option<Figure> {
 }
 
 fn squares(view: &RunView<'_>, matrix: &[Vec<u64>]) -> String {
-    const SIDE: f64 = 560.0;
+    const SIDE: f64 = 490.0;
     let classes = matrix.len();
     let names: Vec<String> =
         (0..classes).map(|class| short_name(&view.class(class as u64))).collect();
@@ -61,13 +61,13 @@ fn squares(view: &RunView<'_>, matrix: &[Vec<u64>]) -> String {
     let (wide, high) = (left + right + cell * size(classes), top + bottom + cell * size(classes));
     let font = (cell * 0.36).clamp(7.5, 15.0);
     let at = |class: usize, start: f64| start + cell * (size(class) + 0.5);
+    let shades = shades(matrix);
     let mut out = String::new();
     for (truth, row) in matrix.iter().enumerate() {
         let of_class: u64 = row.iter().sum();
         for (guess, &n) in row.iter().enumerate() {
-            let share = quotient(n, of_class).unwrap_or(0.0);
             let hue = if truth == guess { "var(--pp)" } else { "var(--np)" };
-            let shade = share.sqrt() * 0.92;
+            let shade = shades[truth][guess];
             let (x, y) = (left + cell * size(guess), top + cell * size(truth));
             let tip = format!(
                 "true {}\nanswered {}\n{n} of {of_class} ({})",
@@ -86,7 +86,7 @@ fn squares(view: &RunView<'_>, matrix: &[Vec<u64>]) -> String {
                 escape(&tip).replace('\n', "&#10;")
             );
             if n > 0 {
-                let class = if shade > 0.55 { "on" } else { "off" };
+                let class = if truth == guess && shade > 0.55 { "on" } else { "off" };
                 let _ = write!(
                     out,
                     "<text class=\"count middle {class}\" style=\"font-size:{font:.1}px\" x=\"{}\" \
@@ -131,13 +131,31 @@ fn squares(view: &RunView<'_>, matrix: &[Vec<u64>]) -> String {
     )
 }
 
+/// How strongly each square is coloured, 0 to 1: right answers by the share of their class, wrong ones on a
+/// square root that ends at the most frequent confusion.
+fn shades(matrix: &[Vec<u64>]) -> Vec<Vec<f64>> {
+    let share = |row: &[u64], n: u64| quotient(n, row.iter().sum()).unwrap_or(0.0);
+    let wrong = matrix.iter().enumerate().flat_map(|(truth, row)| {
+        let others = row.iter().enumerate().filter(move |&(guess, _)| guess != truth);
+        others.map(move |(_, &n)| share(row, n))
+    });
+    let most = wrong.fold(0.0, f64::max).max(f64::MIN_POSITIVE);
+    let of_row = |(truth, row): (usize, &Vec<u64>)| {
+        let shade = |(guess, &n): (usize, &u64)| {
+            let share = share(row, n);
+            if guess == truth { 0.92 * share } else { 0.7 * (share / most).sqrt() }
+        };
+        row.iter().enumerate().map(shade).collect()
+    };
+    matrix.iter().enumerate().map(of_row).collect()
+}
+
 fn image(matrix: &[Vec<u64>]) -> Option<String> {
     let classes = matrix.len();
     let mut indices = Vec::with_capacity(classes * classes);
-    for (truth, row) in matrix.iter().enumerate() {
-        let of_class: u64 = row.iter().sum();
-        for (guess, &n) in row.iter().enumerate() {
-            let shade = colour::byte(127.0 * quotient(n, of_class).unwrap_or(0.0).sqrt());
+    for (truth, row) in shades(matrix).iter().enumerate() {
+        for (guess, shade) in row.iter().enumerate() {
+            let shade = colour::byte(127.0 * shade);
             indices.push(if truth == guess { shade } else { 128 + shade });
         }
     }

@@ -71,7 +71,7 @@ fn tile(view: &RunView<'_>, heat: &Heat, grid: &Grid, top: f64) -> String {
     let excites = record.is_none_or(|one| one.excites);
     let sign = if excites { "excites" } else { "inhibits" };
     let floor = record
-        .map(|one| format!(" · {} on the floor", percent_of(one.floor, one.cells, 1)))
+        .map(|one| format!(" · {} on floor", percent_of(one.floor, one.cells, 1)))
         .unwrap_or_default();
     let route = match heat.pathway.as_bytes() {
         [source @ (b'p' | b'n'), target @ (b'p' | b'n')] => {
@@ -79,14 +79,13 @@ fn tile(view: &RunView<'_>, heat: &Heat, grid: &Grid, top: f64) -> String {
         }
         _ => String::new(),
     };
-    let shape = (size(heat.columns) / size(heat.rows)).clamp(0.72, 1.6);
+    let shape = (size(heat.columns) / size(heat.rows)).clamp(0.85, 1.6);
     // Large pixels keep their edges; small ones are left to the viewer's smoothing.
     let class = if grid.width.max(grid.height) <= 128 { "pixels" } else { "smooth" };
     format!(
         "<div class=\"map\"><div class=\"map-name\"><b class=\"swatch\" style=\"--hue:{}\">{name}</b> \
          {route}{sign}</div><img class=\"{class}\" style=\"aspect-ratio:{shape:.3}\" \
-         alt=\"Levels of pathway {name} of layer {}\" src=\"{uri}\"><div class=\"map-note\">{} rows × {} \
-         columns{floor}</div></div>",
+         alt=\"Levels of pathway {name} of layer {}\" src=\"{uri}\"><div class=\"map-note\">{} × {}{floor}</div></div>",
         colour::pathway(&heat.pathway, excites),
         heat.layer,
         heat.rows,

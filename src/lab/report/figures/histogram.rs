@@ -25,7 +25,7 @@ pub(super) fn draw(view: &RunView<'_>) -> Option<Figure> {
         let charts = of_layer(last, layer).map(|now| {
             let x = Axis::levels(size(bins) * width, unit);
             let y = Axis::root_percent(high * 1.04, "cells (root scale)");
-            let mut chart = Chart::new(330.0, 230.0, 12.0, x, y);
+            let mut chart = Chart::new(280.0, 215.0, 10.0, x, y);
             let edge = |bin: usize| size(bin) * width;
             for (bin, &cells) in now.histogram.iter().enumerate().take(bins) {
                 let top = drawn_percent(cells, now.cells);

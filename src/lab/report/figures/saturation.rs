@@ -23,7 +23,8 @@ pub(super) fn draw(view: &RunView<'_>) -> Option<Figure> {
             let (some, all) = (total(end, phase, event), total(end, phase, whole));
             let share = match quotient(some, all) {
                 // Few per million still deserve digits.
-                Some(share) if share > 0.0 && share < 1e-4 => format!("{:.1} ppm", share * 1e6),
+                Some(0.0) => "0".into(),
+                Some(share) if share < 1e-4 => format!("{:.1} ppm", share * 1e6),
                 Some(share) => percent(share, 2),
                 None => "–".into(),
             };

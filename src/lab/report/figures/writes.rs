@@ -30,7 +30,7 @@ pub(super) fn draw(view: &RunView<'_>) -> Option<Figure> {
     let values = series.iter().flat_map(|one| &one.points).map(|point| point.1);
     let y = Axis::counts(values, "per epoch (log scale)");
     let start = series.iter().find_map(|one| one.points.first()).map_or(first, |p| p.0 as u32);
-    let mut chart = Chart::new(560.0, 330.0, 132.0, Axis::epochs(start, last), y);
+    let mut chart = Chart::new(480.0, 310.0, 122.0, Axis::epochs(start, last), y);
     chart.series(&series, |value| short(value as u64));
 
     let of = |event| total(end, "training", event);
@@ -49,7 +49,8 @@ pub(super) fn draw(view: &RunView<'_>) -> Option<Figure> {
     });
     let each = if end.updates > 0 {
         let each = float(of("pulses_attempted")) / float(end.updates);
-        format!(" On average {each:.1} pulses an update.")
+        let each = if each < 100.0 { format!("{each:.1}") } else { count(each.round() as u64) };
+        format!(" On average {each} pulses an update.")
     } else {
         String::new()
     };
