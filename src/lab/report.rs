@@ -1,23 +1,112 @@
-//! Reports: pages and tables made from records. Nothing here changes a result.
-use crate::lab::store::record::{EpochRecord, Receipt};
+//! Reports: pages and tables made from records. Nothing here changes a result, opens a file or reads a clock.
+//!
+//! ```text
+//! html(view)            one self-contained page: inline SVG, PNG data URIs, no external resource
+//! text::summary(view)   the table at the end of `dalean train`
+//! ```
+//!
+//! Counts come as the records give them; all division happens here (docs/GLOSSARY.md, docs/MODEL.md, 4).
+//! A figure is one file under `report/figures/` and one line in [`figures::ALL`].
 
-/// h
-#[derive(Debug)]
-pub struct Heat { #[allow(missing_docs)] pub layer: usize, #[allow(missing_docs)] pub pathway: String, #[allow(missing_docs)] pub rows: usize, #[allow(missing_docs)] pub columns: usize, #[allow(missing_docs)] pub level_max: u16, #[allow(missing_docs)] pub levels: Vec<u16> }
-/// p
-#[derive(Debug)]
-#[allow(missing_docs)]
-pub struct Picture { pub example: u64, pub truth: u64, pub guess: u64, pub height: usize, pub width: usize, pub channels: usize, pub full_scale: u8, pub values: Vec<u8> }
-/// v
-#[derive(Debug)]
-#[allow(missing_docs)]
-pub struct RunView<'a> { pub title: String, pub config: &'a str, pub receipt: &'a Receipt, pub epochs: &'a [EpochRecord], pub heats: &'a [Heat], pub pictures: &'a [Picture], pub class_names: &'a [String] }
-/// h
-#[must_use]
-pub fn html(_: &RunView<'_>) -> String { String::new() }
-/// t
-pub mod text {
-    /// s
-    #[must_use]
-    pub fn summary(_: &super::RunView<'_>) -> String { String::new() }
+mod chart;
+mod colour;
+mod figures;
+mod image;
+mod number;
+mod page;
+mod scale;
+pub mod text;
+
+#[cfg(test)]
+mod sample;
+
+use super::store::record::{EpochRecord, Receipt};
+
+/// Levels of one pathway of one layer in the final state.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Heat {
+    /// Layer, from 0 at the input.
+    pub layer: usize,
+    /// Name as in the records: `pp`, `np`, `nn`, `pn`, `e`, `i`.
+    pub pathway: String,
+    /// Input side.
+    pub rows: usize,
+    /// Output side.
+    pub columns: usize,
+    /// Highest level a cell can hold.
+    pub level_max: u16,
+    /// Row-major.
+    pub levels: Vec<u16>,
 }
+
+/// One example that was answered wrongly, with its pixels.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Picture {
+    /// Number in the test set.
+    pub example: u64,
+    /// True class.
+    pub truth: u64,
+    /// Predicted class.
+    pub guess: u64,
+    /// Pixels down.
+    pub height: usize,
+    /// Pixels across.
+    pub width: usize,
+    /// 1 for grey, 3 for red, green, blue.
+    pub channels: usize,
+    /// The value that means full brightness.
+    pub full_scale: u8,
+    /// Row-major, one plane a channel.
+    pub values: Vec<u8>,
+}
+
+/// Everything a report shows, borrowed from the run.
+#[derive(Debug, Clone)]
+pub struct RunView<'a> {
+    /// Heading of the page.
+    pub title: String,
+    /// Resolved configuration, TOML.
+    pub config: &'a str,
+    /// What went in and came out.
+    pub receipt: &'a Receipt,
+    /// One record an epoch, in order; epoch 0 is the state before the first update.
+    pub epochs: &'a [EpochRecord],
+    /// Final levels, any subset of the pathways.
+    pub heats: &'a [Heat],
+    /// Wrong answers.
+    pub pictures: &'a [Picture],
+    /// Names of the classes; numbers stand in for missing ones.
+    pub class_names: &'a [String],
+}
+
+impl RunView<'_> {
+    /// The last record.
+    fn last(&self) -> Option<&EpochRecord> {
+        self.epochs.last()
+    }
+
+    /// Name of a class, or its number.
+    fn class(&self, class: u64) -> String {
+        let known = usize::try_from(class).ok().and_then(|class| self.class_names.get(class));
+        known.cloned().unwrap_or_else(|| class.to_string())
+    }
+
+    /// Layers that have cells, in order.
+    fn layers(&self) -> Vec<usize> {
+        let mut layers: Vec<usize> = match self.last() {
+            Some(last) => last.pathways.iter().map(|pathway| pathway.layer).collect(),
+            None => Vec::new(),
+        };
+        layers.dedup();
+        layers
+    }
+}
+
+/// The page, complete.
+#[must_use]
+pub fn html(view: &RunView<'_>) -> String {
+    page::render(view)
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,108 @@
+//! Receptive fields: what the p stream of the first layer listens to, `pp - np` of one column, as an image.
+
+use super::Figure;
+use crate::lab::report::image::indexed;
+use crate::lab::report::number::place;
+use crate::lab::report::{Heat, RunView, colour};
+
+/// Fields drawn at most.
+const FIELDS_MAX: usize = 40;
+/// Longest side of a field.
+const SIDE_MAX: usize = 96;
+
+pub(super) fn draw(view: &RunView<'_>) -> Option<Figure> {
+    let find = |name: &str| view.heats.iter().find(|heat| heat.layer == 0 && heat.pathway == name);
+    let (plus, minus, formula) = match (find("pp"), find("np")) {
+        (Some(plus), Some(minus)) => (plus, minus, "pp − np"),
+        _ => (find("e")?, find("i")?, "e − i"),
+    };
+    let cells = plus.rows.checked_mul(plus.columns)?;
+    let sizes = [plus.levels.len(), minus.levels.len(), minus.rows * minus.columns];
+    if plus.columns == 0 || sizes.iter().any(|&size| size != cells) {
+        return None;
+    }
+    let shape = shape(view, plus)?;
+    let fields: Vec<Vec<f64>> =
+        (0..plus.columns).map(|column| field(plus, minus, column, shape)).collect();
+
+    // The strongest units, in the order of their columns.
+    let strength = |field: &[f64]| field.iter().map(|value| value.abs()).sum::<f64>();
+    let mut units: Vec<usize> = (0..fields.len()).collect();
+    units.sort_by(|&a, &b| strength(&fields[b]).total_cmp(&strength(&fields[a])).then(a.cmp(&b)));
+    units.truncate(FIELDS_MAX);
+    units.sort_unstable();
+
+    let palette = colour::signed();
+    let tiles = units.iter().filter_map(|&unit| {
+        let field = &fields[unit];
+        let peak = field.iter().fold(0.0f64, |peak, value| peak.max(value.abs())).max(1.0);
+        let indices: Vec<u8> =
+            field.iter().map(|value| colour::signed_index(value / peak)).collect();
+        let uri = indexed(shape.width, shape.height, &indices, &palette)?;
+        Some(format!(
+            "<div class=\"field\" data-tip=\"unit {unit}&#10;strongest difference {} levels\"><img \
+             class=\"pixels\" alt=\"Receptive field of unit {unit}\" src=\"{uri}\"><span>{unit}</span></div>",
+            place(peak)
+        ))
+    });
+    let tiles: String = tiles.collect();
+    let which = if fields.len() > FIELDS_MAX {
+        format!("the {FIELDS_MAX} strongest of {} units", fields.len())
+    } else {
+        "all units".into()
+    };
+    Some(Figure {
+        id: "fields",
+        title: "Receptive fields",
+        caption: format!(
+            "Net effect {formula} of the inputs on {which} of the first layer, rows laid out as \
+             {} × {} images. <b class=\"swatch\" style=\"--hue:var(--pp)\">blue</b> excites, \
+             <b class=\"swatch\" style=\"--hue:var(--np)\">orange</b> inhibits; each field has its own scale.",
+            shape.height, shape.width
+        ),
+        body: format!("<div class=\"fields\">{tiles}</div>"),
+        wide: true,
+    })
+}
+
+/// How the rows of the first layer lie in an image.
+#[derive(Clone, Copy)]
+struct Shape {
+    height: usize,
+    width: usize,
+    channels: usize,
+}
+
+/// The shape of the pictures, or else a square; one more row may carry a bias.
+fn shape(view: &RunView<'_>, heat: &Heat) -> Option<Shape> {
+    let fits = |shape: &Shape| {
+        let pixels = shape.height * shape.width * shape.channels;
+        pixels > 0
+            && (heat.rows == pixels || heat.rows == pixels + 1)
+            && (3..=SIDE_MAX).contains(&shape.height)
+            && (3..=SIDE_MAX).contains(&shape.width)
+    };
+    if let Some(picture) = view.pictures.first() {
+        let (height, width, channels) = (picture.height, picture.width, picture.channels);
+        return Some(Shape { height, width, channels }).filter(fits);
+    }
+    [1, 3].into_iter().find_map(|channels| {
+        let side = (heat.rows / channels).isqrt();
+        let whole = side * side * channels == heat.rows;
+        Some(Shape { height: side, width: side, channels }).filter(|shape| whole && fits(shape))
+    })
+}
+
+/// One column as an image, channels averaged.
+fn field(plus: &Heat, minus: &Heat, column: usize, shape: Shape) -> Vec<f64> {
+    let pixels = shape.height * shape.width;
+    let net = |row: usize| {
+        let cell = row * plus.columns + column;
+        f64::from(plus.levels[cell]) - f64::from(minus.levels[cell])
+    };
+    let of_pixel = |pixel: usize| {
+        let sum: f64 = (0..shape.channels).map(|channel| net(channel * pixels + pixel)).sum();
+        sum / shape.channels as f64
+    };
+    (0..pixels).map(of_pixel).collect()
+}

@@ -1,0 +1,204 @@
+//! The page around the figures: key figures on top, then everything in [`figures::ALL`].
+
+use super::number::{
+    count, escape, hash_head, percent, percent_of, place, quotient, ratio, seconds,
+};
+use super::{RunView, figures};
+
+const STYLE: &str = include_str!("page.css");
+const SCRIPT: &str = include_str!("page.js");
+
+/// The whole page.
+pub(super) fn render(view: &RunView<'_>) -> String {
+    let figures = figures::ALL.iter().filter_map(|draw| draw(view));
+    let mut contents = String::new();
+    let mut body = String::new();
+    for (number, figure) in (1..).zip(figures) {
+        let wide = if figure.wide { " wide" } else { "" };
+        contents += &format!("<a href=\"#{}\">{}</a>", figure.id, figure.title);
+        body += &format!(
+            "<section class=\"card{wide}\" id=\"{}\"><h2><span>{number}</span>{}</h2>\
+             <p class=\"caption\">{}</p>{}</section>\n",
+            figure.id, figure.title, figure.caption, figure.body
+        );
+    }
+    format!(
+        "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<meta name=\"viewport\" \
+         content=\"width=device-width, initial-scale=1\">\n<title>{title}</title>\n\
+         <style>\n{STYLE}</style>\n</head>\n<body>\n<div class=\"stripe\"><i></i><i></i><i></i><i></i>\
+         </div>\n<main>\n{header}{notices}<nav>{contents}</nav>\n<div class=\"figures\">\n{body}</div>\n\
+         <footer>dalean {version}. All numbers come from the run's records; nothing on this page is \
+         loaded from elsewhere.</footer>\n</main>\n<script>\n{SCRIPT}</script>\n</body>\n</html>\n",
+        title = escape(&view.title),
+        header = header(view),
+        notices = notices(view),
+        version = escape(&view.receipt.version),
+    )
+}
+
+fn header(view: &RunView<'_>) -> String {
+    let receipt = view.receipt;
+    let shape: Vec<String> = shape(view).iter().map(ToString::to_string).collect();
+    let mut facts = vec![escape(&receipt.data)];
+    if !shape.is_empty() {
+        facts.push(shape.join("\u{202f}–\u{202f}"));
+    }
+    facts.push(format!("kernel {}", escape(&receipt.kernel)));
+    facts.push(match receipt.threads {
+        1 => "1 thread".into(),
+        threads => format!("{threads} threads"),
+    });
+    format!(
+        "<header><div class=\"eyebrow\">dalean run report<button type=\"button\" id=\"theme\" hidden>\
+         light / dark</button></div><h1>{}</h1><p class=\"facts\">{}</p>\
+         <div class=\"hero\"><div class=\"headline\">{}</div><div class=\"keys\">{}</div></div>{}</header>\n",
+        escape(&view.title),
+        facts.join(" · "),
+        headline(view),
+        keys(view),
+        hash(view)
+    )
+}
+
+/// Neurons of a stream, input first.
+fn shape(view: &RunView<'_>) -> Vec<usize> {
+    let Some(last) = view.last() else { return Vec::new() };
+    let mut shape = Vec::new();
+    for layer in view.layers() {
+        if let Some(one) = last.pathways.iter().find(|one| one.layer == layer) {
+            if shape.is_empty() {
+                shape.push(one.shape[0]);
+            }
+            shape.push(one.shape[1]);
+        }
+    }
+    shape
+}
+
+fn headline(view: &RunView<'_>) -> String {
+    let Some(test) = &view.receipt.test else {
+        let status = escape(&view.receipt.status);
+        return format!(
+            "<div class=\"big none\">–</div><div class=\"what\">test accuracy</div><p>The test set has not \
+             been read: the run is {status}.</p>"
+        );
+    };
+    let accuracy = match quotient(test.score.correct, test.score.total) {
+        Some(fraction) => format!("{:.2}<small>\u{202f}%</small>", 100.0 * fraction),
+        None => "–".into(),
+    };
+    let why = match test.select.as_str() {
+        "last" => "the last one".into(),
+        "best_validation" => "chosen by its validation score".into(),
+        other => format!("chosen by {}", escape(&other.replace('_', " "))),
+    };
+    format!(
+        "<div class=\"big\">{accuracy}</div><div class=\"what\">test accuracy</div><p>{} of {} right. State \
+         after epoch {}, {why}; the test set is read once.</p>",
+        count(test.score.correct),
+        count(test.score.total),
+        test.epoch
+    )
+}
+
+fn keys(view: &RunView<'_>) -> String {
+    let key = |name: &str, value: &str, note: &str| {
+        format!(
+            "<div class=\"key\"><div class=\"name\">{name}</div><div class=\"value\">{value}</div>\
+             <div class=\"note\">{note}</div></div>"
+        )
+    };
+    let Some(last) = view.last() else {
+        return key("epochs", "–", "no record yet");
+    };
+    // Validation of the state that was tested, or else of the last.
+    let tested = view.receipt.test.as_ref().map(|test| test.epoch);
+    let read = view.epochs.iter().find(|record| Some(record.epoch) == tested).unwrap_or(last);
+    let validation =
+        read.validation.and_then(|score| Some((quotient(score.correct, score.total)?, score)));
+    let mut out = match validation {
+        Some((fraction, score)) => key(
+            "validation",
+            &percent(fraction, 2),
+            &format!("{} of {}, epoch {}", count(score.correct), count(score.total), read.epoch),
+        ),
+        None => key("validation", "–", "no validation split"),
+    };
+    let floor = last.pathways.iter().map(|one| one.floor).sum();
+    let cells = last.pathways.iter().map(|one| one.cells).sum();
+    out +=
+        &key("floor fraction", &percent_of(floor, cells, 1), &format!("of {} cells", count(cells)));
+    out += &key("epochs", &last.epoch.to_string(), &format!("{} updates", count(last.updates)));
+    out += &key("learning took", &seconds(view.receipt.train_seconds), "wall clock");
+    let balance = last.layers.iter().map(|layer| {
+        let [excite, inhibit] = layer.levels;
+        let share = quotient(excite, excite.saturating_add(inhibit)).unwrap_or(0.5);
+        format!(
+            "<div class=\"balance\" data-tip=\"excitatory levels {}&#10;inhibitory levels {}\">\
+             <span>layer {}</span><div class=\"scale\"><i style=\"width:{}%\"></i></div><b>{}</b></div>",
+            count(excite),
+            count(inhibit),
+            layer.layer,
+            place(100.0 * share),
+            ratio(quotient(excite, inhibit))
+        )
+    });
+    let balance: String = balance.collect();
+    if !balance.is_empty() {
+        out += &format!(
+            "<div class=\"key wide\"><div class=\"name\">E/I by layer <span>stored levels, excitation over \
+             inhibition</span></div>{balance}</div>"
+        );
+    }
+    out
+}
+
+fn hash(view: &RunView<'_>) -> String {
+    let Some(last) = view.last() else { return String::new() };
+    let hash = escape(&last.state_hash);
+    format!(
+        "<div class=\"hash\"><div><div class=\"name\">state hash after epoch {}</div><code class=\"head\">{}</code></div>\
+         <input readonly value=\"{hash}\" aria-label=\"State hash after the last epoch\" size=\"64\">\
+         <button type=\"button\" id=\"copy\" hidden>copy</button><p>Same bits on any machine. \
+         <code>dalean verify RUN</code> runs it again and compares.</p></div>",
+        last.epoch,
+        hash_head(&hash)
+    )
+}
+
+/// Warnings, and the effects that the configuration names but the engine does not simulate.
+fn notices(view: &RunView<'_>) -> String {
+    let mut out = String::new();
+    if view.receipt.status != "finished" {
+        out +=
+            &format!("<li>The run is <b>{}</b>, not finished.</li>", escape(&view.receipt.status));
+    }
+    for warning in &view.receipt.warnings {
+        out += &format!("<li>{}</li>", escape(warning));
+    }
+    for (key, value) in not_simulated(view.config) {
+        out +=
+            &format!("<li>Not simulated: <code>{} = {}</code></li>", escape(&key), escape(&value));
+    }
+    if out.is_empty() { out } else { format!("<ul class=\"notices\">{out}</ul>\n") }
+}
+
+/// Entries of every table named `not_simulated`.
+pub(super) fn not_simulated(config: &str) -> Vec<(String, String)> {
+    fn walk(table: &toml::Table, found: &mut Vec<(String, String)>) {
+        for (key, value) in table {
+            match value.as_table() {
+                Some(inner) if key == "not_simulated" => {
+                    found.extend(inner.iter().map(|(key, value)| (key.clone(), value.to_string())));
+                }
+                Some(inner) => walk(inner, found),
+                None => {}
+            }
+        }
+    }
+    let mut found = Vec::new();
+    if let Ok(table) = config.parse::<toml::Table>() {
+        walk(&table, &mut found);
+    }
+    found
+}

@@ -1,0 +1,153 @@
+//! Invented records for the tests of this room.
+
+use std::collections::BTreeMap;
+
+use super::{Heat, Picture, RunView};
+use crate::lab::store::record::{
+    EpochRecord, LayerRecord, PathwayRecord, Receipt, Score, TestRecord,
+};
+
+/// An invented run: layers as rows, columns and names of pathways.
+pub(super) struct Sample {
+    pub config: String,
+    pub receipt: Receipt,
+    pub epochs: Vec<EpochRecord>,
+    pub heats: Vec<Heat>,
+    pub pictures: Vec<Picture>,
+    pub class_names: Vec<String>,
+}
+
+impl Sample {
+    /// A run of `epochs` epochs, epoch 0 included, with a test of `classes` classes.
+    pub(super) fn new(layers: &[(usize, usize, &[&str])], epochs: u32, classes: usize) -> Self {
+        let records: Vec<_> = (0..epochs).map(|epoch| record(layers, epoch)).collect();
+        let heats = layers.iter().enumerate().flat_map(|(layer, &(rows, columns, names))| {
+            names.iter().map(move |name| heat(layer, name, rows, columns))
+        });
+        Self {
+            config: "task = \"classify\"\n[not_simulated]\ndrift = \"<5 %\"\n".into(),
+            receipt: receipt(&records, classes),
+            epochs: records,
+            heats: heats.collect(),
+            pictures: vec![picture(1), picture(3)],
+            class_names: vec!["zero".into(), "<one>".into()],
+        }
+    }
+
+    pub(super) fn view(&self) -> RunView<'_> {
+        RunView {
+            title: "digits & \"dales\"".into(),
+            config: &self.config,
+            receipt: &self.receipt,
+            epochs: &self.epochs,
+            heats: &self.heats,
+            pictures: &self.pictures,
+            class_names: &self.class_names,
+        }
+    }
+}
+
+fn heat(layer: usize, name: &str, rows: usize, columns: usize) -> Heat {
+    let levels = (0..rows * columns).map(|cell| (cell * 37 % 61 % 16) as u16).collect();
+    Heat { layer, pathway: name.into(), rows, columns, level_max: 15, levels }
+}
+
+fn record(layers: &[(usize, usize, &[&str])], epoch: u32) -> EpochRecord {
+    let e = u64::from(epoch);
+    let counts = |scale: u64| -> BTreeMap<String, u64> {
+        let names = [
+            ("requested", 1000),
+            ("bounded", 100),
+            ("pulses_attempted", 1500),
+            ("pulses_effective", 1203),
+            ("conversions", 5000),
+            ("saturated_conversions", 7),
+        ];
+        names.into_iter().map(|(name, each)| (name.into(), each * e * scale)).collect()
+    };
+    let mut pathways = Vec::new();
+    for (layer, &(rows, columns, names)) in layers.iter().enumerate() {
+        for name in names {
+            let cells = (rows * columns) as u64;
+            let floor = cells * (10 + e.min(20)) / 40;
+            let mut histogram = vec![0; 16];
+            (histogram[0], histogram[3]) = (floor, cells - floor);
+            pathways.push(PathwayRecord {
+                layer,
+                pathway: (*name).into(),
+                excites: matches!(*name, "pp" | "nn" | "e"),
+                shape: [rows, columns],
+                cells,
+                floor,
+                zero: floor,
+                pruned: 0,
+                births: e,
+                deaths: 2 * e,
+                levels: 3 * (cells - floor),
+                idle: [[0, rows as u64], [0, columns as u64], [0, 1]],
+                histogram,
+                training: counts(1),
+            });
+        }
+    }
+    let layers = (0..layers.len()).map(|layer| LayerRecord {
+        layer,
+        levels: [1200 + 3 * e, 1000],
+        currents: [[300, 200], [100, 0]],
+        adc_shifts: Vec::new(),
+        rate_shift: 4,
+    });
+    EpochRecord {
+        epoch,
+        updates: 77 * e,
+        train: (epoch > 0).then_some(Score { correct: 800 + e, total: 1000 }),
+        validation: Some(Score { correct: 80 + e, total: 100 }),
+        state_hash: format!("{:064x}", 0xabcdef + e),
+        layers: layers.collect(),
+        pathways,
+        events: [("evaluation".into(), counts(1)), ("training".into(), counts(4))].into(),
+        train_seconds: 1.5,
+    }
+}
+
+fn receipt(records: &[EpochRecord], classes: usize) -> Receipt {
+    let confusion = (0..classes)
+        .map(|truth| (0..classes).map(|guess| if truth == guess { 41 } else { 1 }).collect())
+        .collect();
+    let test = TestRecord {
+        epoch: records.last().map_or(0, |record| record.epoch),
+        select: "best_validation".into(),
+        score: Score { correct: 1749, total: 1797 },
+        confusion,
+        mistakes: vec![[17, 1, 0]],
+    };
+    Receipt {
+        version: "0.1.0".into(),
+        arithmetic: 1,
+        config_hash: "c0".into(),
+        data: "digits".into(),
+        data_hash: "d0".into(),
+        tables_hash: "e0".into(),
+        epoch_hashes: records.iter().map(|record| record.state_hash.clone()).collect(),
+        status: "finished".into(),
+        test: Some(test),
+        kernel: "scalar".into(),
+        threads: 2,
+        train_seconds: 12.3,
+        warnings: vec!["a <warning>".into()],
+    }
+}
+
+fn picture(channels: usize) -> Picture {
+    let values = (0..64 * channels).map(|i| (i % 17) as u8).collect();
+    Picture {
+        example: 17,
+        truth: 1,
+        guess: 0,
+        height: 8,
+        width: 8,
+        channels,
+        full_scale: 16,
+        values,
+    }
+}

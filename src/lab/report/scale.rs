@@ -1,0 +1,215 @@
+//! Scales and axes: from values to places on the page, and round numbers to mark them with.
+//!
+//! ```text
+//! place = start + (end - start) * (s(value) - s(from)) / (s(to) - s(from))      s = identity, log2, square root
+//! ```
+
+use super::number::{float, short, size};
+
+/// The curve of a scale.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Curve {
+    Linear,
+    Log,
+    Root,
+}
+
+/// Values `from ..= to` laid along a curve. Values outside are drawn at the nearer end.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Scale {
+    pub curve: Curve,
+    pub from: f64,
+    pub to: f64,
+}
+
+impl Scale {
+    fn bend(self, value: f64) -> f64 {
+        let value = value.clamp(self.from, self.to);
+        match self.curve {
+            Curve::Linear => value,
+            Curve::Log => value.max(f64::MIN_POSITIVE).log2(),
+            Curve::Root => value.max(0.0).sqrt(),
+        }
+    }
+
+    /// Where a value lies, 0 at `from` and 1 at `to`.
+    pub(super) fn fraction(self, value: f64) -> f64 {
+        let span = self.bend(self.to) - self.bend(self.from);
+        if span > 0.0 { (self.bend(value) - self.bend(self.from)) / span } else { 0.5 }
+    }
+}
+
+/// A scale with marks and a name.
+#[derive(Debug, Clone)]
+pub(super) struct Axis {
+    pub scale: Scale,
+    pub ticks: Vec<(f64, String)>,
+    pub label: String,
+}
+
+/// The round step (1, 2 or 5 times a power of ten) that cuts `span` into about `parts`.
+fn step(span: f64, parts: f64) -> f64 {
+    let raw = (span / parts).max(1e-9);
+    let power = 10f64.powf(raw.log10().floor());
+    let lead = raw / power;
+    let round = [1.0, 2.0, 5.0].into_iter().find(|&round| lead <= round).unwrap_or(10.0);
+    round * power
+}
+
+fn multiples(from: f64, to: f64, step: f64) -> impl Iterator<Item = f64> {
+    let first = (from / step - 1e-6).ceil();
+    (0..200)
+        .map(move |i| (first + float(i)) * step)
+        .take_while(move |&tick| tick <= to + 1e-6 * step)
+}
+
+impl Axis {
+    /// Epoch numbers.
+    pub(super) fn epochs(first: u32, last: u32) -> Self {
+        let (mut from, mut to) = (f64::from(first), f64::from(last));
+        let step = step(to - from, 8.0).max(1.0);
+        let ticks = multiples(from, to, step).map(|tick| (tick, format!("{tick:.0}"))).collect();
+        if first == last {
+            (from, to) = (from - 0.5, to + 0.5);
+        }
+        Self { scale: Scale { curve: Curve::Linear, from, to }, ticks, label: "epoch".into() }
+    }
+
+    /// Percentages (values 0 to 100), the ends moved out to round numbers.
+    pub(super) fn percent(low: f64, high: f64, label: &str) -> Self {
+        let (low, high) = (low.clamp(-100.0, 100.0), high.clamp(-100.0, 100.0));
+        let step = step((high - low).max(0.02), 5.0);
+        let from = (low / step + 1e-6).floor() * step;
+        let mut to = (high / step - 1e-6).ceil() * step;
+        if to <= from {
+            to = from + step;
+        }
+        let digits = if step < 0.1 {
+            2
+        } else if step < 1.0 {
+            1
+        } else {
+            0
+        };
+        let mark = |tick: f64| {
+            let tick = if tick.abs() < step * 0.5 { 0.0 } else { tick.abs() };
+            format!("{tick:.digits$}\u{202f}%")
+        };
+        let ticks = multiples(from, to, step).map(|tick| (tick, mark(tick))).collect();
+        Self { scale: Scale { curve: Curve::Linear, from, to }, ticks, label: label.into() }
+    }
+
+    /// Shares from 0 % on a square-root curve, so that small ones stay visible.
+    pub(super) fn root_percent(high: f64, label: &str) -> Self {
+        let to = high.clamp(0.1, 100.0);
+        let ticks = [0.0, 0.1, 1.0, 5.0, 10.0, 20.0, 40.0, 60.0, 80.0, 100.0];
+        let mut last = f64::NEG_INFINITY;
+        let mut kept = Vec::new();
+        for tick in ticks {
+            if tick <= to && tick.sqrt() - last >= 0.13 * to.sqrt() {
+                last = tick.sqrt();
+                kept.push((tick, format!("{tick}\u{202f}%")));
+            }
+        }
+        let scale = Scale { curve: Curve::Root, from: 0.0, to };
+        Self { scale, ticks: kept, label: label.into() }
+    }
+
+    /// Ratios around 1 on a log curve.
+    pub(super) fn ratio(values: impl Iterator<Item = f64>, label: &str) -> Self {
+        let (mut low, mut high) = (0.75f64, 1.5f64);
+        for value in values.filter(|value| *value > 0.0 && value.is_finite()) {
+            low = low.min(value);
+            high = high.max(value);
+        }
+        let octaves = high.log2() - low.log2();
+        let marks: Vec<f64> = if octaves > 7.0 {
+            let stride = size((octaves / 7.0).ceil() as usize);
+            multiples(low.log2(), high.log2(), stride).map(f64::exp2).collect()
+        } else {
+            (-10..10)
+                .map(|power| f64::from(power).exp2())
+                .flat_map(|one| if octaves > 3.5 { vec![one] } else { vec![one, 1.5 * one] })
+                .filter(|&mark| mark >= low * 0.99 && mark <= high * 1.01)
+                .collect()
+        };
+        let ticks = marks.into_iter().map(|mark| (mark, plain(mark))).collect();
+        let scale = Scale { curve: Curve::Log, from: low * 0.94, to: high * 1.06 };
+        Self { scale, ticks, label: label.into() }
+    }
+
+    /// Counts on a log curve; 0 is drawn on the bottom line.
+    pub(super) fn counts(values: impl Iterator<Item = f64>, label: &str) -> Self {
+        let (mut low, mut high) = (f64::MAX, 1f64);
+        for value in values.filter(|&value| value >= 1.0) {
+            low = low.min(value);
+            high = high.max(value);
+        }
+        let from = low.min(high).log10().floor();
+        let to = high.log10().ceil().max(from + 1.0);
+        let stride = ((to - from) / 6.0).ceil();
+        let tick = |power: f64| {
+            let count = 10f64.powf(power);
+            (count, short(count as u64))
+        };
+        let ticks = multiples(from, to, stride).map(tick).collect();
+        let scale = Scale { curve: Curve::Log, from: 10f64.powf(from), to: 10f64.powf(to) };
+        Self { scale, ticks, label: label.into() }
+    }
+
+    /// Levels from 0.
+    pub(super) fn levels(end: f64, label: &str) -> Self {
+        let to = end.max(1.0);
+        let step = step(to, 4.0).max(1.0);
+        let ticks = multiples(0.0, to, step).map(|tick| (tick, format!("{tick:.0}"))).collect();
+        let scale = Scale { curve: Curve::Linear, from: 0.0, to };
+        Self { scale, ticks, label: label.into() }
+    }
+}
+
+fn plain(value: f64) -> String {
+    let text = format!("{value:.3}");
+    text.trim_end_matches('0').trim_end_matches('.').into()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ends_lie_at_the_ends_and_values_outside_stay_inside() {
+        for curve in [Curve::Linear, Curve::Log, Curve::Root] {
+            let scale = Scale { curve, from: 1.0, to: 16.0 };
+            assert_eq!([0.0, 1.0, 16.0, 99.0].map(|v| scale.fraction(v)), [0.0, 0.0, 1.0, 1.0]);
+        }
+        assert_eq!(Scale { curve: Curve::Log, from: 1.0, to: 16.0 }.fraction(4.0), 0.5);
+        assert_eq!(Scale { curve: Curve::Linear, from: 3.0, to: 3.0 }.fraction(3.0), 0.5);
+    }
+
+    #[test]
+    fn marks_are_round_and_few_and_inside() {
+        let axes = [
+            Axis::epochs(0, 0),
+            Axis::epochs(0, 1),
+            Axis::epochs(0, 1000),
+            Axis::percent(0.0, 0.0, ""),
+            Axis::percent(97.31, 97.4, ""),
+            Axis::percent(-60.0, 80.0, ""),
+            Axis::root_percent(44.0, ""),
+            Axis::ratio([0.0, f64::NAN].into_iter(), ""),
+            Axis::ratio([1e-3, 3e4].into_iter(), ""),
+            Axis::counts([0.0].into_iter(), ""),
+            Axis::counts([1.0, 1e18].into_iter(), ""),
+            Axis::levels(0.0, ""),
+            Axis::levels(255.0, ""),
+        ];
+        for axis in axes {
+            assert!((1..=12).contains(&axis.ticks.len()), "{axis:?}");
+            for (tick, _) in &axis.ticks {
+                assert!(*tick >= axis.scale.from - 1e-9 && *tick <= axis.scale.to * 1.01 + 1e-9);
+            }
+        }
+        let marks = Axis::percent(0.0, 47.0, "").ticks;
+        assert_eq!(marks.iter().map(|(at, _)| *at).collect::<Vec<_>>()[..3], [0.0, 10.0, 20.0]);
+    }
+}

@@ -1,0 +1,164 @@
+//! Laws of the page: well formed, nothing that is no number, all text escaped, the records' own values.
+
+use super::sample::Sample;
+use super::{html, page, text};
+
+const DALE: &[&str] = &["pp", "np", "nn", "pn"];
+const READOUT: &[&str] = &["pp", "np"];
+const PAIR: &[&str] = &["e", "i"];
+
+/// Runs at the edges of what a report may meet.
+fn samples() -> Vec<Sample> {
+    let dense = || Sample::new(&[(64, 20, DALE), (20, 10, READOUT)], 3, 10);
+    let mut unfinished = dense();
+    unfinished.receipt.test = None;
+    unfinished.receipt.status = "running".into();
+    unfinished.pictures.clear();
+    unfinished.heats.clear();
+    let mut empty = Sample::new(&[], 0, 0);
+    empty.receipt.test = None;
+    empty.config = "not = [toml".into();
+    let mut hollow = dense();
+    for record in &mut hollow.epochs {
+        record.events.clear();
+        record.train = None;
+        record.validation = None;
+        record.layers.iter_mut().for_each(|layer| layer.levels = [0, 0]);
+        for one in &mut record.pathways {
+            (one.cells, one.floor, one.zero, one.levels) = (0, 0, 0, 0);
+            one.histogram.clear();
+            one.training.clear();
+        }
+    }
+    hollow.heats[0].levels.pop();
+    hollow.pictures[0].values.pop();
+    let mut colour = Sample::new(&[(193, 4, DALE)], 2, 4);
+    colour.pictures.remove(0);
+    vec![
+        dense(),
+        unfinished,
+        empty,
+        hollow,
+        colour,
+        Sample::new(&[(64, 20, DALE), (20, 10, READOUT)], 1, 10),
+        Sample::new(&[(9, 1, READOUT)], 2, 2),
+        Sample::new(&[(64, 20, PAIR), (20, 1, PAIR)], 2, 1),
+        Sample::new(&[(16, 256, READOUT)], 700, 256),
+        Sample::new(&[(900, 3, DALE)], 2, 30),
+    ]
+}
+
+/// Panics unless every tag that opens closes, in order; attributes are double-quoted and hold no `<`.
+fn check_tags(page: &str) {
+    let mut open: Vec<&str> = Vec::new();
+    let mut rest = page;
+    while let Some(start) = rest.find('<') {
+        let inside = &rest[start + 1..];
+        let end = inside.find('>').expect("every < has its >");
+        let tag = &inside[..end];
+        rest = &inside[end + 1..];
+        assert!(!tag.contains('<'), "unescaped text in <{tag}>");
+        assert_eq!(tag.matches('"').count() % 2, 0, "quotes of <{tag}>");
+        let name = tag.trim_start_matches('/').split([' ', '/']).next().unwrap();
+        if tag.starts_with('!') || tag.ends_with('/') || ["meta", "img", "input"].contains(&name) {
+            continue;
+        }
+        if tag.starts_with('/') {
+            assert_eq!(open.pop(), Some(name), "nesting at </{name}>");
+        } else {
+            open.push(name);
+            if name == "script" || name == "style" {
+                rest = &rest[rest.find("</").expect("it closes")..];
+            }
+        }
+    }
+    assert_eq!(open, Vec::<&str>::new());
+}
+
+#[test]
+fn every_page_is_well_formed_and_self_contained() {
+    for sample in samples() {
+        let page = html(&sample.view());
+        check_tags(&page);
+        let start = page.find("</style>").unwrap();
+        let body = &page[start..page.find("<script>").unwrap()];
+        // Encoded images may spell anything.
+        let mut pieces = body.split("base64,");
+        let mut words = pieces.next().unwrap().to_owned();
+        pieces.for_each(|piece| words.push_str(&piece[piece.find('"').unwrap()..]));
+        for bad in ["NaN", "inf ", "inf\"", "http:", "https:", "<one>", "<warning>"] {
+            assert!(!words.contains(bad), "{bad} in {words}");
+        }
+    }
+}
+
+#[test]
+fn the_page_shows_the_numbers_of_the_records() {
+    let sample = Sample::new(&[(64, 20, DALE), (20, 10, READOUT)], 3, 10);
+    let page = html(&sample.view());
+    let last = &sample.epochs[2];
+    let wanted = [
+        ("1749 / 1797", "97.33<small>"),
+        ("right of how many", "1 749 of 1 797 right"),
+        ("validation after epoch 2", "82.00 %"),
+        ("updates", "154 updates"),
+        ("cells on the floor", "<div class=\"value\">30.0 %</div>"),
+        ("cells of all six pathways", "of 5 520 cells"),
+        ("E/I of a layer", "<b>1.21</b>"),
+        ("time", "12.3 s"),
+        ("state", last.state_hash.as_str()),
+        ("cells asked to change", "<td>8 000</td>"),
+        ("bounded of requested", "<td>10.0 %</td>"),
+        ("effective of attempted", "<td>80.2 %</td>"),
+        ("saturated conversions in the last epoch", "<td>28</td>"),
+        ("class name, escaped", "&lt;one&gt;"),
+        ("title, escaped", "digits &amp; &quot;dales&quot;"),
+        ("what is not simulated", "drift = &quot;&lt;5 %&quot;"),
+        ("how to check", "dalean verify"),
+    ];
+    let page = page.replace('\u{202f}', " ");
+    for (what, text) in wanted {
+        assert!(page.contains(text), "{what}: {text}");
+    }
+}
+
+#[test]
+fn a_page_of_a_mid_sized_net_stays_small() {
+    let sample = Sample::new(&[(784, 512, DALE), (512, 10, READOUT)], 20, 10);
+    let page = html(&sample.view());
+    assert!(page.len() < 1_500_000, "{} bytes", page.len());
+}
+
+#[test]
+fn summary_is_narrow_aligned_and_dashes_where_nothing_can_be_divided() {
+    for sample in samples() {
+        let table = text::summary(&sample.view());
+        assert!(table.lines().all(|line| line.chars().count() <= 100), "{table}");
+        assert!(!table.contains("NaN") && !table.contains("inf"));
+    }
+    let sample = Sample::new(&[(64, 20, DALE), (20, 10, READOUT)], 3, 10);
+    expect_test::expect![[r#"
+        layer     cells floor %  zero %    E/I  pulses effective bounded % adc sat  table  error   gate
+        0  pp      1280    30.0    30.0   1.21    3000      2406      10.0      14      0      0      0
+           np      1280    30.0    30.0           3000      2406      10.0      14      0      0      0
+           nn      1280    30.0    30.0           3000      2406      10.0      14      0      0      0
+           pn      1280    30.0    30.0           3000      2406      10.0      14      0      0      0
+        1  pp       200    30.0    30.0   1.21    3000      2406      10.0      14      0      0      0
+           np       200    30.0    30.0           3000      2406      10.0      14      0      0      0
+        all        5520    30.0    30.0          12.0k      9624      10.0      56      0      0      0
+
+        train        80.20 %  802 of 1000 right, while learning in epoch 2
+        validation   82.00 %  82 of 100 right, after epoch 2
+        test         97.33 %  1749 of 1797 right, after epoch 2 (best validation)
+        state       0000000000000000000000000000000000000000000000000000000000abcdf1
+    "#]].assert_eq(&text::summary(&sample.view()));
+    let hollow = &samples()[3];
+    assert!(text::summary(&hollow.view()).lines().nth(1).unwrap().contains(" - "));
+}
+
+#[test]
+fn effects_that_are_not_simulated_are_found_in_any_table() {
+    let config = "[a]\nx = 1\n[a.not_simulated]\ndrift = 0.5\n";
+    assert_eq!(page::not_simulated(config), [("drift".into(), "0.5".into())]);
+    assert_eq!(page::not_simulated("not toml ["), []);
+}

@@ -1,0 +1,125 @@
+//! The table at the end of `dalean train`: one line a pathway, at most 100 columns.
+
+use std::fmt::Write as _;
+
+use super::RunView;
+use super::number::{quotient, short_with};
+use crate::lab::store::record::{EpochRecord, PathwayRecord, Score};
+
+/// Heads of the columns and how wide the columns are.
+const COLUMNS: [(&str, usize); 11] = [
+    ("cells", 8),
+    ("floor %", 7),
+    ("zero %", 7),
+    ("E/I", 6),
+    ("pulses", 7),
+    ("effective", 9),
+    ("bounded %", 9),
+    ("adc sat", 7),
+    ("table", 6),
+    ("error", 6),
+    ("gate", 6),
+];
+
+/// Events of the last eight columns; `bounded` is divided by `requested`.
+const SATURATED: [&str; 4] =
+    ["saturated_conversions", "saturated_look_ups", "saturated_errors", "saturated_gates"];
+
+/// Cells, writes and saturations of every pathway in the final state, then accuracies and the state hash.
+/// Pulses, bounds and saturations are those of the whole training; `-` stands where there is nothing to divide by.
+#[must_use]
+pub fn summary(view: &RunView<'_>) -> String {
+    let mut out = String::new();
+    let Some(last) = view.last() else {
+        return "no epoch on record\n".into();
+    };
+    line(&mut out, "layer", COLUMNS.map(|(head, _)| head.into()));
+    let mut layer = None;
+    for one in &last.pathways {
+        let first = layer != Some(one.layer);
+        layer = Some(one.layer);
+        let balance = last.layers.iter().find(|layer| layer.layer == one.layer && first);
+        let name = format!(
+            "{:<2} {}",
+            if first { one.layer.to_string() } else { String::new() },
+            one.pathway
+        );
+        line(&mut out, &name, cells(one, balance.map(|layer| layer.levels)));
+    }
+    line(&mut out, "all", totals(last));
+    out.push('\n');
+    accuracies(&mut out, view, last);
+    let _ = writeln!(out, "state       {}", last.state_hash);
+    out
+}
+
+fn line(out: &mut String, name: &str, cells: [String; COLUMNS.len()]) {
+    let mut text = format!("{name:<6}");
+    for (cell, (_, width)) in cells.iter().zip(COLUMNS) {
+        let _ = write!(text, " {cell:>width$}");
+    }
+    out.push_str(text.trim_end());
+    out.push('\n');
+}
+
+fn cells(one: &PathwayRecord, levels: Option<[u64; 2]>) -> [String; COLUMNS.len()] {
+    let event = |name: &str| one.training.get(name).copied().unwrap_or(0);
+    row([one.cells, one.floor, one.zero], levels, event)
+}
+
+fn totals(last: &EpochRecord) -> [String; COLUMNS.len()] {
+    let sum = |pick: fn(&PathwayRecord) -> u64| last.pathways.iter().map(pick).sum();
+    let event = |name: &str| {
+        last.events.get("training").and_then(|events| events.get(name)).copied().unwrap_or(0)
+    };
+    row([sum(|one| one.cells), sum(|one| one.floor), sum(|one| one.zero)], None, event)
+}
+
+fn row(
+    [cells, floor, zero]: [u64; 3],
+    levels: Option<[u64; 2]>,
+    event: impl Fn(&str) -> u64,
+) -> [String; COLUMNS.len()] {
+    let short = |count| short_with(count, "");
+    let balance = levels.map_or_else(String::new, |[excite, inhibit]| {
+        quotient(excite, inhibit).map_or("-".into(), |ratio| format!("{ratio:.2}"))
+    });
+    let [adc, table, error, gate] = SATURATED.map(|name| short(event(name)));
+    [
+        short(cells),
+        percent(floor, cells),
+        percent(zero, cells),
+        balance,
+        short(event("pulses_attempted")),
+        short(event("pulses_effective")),
+        percent(event("bounded"), event("requested")),
+        adc,
+        table,
+        error,
+        gate,
+    ]
+}
+
+fn percent(part: u64, whole: u64) -> String {
+    quotient(part, whole).map_or("-".into(), |share| format!("{:.1}", 100.0 * share))
+}
+
+fn accuracies(out: &mut String, view: &RunView<'_>, last: &EpochRecord) {
+    let mut score = |name: &str, score: Option<Score>, note: &str| {
+        if let Some(score) = score {
+            let accuracy = quotient(score.correct, score.total)
+                .map_or("-".into(), |share| format!("{:.2} %", 100.0 * share));
+            let _ = writeln!(
+                out,
+                "{name:<11} {accuracy:>8}  {} of {} right, {note}",
+                score.correct, score.total
+            );
+        }
+    };
+    score("train", last.train, &format!("while learning in epoch {}", last.epoch));
+    score("validation", last.validation, &format!("after epoch {}", last.epoch));
+    if let Some(test) = &view.receipt.test {
+        let why = test.select.replace('_', " ");
+        score("test", Some(test.score), &format!("after epoch {} ({why})", test.epoch));
+    }
+}
