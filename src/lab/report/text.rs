@@ -21,7 +21,7 @@ const COLUMNS: [(&str, usize); 11] = [
     ("gate", 6),
 ];
 
-/// Events of the last eight columns; `bounded` is divided by `requested`.
+/// Events of the last four columns.
 const SATURATED: [&str; 4] =
     ["saturated_conversions", "saturated_look_ups", "saturated_errors", "saturated_gates"];
 
