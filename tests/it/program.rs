@@ -8,7 +8,8 @@ use serde_json::Value;
 /// The program, with a data folder that does not exist and no colour.
 pub(crate) fn dalean() -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_dalean"));
-    command.env_remove("DALEAN_DATA").env_remove("DALEAN_RUNS").env_remove("RUST_BACKTRACE");
+    command.env("DALEAN_DATA", "no such folder");
+    command.env_remove("DALEAN_RUNS").env_remove("RUST_BACKTRACE");
     command
 }
 
@@ -23,7 +24,11 @@ pub(crate) struct Ran {
 impl From<Output> for Ran {
     fn from(output: Output) -> Self {
         let text = |bytes: Vec<u8>| String::from_utf8(bytes).expect("messages are UTF-8");
-        Self { code: output.status.code(), stdout: text(output.stdout), stderr: text(output.stderr) }
+        Self {
+            code: output.status.code(),
+            stdout: text(output.stdout),
+            stderr: text(output.stderr),
+        }
     }
 }
 
@@ -39,13 +44,13 @@ pub(crate) fn run(command: &mut Command) -> Ran {
     command.output().expect("the program starts").into()
 }
 
-/// `dalean train` of two small epochs of the built-in digits into `out`.
+/// The configuration of small runs: two epochs of the built-in digits on 24 hidden units.
+pub(crate) const SMALL: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/golden/small.toml");
+
+/// `dalean train` of the small run into `out`.
 pub(crate) fn train(out: &Path) -> Command {
     let mut command = dalean();
-    command.arg("train").arg("--out").arg(out).arg("--json");
-    for setting in ["network.hidden=[24]", "learning.epochs=2"] {
-        command.args(["--set", setting]);
-    }
+    command.args(["train", SMALL, "--json", "--out"]).arg(out);
     command
 }
 

@@ -12,21 +12,18 @@ fn every_rule_mode_and_chip_learns_the_built_in_digits() {
         (&["learning.mode=replay", "learning.rate=2"], 0.7),
         (&["learning.mode=online", "learning.centre=running", "learning.rate=2"], 0.7),
         (&["learning.route=random_sparse"], 0.7),
-        (&["learning.route=random_dense", "learning.taps=1"], 0.7),
+        (&["learning.route=random_dense"], 0.7),
         (&["hw.write.dither_bits=16"], 0.85),
         (&["hw.write.dither=separable"], 0.8),
         (&["hw.write.residual_bits=8", "hw.cell.level_bits=4"], 0.8),
         (&["hw.cell.floor_kind=absorbing"], 0.8),
         (&["hw.cell.level_bits=12"], 0.85),
-        (&["hw.adc.bits=8", "hw.tile.rows=32"], 0.85),
+        (&["hw.adc.bits=8", "hw.tile.rows=32", "hw.adc.recalibrate=epoch"], 0.85),
         (&["hw.adc.bits=8", "hw.adc.subtract=current", "hw.adc.recalibrate=epoch"], 0.85),
         (&["network.bias=rows"], 0.85),
     ] {
         let mut all = vec!["--set", "learning.epochs=4"];
         for setting in settings {
-            if setting.contains("random_") {
-                all.extend(["--set", "learning.taps=1"]);
-            }
             all.extend(["--set", setting]);
         }
         let (_, done) = trained(out.path(), &all);

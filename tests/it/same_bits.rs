@@ -67,8 +67,7 @@ fn a_run_killed_at_any_moment_resumes_to_the_same_bits() {
     let (_, whole) = trained(out.path(), &settings);
     for stop_after in [0u64, 1, 3, 4] {
         let root = tempfile::tempdir().unwrap();
-        let mut child =
-            train(root.path()).args(settings).stdout(Stdio::piped()).spawn().unwrap();
+        let mut child = train(root.path()).args(settings).stdout(Stdio::piped()).spawn().unwrap();
         let lines = BufReader::new(child.stdout.take().unwrap()).lines();
         for line in lines {
             let event: serde_json::Value = serde_json::from_str(&line.unwrap()).unwrap();

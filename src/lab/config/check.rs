@@ -411,11 +411,11 @@ fn route(learning: &mut LearningFile, rule: Rule) -> Result<Route, ConfigError> 
         let allowed = "direct feedback alignment has random dense feedback; leave the key out";
         return Err(wrong("learning.route", "is not \"random_dense\"", allowed));
     }
-    if kind != 0 && learning.taps.is_some_and(|taps| taps != 1) {
-        return Err(wrong("learning.taps", "is given", "only route = \"modulo\" has taps"));
-    }
-    if kind == 0 {
+    if kind == 0 && rule.is_dalean() {
         learning.taps.get_or_insert(1);
+    } else {
+        // taps belong to the modulo route: a file may keep them while its rule or route is changed
+        learning.taps = None;
     }
     let shift = learning.tap_shift;
     if shift.is_some_and(|shift| shift > 16) {
