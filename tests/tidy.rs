@@ -1,1 +1,581 @@
-fn main() {}
+//! The map is part of the code: what may lean on what, what the core must not touch, and that documents name things
+//! that exist.
+//!
+//! The table [`HOUSE`] is the house of docs/ARCHITECTURE.md. A wing may use the wings before it, a room the rooms
+//! before it in its own wing, never the other way round. Source is read as tokens: comments and strings are left out.
+
+use std::collections::BTreeSet;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+/// Wings in order, each with its rooms in order.
+const HOUSE: [(&str, &[&str]); 6] = [
+    ("num", &["fixed", "draw", "tables"]),
+    ("chip", &["hardware", "ledger", "periphery", "crossbar", "population", "layer", "engine"]),
+    ("learn", &["error", "route", "statistics", "rule", "driver"]),
+    ("task", &["classify"]),
+    ("lab", &["data", "config", "store", "report", "run"]),
+    ("cli", &["progress", "data", "hw", "run"]),
+];
+
+/// Wings that know no floats, clocks, hash maps, environment or files.
+const CORE: [&str; 4] = ["num", "chip", "learn", "task"];
+/// The one room of the core where floats become integers.
+const FLOAT_ROOM: &str = "src/num/tables.rs";
+/// Where the loops over cells live: the only home of `unsafe`.
+const KERNELS: &str = "src/chip/crossbar/kernel";
+/// Most lines of a source file.
+const LINES_MAX: usize = 600;
+
+// --- files ---
+
+fn root() -> PathBuf {
+    PathBuf::from(env!("CARGO_MANIFEST_DIR"))
+}
+
+fn read(path: &str) -> String {
+    fs::read_to_string(root().join(path)).unwrap_or_else(|error| panic!("{path}: {error}"))
+}
+
+/// Files below `folder` with the extension `.rs`, as paths from the root with `/`, sorted.
+fn sources(folder: &str) -> Vec<String> {
+    let mut found = Vec::new();
+    walk(&root().join(folder), &mut found);
+    found.retain(|path| path.ends_with(".rs"));
+    assert!(!found.is_empty(), "{folder} holds source");
+    found
+}
+
+fn walk(folder: &Path, found: &mut Vec<String>) {
+    let entries = fs::read_dir(folder).unwrap_or_else(|e| panic!("{}: {e}", folder.display()));
+    let mut paths: Vec<_> = entries.map(|entry| entry.unwrap().path()).collect();
+    paths.sort();
+    for path in paths {
+        // what .gitignore names
+        let ignored = [".git", "target", "runs", "data"].map(|name| root().join(name));
+        if path.is_symlink() || ignored.contains(&path) {
+            continue;
+        }
+        if path.is_dir() {
+            walk(&path, found);
+        } else {
+            let below = path.strip_prefix(root()).unwrap();
+            let parts: Vec<_> = below.iter().map(|part| part.to_string_lossy()).collect();
+            found.push(parts.join("/"));
+        }
+    }
+}
+
+/// Files that version control keeps; where there is none, every file.
+fn tracked() -> Vec<String> {
+    let listing = Command::new("git").arg("ls-files").arg("-z").current_dir(root()).output();
+    if let Ok(listing) = listing
+        && listing.status.success()
+        && !listing.stdout.is_empty()
+    {
+        let text = String::from_utf8(listing.stdout).unwrap();
+        return text.split_terminator('\0').map(str::to_owned).collect();
+    }
+    let mut found = Vec::new();
+    walk(&root(), &mut found);
+    found
+}
+
+fn assert_none(problems: &[String], rule: &str) {
+    assert!(problems.is_empty(), "{rule}:\n  {}", problems.join("\n  "));
+}
+
+// --- source as tokens ---
+
+/// The text with comments, strings and characters blanked out; lines stay where they are.
+fn code(text: &str) -> String {
+    let s: Vec<char> = text.chars().collect();
+    let at = |i: usize| s.get(i).copied().unwrap_or('\0');
+    let mut out = String::with_capacity(text.len());
+    let mut i = 0;
+    while i < s.len() {
+        let end = match (s[i], at(i + 1)) {
+            ('/', '/') => (i..s.len()).find(|&j| s[j] == '\n').unwrap_or(s.len()),
+            ('/', '*') => block_comment_end(&s, i),
+            ('"', _) => string_end(&s, i + 1),
+            ('r', '"' | '#')
+                if !is_word(if i > 0 { s[i - 1] } else { ' ' }) || at(i - 1) == 'b' =>
+            {
+                raw_string_end(&s, i + 1).unwrap_or(i)
+            }
+            ('\'', '\\') => (i + 3..s.len()).find(|&j| s[j] == '\'').map_or(s.len(), |j| j + 1),
+            ('\'', _) if at(i + 2) == '\'' => i + 3,
+            _ => i,
+        };
+        if end > i {
+            out.extend(s[i..end].iter().map(|&c| if c == '\n' { '\n' } else { ' ' }));
+            i = end;
+        } else {
+            out.push(s[i]);
+            i += 1;
+        }
+    }
+    out
+}
+
+fn block_comment_end(s: &[char], start: usize) -> usize {
+    let mut depth = 0;
+    let mut i = start;
+    while i < s.len() {
+        match (s[i], s.get(i + 1)) {
+            ('/', Some('*')) => (depth, i) = (depth + 1, i + 2),
+            ('*', Some('/')) => (depth, i) = (depth - 1, i + 2),
+            _ => i += 1,
+        }
+        if depth == 0 {
+            return i;
+        }
+    }
+    i
+}
+
+fn string_end(s: &[char], mut i: usize) -> usize {
+    while i < s.len() && s[i] != '"' {
+        i += if s[i] == '\\' { 2 } else { 1 };
+    }
+    (i + 1).min(s.len())
+}
+
+/// End of a raw string whose hashes begin at `i`; `None` when there is none.
+fn raw_string_end(s: &[char], i: usize) -> Option<usize> {
+    let hashes = s[i..].iter().take_while(|&&c| c == '#').count();
+    if s.get(i + hashes) != Some(&'"') {
+        return None; // a raw identifier
+    }
+    let closes = |j: usize| s[j] == '"' && s[j + 1..].iter().take(hashes).all(|&c| c == '#');
+    let end = (i + hashes + 1..s.len()).find(|&j| closes(j))?;
+    Some((end + 1 + hashes).min(s.len()))
+}
+
+fn is_word(c: char) -> bool {
+    c.is_alphanumeric() || c == '_'
+}
+
+/// Words, `::` and single characters, each with its line.
+fn tokens(text: &str) -> Vec<(String, usize)> {
+    let mut out: Vec<(String, usize)> = Vec::new();
+    for (line, text) in code(text).lines().enumerate() {
+        let mut rest = text.trim_start();
+        while let Some(first) = rest.chars().next() {
+            let length = if is_word(first) {
+                rest.find(|c| !is_word(c)).unwrap_or(rest.len())
+            } else if rest.starts_with("::") {
+                2
+            } else {
+                first.len_utf8()
+            };
+            out.push((rest[..length].to_owned(), line + 1));
+            rest = rest[length..].trim_start();
+        }
+    }
+    out
+}
+
+/// Module path of a file: `src/chip/engine/forward.rs` is `chip`, `engine`, `forward`.
+fn module_of(path: &str) -> Vec<String> {
+    let inner = path.trim_start_matches("src/").trim_end_matches(".rs");
+    match inner {
+        "lib" | "main" => vec![],
+        _ => inner.split('/').map(str::to_owned).collect(),
+    }
+}
+
+/// Every path in a file that starts at `crate`, `super` or `self`, from the root of the crate, with its line.
+fn reaches(path: &str, text: &str) -> Vec<(Vec<String>, usize)> {
+    let tokens = tokens(text);
+    let word = |i: usize| tokens.get(i).map_or("", |(word, _)| &**word);
+    let mut here = module_of(path);
+    let mut scopes: Vec<bool> = Vec::new();
+    let mut found = Vec::new();
+    let mut i = 0;
+    while i < tokens.len() {
+        match word(i) {
+            "{" => {
+                let is_module = i >= 2 && word(i - 2) == "mod";
+                if is_module {
+                    here.push(word(i - 1).to_owned());
+                }
+                scopes.push(is_module);
+            }
+            "}" if scopes.pop() == Some(true) => {
+                here.pop();
+            }
+            "crate" | "super" | "self"
+                if word(i + 1) == "::" && (i == 0 || word(i - 1) != "::") =>
+            {
+                let line = tokens[i].1;
+                let mut ends = Vec::new();
+                let next = tree(&tokens, i, &[], &mut ends);
+                found.extend(ends.iter().map(|end| (absolute(&here, end), line)));
+                i = next;
+                continue;
+            }
+            _ => {}
+        }
+        i += 1;
+    }
+    found
+}
+
+/// Reads a path, or a tree of paths in braces, from token `i` on; gives the token after it.
+fn tree(
+    tokens: &[(String, usize)],
+    mut i: usize,
+    before: &[String],
+    ends: &mut Vec<Vec<String>>,
+) -> usize {
+    let word = |i: usize| tokens.get(i).map_or("", |(word, _)| &**word);
+    let mut path = before.to_vec();
+    loop {
+        match word(i) {
+            "{" if word(i.wrapping_sub(1)) == "::" => {
+                i += 1;
+                while word(i) != "}" && i < tokens.len() {
+                    i = match word(i) {
+                        "," => i + 1,
+                        _ => tree(tokens, i, &path, ends),
+                    };
+                }
+                return i + 1;
+            }
+            name if name.starts_with(is_word) => path.push(name.to_owned()),
+            _ => {}
+        }
+        i += 1;
+        if word(i) == "::" && (word(i + 1) == "{" || word(i + 1).starts_with(is_word)) {
+            i += 1;
+        } else {
+            // what follows a name in a tree: `as other`
+            while !before.is_empty() && !matches!(word(i), "," | "}" | "") {
+                i += 1;
+            }
+            ends.push(path);
+            return i;
+        }
+    }
+}
+
+fn absolute(here: &[String], path: &[String]) -> Vec<String> {
+    let mut base = if path[0] == "crate" { vec![] } else { here.to_vec() };
+    for name in path {
+        match &**name {
+            "crate" | "self" => {}
+            "super" => {
+                base.pop();
+            }
+            _ => base.push(name.clone()),
+        }
+    }
+    base
+}
+
+fn wing_number(name: &str) -> Option<usize> {
+    HOUSE.iter().position(|(wing, _)| *wing == name)
+}
+
+/// Why a file may not use a path; `None` when it may.
+fn violation(from: &[String], to: &[String]) -> Option<String> {
+    let [wing, ..] = from else { return None }; // lib.rs and main.rs see everything
+    let own = wing_number(wing).unwrap_or_else(|| panic!("wing `{wing}` is in the table"));
+    let target = to.first()?;
+    let Some(other) = wing_number(target) else {
+        return Some(format!("`{target}` is no wing"));
+    };
+    if other != own {
+        return (other > own)
+            .then(|| format!("wing `{wing}` may not use the later wing `{target}`"));
+    }
+    let room = from.get(1)?; // a front door lists its rooms
+    let rooms = HOUSE[own].1;
+    let number = |name: &String| rooms.iter().position(|room| room == name);
+    let mine = number(room).unwrap_or_else(|| panic!("room `{wing}::{room}` is in the table"));
+    match to.get(1).map(|name| (name, number(name))) {
+        Some((name, Some(theirs))) => {
+            (theirs > mine).then(|| format!("room `{wing}::{room}` may not use the later `{name}`"))
+        }
+        // the command line keeps what its commands share in its front door
+        _ => (wing != "cli").then(|| format!("room `{wing}::{room}` uses its own front door")),
+    }
+}
+
+// --- the house ---
+
+#[test]
+fn the_table_lists_every_room_and_no_other() {
+    let wanted: BTreeSet<String> = HOUSE
+        .iter()
+        .flat_map(|(wing, rooms)| rooms.iter().map(move |room| format!("src/{wing}/{room}.rs")))
+        .collect();
+    let found = sources("src").into_iter().filter(|path| path.split('/').count() == 3);
+    assert_eq!(found.collect::<BTreeSet<_>>(), wanted);
+}
+
+#[test]
+fn nothing_leans_on_what_comes_later() {
+    let mut problems = Vec::new();
+    let mut seen = 0;
+    for path in sources("src") {
+        let from = module_of(&path);
+        for (to, line) in reaches(&path, &read(&path)) {
+            seen += 1;
+            if let Some(why) = violation(&from, &to) {
+                problems.push(format!("{path}:{line}: {} ({why})", to.join("::")));
+            }
+        }
+    }
+    assert!(seen > 200, "paths were found ({seen})");
+    assert_none(&problems, "a wing may use earlier wings, a room earlier rooms of its wing");
+}
+
+#[test]
+fn the_core_knows_no_floats() {
+    let mut problems = Vec::new();
+    for path in CORE.iter().flat_map(|wing| sources(&format!("src/{wing}"))) {
+        for (word, line) in tokens(&read(&path)) {
+            let float = word.ends_with("f32") || word.ends_with("f64");
+            let literal = word.starts_with(|c: char| c.is_ascii_digit()) && !word.starts_with("0x");
+            if path != FLOAT_ROOM && float && (literal || word.len() == 3) {
+                problems.push(format!("{path}:{line}: {word}"));
+            }
+        }
+    }
+    assert_none(
+        &problems,
+        "floats become integers in src/num/tables.rs and nowhere else in the core",
+    );
+}
+
+#[test]
+fn the_core_knows_no_clock_order_environment_or_file() {
+    let words = ["HashMap", "HashSet", "Instant", "SystemTime", "RandomState"];
+    let modules = ["fs", "env", "net", "time", "process"];
+    let mut problems = Vec::new();
+    for path in CORE.iter().flat_map(|wing| sources(&format!("src/{wing}"))) {
+        let tokens = tokens(&read(&path));
+        for (i, (word, line)) in tokens.iter().enumerate() {
+            let of_std = i >= 2 && tokens[i - 1].0 == "::" && tokens[i - 2].0 == "std";
+            if words.contains(&&**word) || of_std && modules.contains(&&**word) {
+                problems.push(format!("{path}:{line}: {word}"));
+            }
+        }
+    }
+    assert_none(&problems, "a result depends on nothing but configuration, data and seed");
+}
+
+#[test]
+fn unsafe_stays_in_the_kernels() {
+    let mut problems = Vec::new();
+    for path in sources("src") {
+        let at_home = path.starts_with(&format!("{KERNELS}/")) || path == format!("{KERNELS}.rs");
+        let tokens = tokens(&read(&path));
+        let found = tokens.iter().filter(|(word, _)| word == "unsafe");
+        if !at_home {
+            problems.extend(found.map(|(_, line)| format!("{path}:{line}")));
+        }
+    }
+    assert_none(&problems, "`unsafe` lives under src/chip/crossbar/kernel");
+}
+
+#[test]
+fn files_stay_short() {
+    let mut problems = Vec::new();
+    for path in ["src", "tests"].iter().flat_map(|folder| sources(folder)) {
+        let lines = read(&path).lines().count();
+        if lines > LINES_MAX {
+            problems.push(format!("{path}: {lines} lines"));
+        }
+    }
+    assert_none(&problems, "a source file has at most 600 lines");
+}
+
+#[test]
+fn lints_are_expected_not_allowed() {
+    let mut problems = Vec::new();
+    for path in ["src", "tests"].iter().flat_map(|folder| sources(folder)) {
+        let tokens = tokens(&read(&path));
+        for three in tokens.windows(3) {
+            if three[0].0 == "[" && three[1].0 == "allow" && three[2].0 == "(" {
+                problems.push(format!("{path}:{}", three[1].1));
+            }
+        }
+    }
+    assert_none(&problems, "use #[expect(lint, reason = \"...\")]");
+}
+
+// --- documents ---
+
+/// Paths a document names: in backquotes below a folder of ours, and targets of links, from the root.
+fn named_paths(document: &str) -> Vec<String> {
+    let folders = ["src/", "tests/", "docs/", "examples/", "hw_models/", ".ci/"];
+    let text = read(document);
+    let fences: Vec<&str> = text.split("```").step_by(2).collect();
+    let prose = fences.concat();
+    let spans = prose.split('`').skip(1).step_by(2);
+    let is_path = |s: &&str| {
+        folders.iter().any(|folder| s.starts_with(folder))
+            && s.chars().all(|c| is_word(c) || "./-".contains(c))
+    };
+    let mut found: Vec<String> = spans.filter(is_path).map(str::to_owned).collect();
+    let folder = Path::new(document).parent().unwrap().to_owned();
+    for target in prose.split("](").skip(1).filter_map(|rest| rest.split(')').next()) {
+        let target = target.split('#').next().unwrap_or_default();
+        if !target.is_empty() && !target.contains("://") {
+            found.push(folder.join(target).to_string_lossy().into_owned());
+        }
+    }
+    found
+}
+
+#[test]
+fn documents_name_files_that_exist() {
+    let mut problems = Vec::new();
+    for (document, least) in [
+        ("docs/ARCHITECTURE.md", 30),
+        ("docs/MODEL.md", 15),
+        ("docs/GLOSSARY.md", 1),
+        ("docs/DECISIONS.md", 1),
+    ] {
+        let paths = named_paths(document);
+        assert!(paths.len() >= least, "{document} names files ({})", paths.len());
+        let missing = paths.iter().filter(|path| !root().join(path).exists());
+        problems.extend(missing.map(|path| format!("{document}: {path}")));
+    }
+    assert_none(&problems, "every path a document names exists");
+}
+
+/// Numbers at the head of the headings of the model document.
+fn sections() -> BTreeSet<String> {
+    let text = read("docs/MODEL.md");
+    let headings = text.lines().filter_map(|line| line.strip_prefix('#'));
+    headings
+        .filter_map(|line| line.trim_start_matches('#').split_whitespace().next())
+        .map(|number| number.trim_end_matches('.').to_owned())
+        .filter(|number| number.starts_with(|c: char| c.is_ascii_digit()))
+        .collect()
+}
+
+#[test]
+fn references_to_the_model_name_its_sections() {
+    let sections = sections();
+    let mut problems = Vec::new();
+    let mut seen = 0;
+    for path in sources("src") {
+        // comments may break a line between the document and the number
+        let lines = read(&path);
+        let lines =
+            lines.lines().map(|line| line.trim_start().trim_start_matches(['/', '!']).trim());
+        let text = lines.collect::<Vec<_>>().join(" ");
+        for rest in text.split("docs/MODEL.md").skip(1) {
+            let Some(rest) = rest.strip_prefix(", ") else { continue };
+            let list = rest.split(|c: char| !(c.is_ascii_digit() || ". and,".contains(c))).next();
+            let numbers =
+                list.unwrap_or_default().split([' ', ',']).map(|n| n.trim_end_matches('.'));
+            let numbers = numbers.filter(|n| n.starts_with(|c: char| c.is_ascii_digit()));
+            for number in numbers {
+                seen += 1;
+                if !sections.contains(number) {
+                    problems.push(format!("{path}: section {number}"));
+                }
+            }
+        }
+    }
+    assert!(seen >= 15, "references were found ({seen})");
+    assert_none(&problems, "a reference to docs/MODEL.md names one of its sections");
+}
+
+#[test]
+fn every_dependency_has_a_line_of_reason() {
+    let decisions = read("docs/DECISIONS.md");
+    let mut problems = Vec::new();
+    for manifest in ["Cargo.toml", "tests/fuzz/Cargo.toml"] {
+        let mut inside = false;
+        for line in read(manifest).lines() {
+            if line.starts_with('[') {
+                inside = line.trim_matches(['[', ']']).ends_with("dependencies");
+            } else if let (true, Some((name, _))) = (inside, line.split_once('=')) {
+                let name = name.trim();
+                let told = |line: &str| line.contains(&format!("`{name}`"));
+                if name != "dalean" && !decisions.lines().any(told) {
+                    problems.push(format!("{manifest}: {name}"));
+                }
+            }
+        }
+    }
+    assert_none(&problems, "a dependency has a line in docs/DECISIONS.md");
+}
+
+#[test]
+fn no_file_knows_the_machine_it_was_written_on() {
+    // put together here, so that this file does not contain them
+    let folders = ["work", "root", "home", "Users"].map(|name| format!("/{name}/"));
+    let hosts =
+        ["registry.npmjs", "pypi", "crates-io", "static.crates", "index.crates", "deb.debian"];
+    let hosts = hosts.map(|host| format!("://{host}."));
+    let index = format!("source = \"registry+https://github.com/rust-lang/crates.{}-index\"", "io");
+    let mut problems = Vec::new();
+    for path in tracked() {
+        let Ok(bytes) = fs::read(root().join(&path)) else { continue };
+        let text = String::from_utf8_lossy(&bytes);
+        for (number, line) in text.lines().enumerate() {
+            let marked = folders.iter().chain(&hosts).any(|mark| line.contains(mark));
+            let strange =
+                path.ends_with("Cargo.lock") && line.starts_with("source") && line != index;
+            if marked || strange {
+                problems.push(format!("{path}:{}: {}", number + 1, line.trim()));
+            }
+        }
+    }
+    assert_none(&problems, "files name no folder of one machine and no registry host");
+}
+
+// --- the reader of source itself ---
+
+#[test]
+fn comments_strings_and_characters_are_not_code() {
+    let text =
+        "a // b\n/* c /* d */ e */ f \"g \\\" h\" r#\"i \" j\"# '\\'' 'k' &'l m b\"n\" br\"o\"";
+    let words: Vec<_> = tokens(text).into_iter().map(|(word, _)| word).collect();
+    assert_eq!(words, ["a", "f", "&", "'", "l", "m", "b", "b"]);
+}
+
+#[test]
+fn paths_are_read_through_trees_supers_and_inner_modules() {
+    let text = "use super::hardware::{Adc, self as h, x::{Y, Z}};\n\
+                mod tests { use super::super::Engine; fn f() { crate::num::fixed::rsh::<u8>(1); } }\n\
+                pub(super) fn g() { self::h() }";
+    let found: Vec<_> = reaches("src/chip/engine/forward.rs", text)
+        .into_iter()
+        .map(|(path, line)| format!("{} {line}", path.join("::")))
+        .collect();
+    let wanted = [
+        "chip::engine::hardware::Adc 1",
+        "chip::engine::hardware 1",
+        "chip::engine::hardware::x::Y 1",
+        "chip::engine::hardware::x::Z 1",
+        "chip::engine::Engine 2",
+        "num::fixed::rsh 2",
+        "chip::engine::forward::h 3",
+    ];
+    assert_eq!(found, wanted);
+}
+
+#[test]
+fn the_table_is_enforced_in_both_directions() {
+    let path = |text: &str| text.split("::").map(str::to_owned).collect::<Vec<_>>();
+    let allowed = |from, to| violation(&path(from), &path(to)).is_none();
+    assert!(
+        allowed("learn::route", "chip::layer::Taps") && !allowed("chip::layer", "learn::route")
+    );
+    assert!(
+        allowed("chip::engine::forward", "chip::layer") && !allowed("chip::layer", "chip::engine")
+    );
+    assert!(allowed("chip::engine::forward", "chip::engine::Engine"));
+    assert!(!allowed("chip::layer", "chip::Layer") && allowed("cli::run", "cli::say"));
+    assert!(!allowed("num::fixed", "lab") && !allowed("num::fixed", "nowhere::at_all"));
+}
