@@ -147,7 +147,7 @@ impl Banks<'_> {
                 self.arrays[bank].read(backend, panel, blocks, &read.drives, out, &mut scratch);
                 let live =
                     out.chunks_exact(PANEL_COLUMNS).map(|row| row[..live].iter().sum::<i64>());
-                seen.currents[bank] += live.sum::<i64>();
+                seen.currents[bank] += live.sum::<i64>() << (slice * self.dac_bits);
             }
             let [e, i] = &currents;
             let rows = accumulators.chunks_exact_mut(PANEL_COLUMNS);

@@ -411,10 +411,10 @@ fn route(learning: &mut LearningFile, rule: Rule) -> Result<Route, ConfigError> 
         let allowed = "direct feedback alignment has random dense feedback; leave the key out";
         return Err(wrong("learning.route", "is not \"random_dense\"", allowed));
     }
-    if kind == 0 && rule.is_dalean() {
+    if kind == 0 && rule == Rule::Ed {
         learning.taps.get_or_insert(1);
     } else {
-        // taps belong to the modulo route: a file may keep them while its rule or route is changed
+        // taps belong to ED's modulo route: a file may keep them while its rule or route is changed
         learning.taps = None;
     }
     let shift = learning.tap_shift;
@@ -470,7 +470,7 @@ impl Config {
         if self.rule == Rule::Kaneko && outputs != 1 {
             let allowed = format!(
                 "Kaneko's rule has one output and two classes, but the data has {classes}; use a binary set such as \
-                 xor or parity-4, or rule = \"ed\""
+                 xor or parity4, or rule = \"ed\""
             );
             return Err(wrong("learning.rule", "is \"kaneko\"", allowed));
         }

@@ -45,7 +45,7 @@ keys! {
     }
     /// `[data]`: a named set, or files of one's own.
     DataFile {
-        /// `optdigits`, `mnist`, `fashion-mnist`, `cifar10`, `xor`, `parity-N`.
+        /// `optdigits`, `mnist`, `fashion-mnist`, `cifar10`, `xor`, `parity2` to `parity8`.
         set: String,
         /// `idx`, `npz`, `csv`: own files.
         format: String,
@@ -53,7 +53,7 @@ keys! {
         train: String,
         /// IDX labels of the training examples.
         train_labels: String,
-        /// Validation examples; default: the last 1/12 of the training examples.
+        /// Validation examples; default: every 12th training example.
         validation: String,
         /// IDX labels of the validation examples.
         validation_labels: String,
@@ -61,7 +61,7 @@ keys! {
         test: String,
         /// IDX labels of the test examples.
         test_labels: String,
-        /// Greatest value; default: 255, or 1 for floats.
+        /// Greatest value; default: the greatest training value, or 255 for floats.
         full_scale: u8,
         /// Number of classes; default: greatest label + 1.
         classes: usize,

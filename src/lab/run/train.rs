@@ -262,13 +262,17 @@ pub fn view<'a>(
     heats: &'a [Heat],
     pictures: &'a [Picture],
 ) -> RunView<'a> {
-    let hidden: Vec<_> = config.hidden.iter().map(|units| format!("{units}-")).collect();
+    let shapes = records.first().map(|record| &record.pathways).into_iter().flatten();
+    let mut sizes: Vec<(usize, [usize; 2])> = shapes.map(|p| (p.layer, p.shape)).collect();
+    sizes.dedup();
+    let first = sizes.first().map_or(0, |(_, [rows, _])| rows - usize::from(config.bias_rows));
+    let units = sizes.iter().map(|(_, [_, columns])| columns);
+    let sizes: Vec<_> = std::iter::once(&first).chain(units).map(usize::to_string).collect();
     let title = format!(
-        "{} by {}: {}{} on {}",
+        "{} by {}: {} on {}",
         config.data_name(),
         config.rule_name(),
-        hidden.concat(),
-        config.outputs.map_or_else(|| "classes".into(), |n| n.to_string()),
+        sizes.join("-"),
         config.hardware_name
     );
     RunView { title, config: "", receipt, epochs: records, heats, pictures, class_names: &[] }
