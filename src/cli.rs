@@ -100,7 +100,10 @@ struct Shared {
     quiet: bool,
 }
 
-#[expect(clippy::disallowed_methods, reason = "the command line reads the environment for the rest")]
+#[expect(
+    clippy::disallowed_methods,
+    reason = "the command line reads the environment for the rest"
+)]
 fn environment(name: &str) -> Option<String> {
     std::env::var(name).ok().filter(|value| !value.is_empty())
 }
@@ -185,7 +188,8 @@ pub fn main() -> ExitCode {
         Ok(()) => ExitCode::SUCCESS,
         Err(Failure { code, message }) => {
             if json {
-                say(&serde_json::json!({"event": "error", "code": code, "message": message}).to_string());
+                say(&serde_json::json!({"event": "error", "code": code, "message": message})
+                    .to_string());
             }
             let red = std::io::stderr().is_terminal();
             let word = if red { "\u{1b}[31merror\u{1b}[0m" } else { "error" };

@@ -87,7 +87,9 @@ fn fetch(name: &str, from: &str, data_dir: Option<PathBuf>, json: bool) -> Done 
         let line = match &event {
             FetchEvent::Present { file } => format!("{file}: already here"),
             FetchEvent::Trying { place } => format!("trying {place}"),
-            FetchEvent::Resumed { file, bytes } => format!("{file}: continuing after {bytes} bytes"),
+            FetchEvent::Resumed { file, bytes } => {
+                format!("{file}: continuing after {bytes} bytes")
+            }
             FetchEvent::Received { file, bytes, total } => {
                 if live {
                     let of = total.map_or_else(String::new, |total| format!(" of {total}"));

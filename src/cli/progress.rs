@@ -51,10 +51,10 @@ impl Meter {
         let seconds = self.started.elapsed().as_secs_f64();
         let rate = (done - self.samples) as f64 / seconds.max(1e-3);
         let total = u64::from(self.epochs) * samples_total as u64;
-        let left = Duration::from_secs_f64(((total - done.min(total)) as f64 / rate.max(1.0)).min(1e9));
+        let left =
+            Duration::from_secs_f64(((total - done.min(total)) as f64 / rate.max(1.0)).min(1e9));
         let right = 100.0 * correct as f64 / samples as f64;
-        let message =
-            format!("train {right:.2} %  {rate:.0} images/s  {} to go", clock(left));
+        let message = format!("train {right:.2} %  {rate:.0} images/s  {} to go", clock(left));
         if let Some(bar) = &self.bar {
             bar.set_length(samples_total as u64);
             bar.set_prefix(format!("epoch {:>3}/{}", epoch + 1, self.epochs));
@@ -62,7 +62,11 @@ impl Meter {
             bar.set_message(message);
         } else if self.last_line.elapsed() >= Duration::from_secs(LINE_SECONDS) {
             self.last_line = Instant::now();
-            eprintln!("epoch {}/{}: {samples}/{samples_total} images, {message}", epoch + 1, self.epochs);
+            eprintln!(
+                "epoch {}/{}: {samples}/{samples_total} images, {message}",
+                epoch + 1,
+                self.epochs
+            );
         }
     }
 

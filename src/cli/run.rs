@@ -99,7 +99,8 @@ pub(super) fn train(args: &TrainArgs) -> Done {
                 if json {
                     let run = path.display().to_string();
                     say(&json!({"event": "started", "run": run, "data": data, "epoch": epoch,
-                        "epochs": epochs, "warnings": warnings}).to_string());
+                        "epochs": epochs, "warnings": warnings})
+                    .to_string());
                 } else if !quiet {
                     meter.line(data);
                     meter.line(&format!(
@@ -207,7 +208,8 @@ pub(super) fn verify(args: &VerifyArgs) -> Done {
         Verdict::Same { epochs, state_hash, test } => {
             if shared.json {
                 say(&json!({"event": "done", "verified": true, "epochs": epochs.saturating_sub(1),
-                    "state_hash": state_hash, "test": test}).to_string());
+                    "state_hash": state_hash, "test": test})
+                .to_string());
             } else {
                 let test = if test { " and the test result" } else { "" };
                 say(&format!(

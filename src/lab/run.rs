@@ -41,7 +41,9 @@ pub enum RunError {
         error: CheckpointError,
     },
     /// The data is not what the run was made with.
-    #[error("the data has the hash {found}, but the run was made with {wanted}; get the same data again (`dalean data list`)")]
+    #[error(
+        "the data has the hash {found}, but the run was made with {wanted}; get the same data again (`dalean data list`)"
+    )]
     DataChanged {
         /// Hash now.
         found: String,
@@ -49,7 +51,9 @@ pub enum RunError {
         wanted: String,
     },
     /// The configuration is not what the run was made with.
-    #[error("config.toml has the hash {found}, but receipt.json says {wanted}; one of them was changed")]
+    #[error(
+        "config.toml has the hash {found}, but receipt.json says {wanted}; one of them was changed"
+    )]
     ConfigChanged {
         /// Hash now.
         found: String,

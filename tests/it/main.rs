@@ -1,3 +1,7 @@
 //! Tests of the whole program, through its public faces.
 
+mod bad_input;
 mod oracle;
+mod program;
+mod rules;
+mod same_bits;

@@ -141,9 +141,9 @@ impl Banks<'_> {
         let mut scratch = Vec::new();
         for at in 0..self.reads[0].len() {
             let slice = self.reads[0][at].slice;
-            for bank in 0..2 {
+            for (bank, out) in currents.iter_mut().enumerate() {
                 let read = &self.reads[bank][at];
-                let (out, blocks) = (&mut currents[bank], read.blocks.clone());
+                let blocks = read.blocks.clone();
                 self.arrays[bank].read(backend, panel, blocks, &read.drives, out, &mut scratch);
                 let live =
                     out.chunks_exact(PANEL_COLUMNS).map(|row| row[..live].iter().sum::<i64>());

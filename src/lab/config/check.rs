@@ -138,7 +138,8 @@ fn per_layer<T: Clone + PartialEq>(
         PerLayer::Each(list) if list.len() == layers => Ok(list.clone()),
         PerLayer::Each(list) => {
             let found = format!("has {} numbers", list.len());
-            let allowed = format!("there are {layers} layers (hidden and output); give {layers}, or one");
+            let allowed =
+                format!("there are {layers} layers (hidden and output); give {layers}, or one");
             Err(wrong(key, found, allowed))
         }
     }
@@ -163,8 +164,7 @@ fn resolve_hardware(file: &mut HardwareFile, prefix: &str) -> Result<Hardware, C
     // the default ceiling follows the bits, so it is not written back
     let ceiling = cell.ceiling.unwrap_or(i64::from(level_bits.level_max()));
     let window = range(&key("cell"), Window::new(floor, ceiling, level_bits))?;
-    let floors =
-        [("recoverable", FloorKind::Recoverable), ("absorbing", FloorKind::Absorbing)];
+    let floors = [("recoverable", FloorKind::Recoverable), ("absorbing", FloorKind::Absorbing)];
     let floor_kind = word(&key("cell.floor_kind"), &mut cell.floor_kind, "recoverable", &floors)?;
 
     let tile = file.tile.get_or_insert_with(TileFile::default);
@@ -238,10 +238,9 @@ fn converters(table: &mut AdcTable, key: &dyn Fn(&str) -> String) -> Result<Adc,
     let every_epoch = word(&key("adc.recalibrate"), &mut table.recalibrate, "never", &again)?;
     let default = || RangeFile::Named("calibrated".into());
     let range = match table.range.get_or_insert_with(default) {
-        RangeFile::Named(name) if name == "calibrated" => AdcRange::Calibrated {
-            headroom: u32::try_from(headroom).expect("0..=16"),
-            every_epoch,
-        },
+        RangeFile::Named(name) if name == "calibrated" => {
+            AdcRange::Calibrated { headroom: u32::try_from(headroom).expect("0..=16"), every_epoch }
+        }
         RangeFile::Named(name) if name == "full" => AdcRange::Full,
         RangeFile::Named(name) => {
             let allowed = "it is \"calibrated\", \"full\" or a shift in 0..=40";
@@ -301,7 +300,8 @@ pub(super) fn config(mut file: ExperimentFile) -> Result<Config, ConfigError> {
     if hidden.contains(&0) {
         return Err(wrong("network.hidden", "has a layer of 0 units", "give at least 1 unit"));
     }
-    let alphas = per_layer("network.alpha", &mut network.alpha, if seeded { 1.0 } else { 6.0 }, layers)?;
+    let alphas =
+        per_layer("network.alpha", &mut network.alpha, if seeded { 1.0 } else { 6.0 }, layers)?;
     let mut kinds = vec![
         word(
             "network.activation",
@@ -328,7 +328,8 @@ pub(super) fn config(mut file: ExperimentFile) -> Result<Config, ConfigError> {
             wrong("network.weight_max", format!("is {weight}"), allowed)
         })?);
     }
-    let bias_rows = word("network.bias", &mut network.bias, "none", &[("none", false), ("rows", true)])?;
+    let bias_rows =
+        word("network.bias", &mut network.bias, "none", &[("none", false), ("rows", true)])?;
     word("network.readout", &mut network.readout, "p", &[("p", ())])?;
     let symmetric = seeded || !rule.is_dalean();
     let gain = if symmetric { [1.0, 1.0] } else { [1.5, 0.5] };
@@ -347,7 +348,11 @@ pub(super) fn config(mut file: ExperimentFile) -> Result<Config, ConfigError> {
     for factor in per_layer("learning.rate_multipliers", multipliers, 1.0, layers)? {
         let factor = positive("learning.rate_multipliers", factor)?;
         let product = rate.times(factor).ok_or_else(|| {
-            wrong("learning.rate_multipliers", "times the rate is out of range", "keep it in 1e-6..=1e6")
+            wrong(
+                "learning.rate_multipliers",
+                "times the rate is out of range",
+                "keep it in 1e-6..=1e6",
+            )
         })?;
         rates.push(product);
     }
@@ -400,18 +405,17 @@ pub(super) fn config(mut file: ExperimentFile) -> Result<Config, ConfigError> {
 
 fn route(learning: &mut LearningFile, rule: Rule) -> Result<Route, ConfigError> {
     let default = if rule == Rule::Dfa { "random_dense" } else { "modulo" };
-    let names =
-        [("modulo", 0), ("random_sparse", 1), ("scalar_broadcast", 2), ("random_dense", 3)];
+    let names = [("modulo", 0), ("random_sparse", 1), ("scalar_broadcast", 2), ("random_dense", 3)];
     let kind = word("learning.route", &mut learning.route, default, &names)?;
     if rule == Rule::Dfa && kind != 3 {
         let allowed = "direct feedback alignment has random dense feedback; leave the key out";
         return Err(wrong("learning.route", "is not \"random_dense\"", allowed));
     }
-    if kind != 0 && learning.taps.is_some_and(|taps| taps != 1) {
-        return Err(wrong("learning.taps", "is given", "only route = \"modulo\" has taps"));
-    }
-    if kind == 0 {
+    if kind == 0 && rule.is_dalean() {
         learning.taps.get_or_insert(1);
+    } else {
+        // taps belong to the modulo route: a file may keep them while its rule or route is changed
+        learning.taps = None;
     }
     let shift = learning.tap_shift;
     if shift.is_some_and(|shift| shift > 16) {
@@ -459,7 +463,8 @@ impl Config {
         let default = if self.rule == Rule::Kaneko && classes == 2 { 1 } else { classes };
         let outputs = self.outputs.unwrap_or(default);
         if outputs != classes && !(outputs == 1 && classes == 2) {
-            let allowed = format!("the data has {classes} classes: use {classes}, or 1 for two classes");
+            let allowed =
+                format!("the data has {classes} classes: use {classes}, or 1 for two classes");
             return Err(wrong("network.outputs", format!("is {outputs}"), allowed));
         }
         if self.rule == Rule::Kaneko && outputs != 1 {

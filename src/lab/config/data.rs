@@ -19,11 +19,17 @@ impl Config {
         };
         let Some(format) = &data.format else {
             let name = data.set.as_deref().unwrap_or("optdigits");
-            let set = name.parse().map_err(|error| wrong("set", format!("is \"{name}\""), &format!("{error}")))?;
+            let set = name
+                .parse()
+                .map_err(|error| wrong("set", format!("is \"{name}\""), &format!("{error}")))?;
             return Ok(Source::Named(set));
         };
         if data.set.is_some() {
-            return Err(wrong("format", "is given beside data.set".into(), "name a set or files, not both"));
+            return Err(wrong(
+                "format",
+                "is given beside data.set".into(),
+                "name a set or files, not both",
+            ));
         }
         let part = |name: &str, values: &Option<String>, labels: &Option<String>| {
             let Some(path) = values else { return Ok(None) };
@@ -50,12 +56,17 @@ impl Config {
                     PartFile::Csv { path, label }
                 }
                 other => {
-                    return Err(wrong("format", format!("is \"{other}\""), "it is idx, npz or csv"));
+                    return Err(wrong(
+                        "format",
+                        format!("is \"{other}\""),
+                        "it is idx, npz or csv",
+                    ));
                 }
             }))
         };
-        let train = part("train", &data.train, &data.train_labels)?
-            .ok_or_else(|| wrong("train", "is missing".into(), "give the file of training examples"))?;
+        let train = part("train", &data.train, &data.train_labels)?.ok_or_else(|| {
+            wrong("train", "is missing".into(), "give the file of training examples")
+        })?;
         Ok(Source::Files(Box::new(FileSet {
             train,
             validation: part("validation", &data.validation, &data.validation_labels)?,

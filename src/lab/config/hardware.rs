@@ -49,8 +49,11 @@ pub(super) fn model_text(name: &str) -> Result<String, ConfigError> {
     }
     let hint = format!("built-in models are {}", model_names().join(", "));
     #[expect(clippy::disallowed_methods, reason = "models live in files")]
-    std::fs::read_to_string(name)
-        .map_err(|error| ConfigError::Unreadable { path: name.into(), error, hint })
+    std::fs::read_to_string(name).map_err(|error| ConfigError::Unreadable {
+        path: name.into(),
+        error,
+        hint,
+    })
 }
 
 /// Reads a model file: every key known, every table with a source.
@@ -144,7 +147,8 @@ mod tests {
 
     #[test]
     fn an_unknown_key_is_shown_with_a_caret_and_the_keys_there_are() {
-        let error = model_file("x.toml", "name = \"x\"\n[adc]\nadc-bit = 8\n").unwrap_err().to_string();
+        let error =
+            model_file("x.toml", "name = \"x\"\n[adc]\nadc-bit = 8\n").unwrap_err().to_string();
         assert!(error.contains("unknown field `adc-bit`, expected one of `bits`"), "{error}");
         assert!(error.contains("line 3") && error.contains('^'), "{error}");
     }

@@ -123,9 +123,11 @@ mod tests {
 
     #[test]
     fn a_resolved_configuration_resolves_to_itself() {
-        let config = with(&["hw.model=prime", "hw.write.increment_max=3", "learning.taps=3"]).unwrap();
+        let config =
+            with(&["hw.model=prime", "hw.write.increment_max=3", "learning.taps=3"]).unwrap();
         let text = config.to_toml();
-        let again = load(&Sources { experiment: Some(("x", &text)), ..Sources::default() }).unwrap();
+        let again =
+            load(&Sources { experiment: Some(("x", &text)), ..Sources::default() }).unwrap();
         assert_eq!(again.to_toml(), text);
         assert_eq!(again.hardware, config.hardware);
     }

@@ -1,5 +1,8 @@
 //! A training in memory: data, trainer, and the records they give.
-#![expect(clippy::disallowed_types, reason = "wall-clock seconds are shown to people, never compared")]
+#![expect(
+    clippy::disallowed_types,
+    reason = "wall-clock seconds are shown to people, never compared"
+)]
 
 use std::collections::BTreeMap;
 use std::time::Instant;
@@ -57,8 +60,7 @@ impl Session {
             let hint = "give it at least one example";
             return Err(RunError::Empty { part: "training", hint });
         }
-        let experiment =
-            config.experiment(split.train.features(), split.train.classes(), image)?;
+        let experiment = config.experiment(split.train.features(), split.train.classes(), image)?;
         let train = match config.train_on {
             TrainOn::Train => split.train,
             TrainOn::All => split.train.joined(&split.validation),
@@ -172,7 +174,10 @@ impl Session {
     }
 
     /// One epoch and its record. `None` when `go_on` said to stop.
-    pub fn epoch(&mut self, go_on: &mut (dyn FnMut(Progress) -> bool + Send)) -> Option<EpochRecord> {
+    pub fn epoch(
+        &mut self,
+        go_on: &mut (dyn FnMut(Progress) -> bool + Send),
+    ) -> Option<EpochRecord> {
         let started = Instant::now();
         let again = matches!(
             self.trainer.experiment().hardware.adc,
@@ -272,7 +277,8 @@ impl Session {
             let of = |event: Event| (event.name().to_owned(), ledger.total(event));
             Event::ALL.into_iter().map(of).filter(|(_, count)| *count > 0).collect()
         };
-        let events = Phase::ALL.map(|phase| (phase.name().to_owned(), totals(engine.ledger(phase))));
+        let events =
+            Phase::ALL.map(|phase| (phase.name().to_owned(), totals(engine.ledger(phase))));
         EpochRecord {
             epoch: self.trainer.epoch(),
             updates: driver.updates(),
@@ -289,9 +295,9 @@ impl Session {
 
 /// The epoch whose state reads the test set, given the records so far.
 pub(super) fn chosen(select: Select, records: &[EpochRecord]) -> Option<u32> {
-    let learnt = records.iter().filter(|record| record.epoch > 0);
+    let mut learnt = records.iter().filter(|record| record.epoch > 0);
     match select {
-        Select::Last => learnt.last().map(|record| record.epoch),
+        Select::Last => learnt.next_back().map(|record| record.epoch),
         Select::BestValidation => {
             let score = |r: &EpochRecord| r.validation.map_or(0, |score| score.correct);
             learnt.max_by_key(|r| (score(r), std::cmp::Reverse(r.epoch))).map(|r| r.epoch)

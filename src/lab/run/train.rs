@@ -96,7 +96,9 @@ pub fn resume(
         let finished = session.trainer().epoch() as usize;
         if records.len() <= finished {
             let found = format!("has {} records, but epoch {finished} is finished", records.len());
-            return Err(folder::FolderError::Content { path: path.join(names::METRICS), found }.into());
+            return Err(
+                folder::FolderError::Content { path: path.join(names::METRICS), found }.into()
+            );
         }
         records.truncate(finished + 1);
     }
@@ -276,7 +278,8 @@ fn heats(session: &Session) -> Vec<Heat> {
     let engine = session.trainer().driver().engine();
     let level_max = engine.hardware().level_bits.level_max();
     let layers = engine.layers().iter();
-    let all = layers.flat_map(|l| l.arrays.iter().zip(l.spec.wiring.pathways()).map(move |p| (l, p)));
+    let all =
+        layers.flat_map(|l| l.arrays.iter().zip(l.spec.wiring.pathways()).map(move |p| (l, p)));
     all.map(|(layer, (array, pathway))| Heat {
         layer: usize::from(layer.index),
         pathway: pathway.name.into(),

@@ -66,14 +66,13 @@ pub fn verify(
         let record = if epoch == 0 {
             session.start()
         } else {
-            let stopped = || RunError::Stopped {
-                epoch: epoch as u32 - 1,
-                path: path.display().to_string(),
-            };
+            let stopped =
+                || RunError::Stopped { epoch: epoch as u32 - 1, path: path.display().to_string() };
             session.epoch(on_batch).ok_or_else(stopped)?
         };
         if record.state_hash != *wanted {
-            let what = kept.get(epoch).map_or_else(String::new, |kept| first_difference(kept, &record));
+            let what =
+                kept.get(epoch).map_or_else(String::new, |kept| first_difference(kept, &record));
             let what = format!("state after epoch {epoch}{what}");
             return different(what, wanted, &record.state_hash);
         }
@@ -84,10 +83,9 @@ pub fn verify(
                 // reading the test set charges a ledger, which is part of the state
                 let state = session.checkpoint();
                 best = Some((score, session.test()));
-                session.restore(&state).map_err(|error| RunError::Checkpoint {
-                    path: "memory".into(),
-                    error,
-                })?;
+                session
+                    .restore(&state)
+                    .map_err(|error| RunError::Checkpoint { path: "memory".into(), error })?;
             }
         }
     }

@@ -5,7 +5,6 @@
 //! the configuration, hash of the data, epoch, updates, state hash. What is read is checked against all of them.
 
 use std::borrow::Cow;
-use std::collections::HashMap;
 
 use bitvec::prelude::*;
 use safetensors::{Dtype, SafeTensors, View};
@@ -22,7 +21,9 @@ pub enum CheckpointError {
     #[error("it is not a checkpoint: {0}; start the run again")]
     Format(#[from] safetensors::SafeTensorError),
     /// Another run's, or another version's.
-    #[error("its {what} is {found}, but this run has {wanted}; it belongs to another run or version")]
+    #[error(
+        "its {what} is {found}, but this run has {wanted}; it belongs to another run or version"
+    )]
     Other {
         /// Which entry.
         what: &'static str,
@@ -137,9 +138,8 @@ pub fn write(trainer: &Trainer, identity: Identity<'_>) -> Vec<u8> {
         ("updates", trainer.driver().updates().to_string()),
         ("state_hash", hash::state(trainer.driver())),
     ];
-    #[expect(clippy::disallowed_types, reason = "the library's signature; it sorts the names")]
-    let metadata: HashMap<String, String> =
-        entries.into_iter().map(|(key, value)| (key.to_owned(), value)).collect();
+    // the library takes a hash map and writes its names in order
+    let metadata = entries.into_iter().map(|(key, value)| (key.to_owned(), value)).collect();
     safetensors::serialize(tensors, Some(metadata)).expect("names are unique and sizes small")
 }
 

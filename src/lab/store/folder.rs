@@ -128,10 +128,16 @@ impl RunFolder {
     /// When the system refuses; the old file is then still there.
     pub fn write(&self, name: &str, bytes: &[u8]) -> Result<(), FolderError> {
         let place = self.path.join(name);
-        let mut file = tempfile::Builder::new()
-            .prefix(".part-")
-            .tempfile_in(&self.path)
-            .map_err(|e| io_error("write", &place, e))?;
+        let mut builder = tempfile::Builder::new();
+        builder.prefix(".part-");
+        #[cfg(unix)]
+        let builder = {
+            // readable by whom the user's mask allows, as any other file
+            use std::os::unix::fs::PermissionsExt;
+            builder.permissions(fs::Permissions::from_mode(0o666))
+        };
+        let file = builder.tempfile_in(&self.path);
+        let mut file = file.map_err(|e| io_error("write", &place, e))?;
         let written = file.write_all(bytes).and_then(|()| file.as_file().sync_all());
         written.map_err(|e| io_error("write", &place, e))?;
         file.persist(&place).map_err(|e| io_error("write", &place, e.error))?;
