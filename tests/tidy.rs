@@ -56,7 +56,8 @@ fn sources(folder: &str) -> Vec<String> {
 
 fn walk(folder: &Path, found: &mut Vec<String>) {
     let entries = fs::read_dir(folder).unwrap_or_else(|e| panic!("{}: {e}", folder.display()));
-    let mut paths: Vec<_> = entries.map(|entry| entry.expect("a folder can be listed").path()).collect();
+    let mut paths: Vec<_> =
+        entries.map(|entry| entry.expect("a folder can be listed").path()).collect();
     paths.sort();
     for path in paths {
         // what .gitignore names
