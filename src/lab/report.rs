@@ -6,7 +6,7 @@
 //! ```
 //!
 //! Counts come as the records give them; all division happens here (docs/GLOSSARY.md, docs/MODEL.md, 4).
-//! A figure is one file under `report/figures/` and one line in [`figures::ALL`].
+//! A figure is one file under `report/figures/` and one line in `figures::ALL`.
 
 mod chart;
 mod colour;

@@ -1,6 +1,7 @@
 //! Tests of the whole program, through its public faces.
 
 mod bad_input;
+mod laws;
 mod oracle;
 mod program;
 mod rules;

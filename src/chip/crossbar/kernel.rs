@@ -1,4 +1,4 @@
-//! The loops that touch every cell. [`scalar`] is the law; every other back end gives its bits.
+//! The loops that touch every cell. `scalar` is the law; every other back end gives its bits.
 //!
 //! All sums are `i32`: a read adds at most 33,025 products of two bytes (the plan cuts longer columns into
 //! chunks), an update at most 4,096 products of a drive (0..=255) and a gate (-127..=127), times a mantissa

@@ -331,6 +331,7 @@ impl Engine {
             std::array::from_fn(|a| periphery::drive(u8::try_from(a).expect("a byte"), bits));
         let samples = self.samples;
         let (head, tail) = self.registers.split_at_mut(layer + 1);
+        assert!(tail[0].pending == 0, "sums wait to be programmed");
         for &source in next.spec.wiring.sources() {
             let activity = &head[layer].activity[source.index()];
             let drives = &mut tail[0].drives[source.index()];

@@ -29,6 +29,9 @@ impl Engine {
         let this = &self.layers[layer];
         let (taps, units, wiring) = (&this.taps, this.layout.columns, this.spec.wiring);
         assert_eq!(words.len(), samples.len() * taps.width, "a word a bus slot and sample");
+        // sums are formed when they are programmed: what they are formed of must still be there
+        let pending = self.registers[layer].pending;
+        assert!(samples.is_empty() || samples.start >= pending, "sums wait to be programmed");
         let bits = self.hardware.error_bits;
         let (loaded, padded) = (self.samples, this.layout.columns_padded());
         let registers = &mut self.registers[layer];

@@ -1,0 +1,200 @@
+//! Any valid chip, any small network on it, any list of choices.
+
+use dalean::chip::hardware::{
+    Adc, AdcRange, DitherBits, DitherPattern, FloorKind, Hardware, Subtract, Window,
+};
+use dalean::chip::layer::{LayerSpec, Taps};
+use dalean::chip::population::Wiring;
+use dalean::num::fixed::*;
+use dalean::num::tables::{Activation, Positive};
+use proptest::prelude::*;
+
+/// Numbers from a seed; the tests' own, so that no draw of the chip is tested with itself.
+#[derive(Debug, Clone)]
+pub(crate) struct Numbers(pub(crate) u64);
+
+impl Numbers {
+    pub(crate) fn next(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        z ^ (z >> 31)
+    }
+
+    /// A number in `from..=to`.
+    pub(crate) fn within(&mut self, from: i64, to: i64) -> i64 {
+        from + (self.next() % (to - from + 1) as u64) as i64
+    }
+}
+
+/// A network on a chip, before any level is loaded.
+#[derive(Debug, Clone)]
+pub(crate) struct Net {
+    pub(crate) seed: u64,
+    pub(crate) hardware: Hardware,
+    pub(crate) specs: Vec<LayerSpec>,
+    pub(crate) taps: Vec<Taps>,
+    pub(crate) mantissa: u32,
+    pub(crate) potentiation_only: bool,
+}
+
+impl Net {
+    /// Cells, the measure of how long a case takes.
+    pub(crate) fn cells(&self) -> usize {
+        self.specs.iter().map(|s| s.inputs * s.units * s.wiring.pathways().len()).sum()
+    }
+}
+
+/// Sides of arrays: mostly small, often beside the edge of a half, a panel, a block or two.
+pub(crate) fn side() -> impl Strategy<Value = usize> {
+    prop_oneof![
+        5 => 1usize..=12,
+        3 => prop::sample::select(vec![15, 16, 17, 31, 32, 33, 63, 64, 65, 70]),
+        1 => prop::sample::select(vec![96, 127, 128, 129, 140]),
+    ]
+}
+
+fn window(bits: LevelBits, ends: Option<[u16; 2]>) -> Window {
+    let max = i64::from(bits.level_max());
+    let (mut floor, mut ceiling) = (0, max);
+    if let Some(ends) = ends {
+        let [a, b] = ends.map(|end| i64::from(end) % (max + 1));
+        (floor, ceiling) = (a.min(b), a.max(b));
+        if floor == ceiling {
+            (floor, ceiling) = if ceiling < max { (floor, ceiling + 1) } else { (floor - 1, max) };
+        }
+    }
+    Window::new(floor, ceiling, bits).unwrap()
+}
+
+fn adc() -> impl Strategy<Value = Adc> {
+    let range = prop_oneof![
+        (0u32..=12).prop_map(AdcRange::Shift),
+        Just(AdcRange::Full),
+        (0u32..=3, any::<bool>())
+            .prop_map(|(headroom, every_epoch)| AdcRange::Calibrated { headroom, every_epoch }),
+    ];
+    let subtract = prop::sample::select(vec![Subtract::Digital, Subtract::Current]);
+    let finite = (2i64..=16, subtract, range).prop_map(|(bits, subtract, range)| Adc::Finite {
+        bits: AdcBits::new(bits).unwrap(),
+        subtract,
+        range,
+    });
+    prop_oneof![2 => Just(Adc::Ideal), 3 => finite]
+}
+
+/// Any chip. Tiles are at least an eighth of `widest`, so that a case ends soon.
+pub(crate) fn hardware(widest: usize) -> impl Strategy<Value = Hardware> {
+    let ends = prop::option::weighted(0.5, any::<[u16; 2]>());
+    let cells = (1i64..=12, ends, any::<bool>(), prop_oneof![3 => Just(0i64), 2 => 1i64..=15]);
+    let least = (widest / 8).max(1);
+    let tile_rows = prop_oneof![least..=200, least..=widest];
+    let tiles = (tile_rows, 1usize..=200, any::<bool>());
+    let words = (1i64..=8, any::<u32>(), adc(), 2i64..=14, 2i64..=9);
+    let dither = (
+        prop::sample::select(vec![DitherBits::Zero, DitherBits::Eight, DitherBits::Sixteen]),
+        prop::sample::select(vec![DitherPattern::PerCell, DitherPattern::Separable]),
+        prop_oneof![1i64..=7, 1i64..=127],
+    );
+    (cells, tiles, words, dither).prop_map(
+        |(
+            (level_bits, ends, absorbs, residual_bits),
+            (tile_rows, tile_columns, transposed_read),
+            (drive_bits, dac_bits, adc, lut_bits, error_bits),
+            (dither_bits, dither_pattern, increment_max),
+        )| {
+            let level_bits = LevelBits::new(level_bits).unwrap();
+            let drive_bits = DriveBits::new(drive_bits).unwrap();
+            Hardware {
+                level_bits,
+                window: window(level_bits, ends),
+                floor_kind: if absorbs { FloorKind::Absorbing } else { FloorKind::Recoverable },
+                tile_rows,
+                tile_columns,
+                tiles_max: None,
+                transposed_read,
+                drive_bits,
+                dac_bits: 1 + dac_bits % drive_bits.get(),
+                adc,
+                lut_bits: LutBits::new(lut_bits).unwrap(),
+                error_bits: ErrorBits::new(error_bits).unwrap(),
+                increment_max: IncrementMax::new(increment_max).unwrap(),
+                dither_bits,
+                dither_pattern,
+                residual_bits: ResidualBits::new(residual_bits).unwrap(),
+            }
+        },
+    )
+}
+
+pub(crate) fn activation() -> impl Strategy<Value = Activation> {
+    let alpha = prop::sample::select(vec![0.5, 1.0, 4.0, 6.0]);
+    prop_oneof![
+        3 => alpha.prop_map(|alpha| Activation::Sigmoid(Positive::new(alpha).unwrap())),
+        1 => Just(Activation::Relu),
+        1 => Just(Activation::Identity),
+    ]
+}
+
+/// How the arrays of all layers are wired: `(hidden, last)`.
+pub(crate) fn wiring() -> impl Strategy<Value = (Wiring, Wiring)> {
+    prop::sample::select(vec![
+        (Wiring::Dual, Wiring::DualReadout),
+        (Wiring::Dual, Wiring::Dual),
+        (Wiring::Single, Wiring::Single),
+    ])
+}
+
+/// A network whose layers have these sides, on any chip.
+pub(crate) fn net(sides: impl Strategy<Value = Vec<usize>>) -> impl Strategy<Value = Net> {
+    let chip = sides.prop_flat_map(|sides| {
+        let widest = *sides.iter().max().unwrap();
+        let layers =
+            prop::collection::vec((activation(), -1i32..=4, any::<bool>()), sides.len() - 1);
+        (Just(sides), hardware(widest), layers, wiring())
+    });
+    let learning = (any::<u64>(), prop_oneof![Just(1u32), 1u32..=15], prop::bool::weighted(0.2));
+    (chip, learning).prop_map(
+        |((sides, hardware, layers, (hidden, last)), (seed, mantissa, potentiation_only))| {
+            let mut numbers = Numbers(seed);
+            let count = layers.len();
+            let (mut specs, mut taps) = (vec![], vec![]);
+            for (at, (activation, weight_max_log2, constant_row)) in layers.into_iter().enumerate()
+            {
+                specs.push(LayerSpec {
+                    inputs: sides[at],
+                    units: sides[at + 1],
+                    wiring: if at + 1 == count { last } else { hidden },
+                    activation,
+                    weight_max_log2,
+                    gain_64ths: [96, 32],
+                    constant_row,
+                });
+                let width = numbers.within(1, 17);
+                let per_unit = numbers.within(1, width.min(4)) as usize;
+                let words = sides[at + 1] * per_unit;
+                let words = (0..words).map(|_| numbers.within(0, width - 1) as u16).collect();
+                let shift = numbers.within(0, 2) as u32;
+                taps.push(Taps { width: width as usize, per_unit, words, shift });
+            }
+            Net { seed, hardware, specs, taps, mantissa, potentiation_only }
+        },
+    )
+}
+
+/// Any network of one to three layers.
+pub(crate) fn any_net() -> impl Strategy<Value = Net> {
+    net(prop::collection::vec(side(), 2..=4))
+}
+
+/// One decision: what to do, and with which numbers.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Choice {
+    pub(crate) kind: u8,
+    pub(crate) seed: u64,
+}
+
+pub(crate) fn choices() -> impl Strategy<Value = Vec<Choice>> {
+    let one = (any::<u8>(), any::<u64>()).prop_map(|(kind, seed)| Choice { kind, seed });
+    prop::collection::vec(one, 2..=14)
+}

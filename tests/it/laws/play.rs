@@ -1,0 +1,428 @@
+//! Choices become operations, whatever the order; the engine and its shadow carry them out side by side.
+
+use std::ops::Range;
+
+use dalean::chip::crossbar::kernel::Backend;
+use dalean::chip::engine::{Calibration, Engine, Operation, Phase, Side, Write};
+use dalean::chip::hardware::Adc;
+use dalean::chip::layer::Layer;
+use dalean::chip::ledger::Ledger;
+
+use super::choose::{Choice, Net, Numbers};
+use super::fault::Fault;
+use super::shadow::{Shadow, Table};
+
+/// An operation with numbers of its own.
+#[derive(Debug, Clone)]
+pub(crate) enum Op {
+    Levels { layer: usize, array: usize, row: usize, levels: Vec<u16> },
+    Drives(Vec<u8>),
+    Forward(usize),
+    Backward(usize),
+    Error { layer: usize, samples: Range<usize>, words: Vec<i16> },
+    Update { layer: usize, write: Write, samples: Range<usize>, shift: u32 },
+    Calibrate(Vec<u8>),
+    Charge(Phase),
+}
+
+/// What may come next: the order of operations that registers allow.
+struct Script<'a> {
+    net: &'a Net,
+    numbers: Numbers,
+    ops: Vec<Op>,
+    samples: usize,
+    /// Layers read since the samples were loaded.
+    read: usize,
+    /// By layer and sample: whether gates were formed since the samples were loaded.
+    gates: Vec<Vec<bool>>,
+    /// Samples added and not yet written.
+    pending: Vec<usize>,
+}
+
+/// A list of valid operations, from any list of choices.
+pub(crate) fn script(net: &Net, choices: &[Choice]) -> Vec<Op> {
+    let count = net.specs.len();
+    let mut script = Script {
+        net,
+        numbers: Numbers(net.seed),
+        ops: vec![],
+        samples: 0,
+        read: 0,
+        gates: vec![vec![]; count],
+        pending: vec![0; count],
+    };
+    for layer in 0..count {
+        for array in 0..net.specs[layer].wiring.pathways().len() {
+            let style = script.numbers.within(0, 5);
+            for row in 0..net.specs[layer].inputs + usize::from(net.specs[layer].constant_row) {
+                script.levels(layer, array, row, style);
+            }
+        }
+    }
+    for choice in choices {
+        script.numbers = Numbers(choice.seed);
+        script.choose(choice.kind % 16);
+    }
+    script.ops
+}
+
+impl Script<'_> {
+    fn pick(&mut self, below: usize) -> usize {
+        self.numbers.within(0, below as i64 - 1) as usize
+    }
+
+    fn levels(&mut self, layer: usize, array: usize, row: usize, style: i64) {
+        let window = self.net.hardware.window;
+        let (floor, ceiling) = (i64::from(window.floor()), i64::from(window.ceiling()));
+        let numbers = &mut self.numbers;
+        let level = |_| match style {
+            0 => floor,
+            1 => ceiling,
+            2 => numbers.within(floor, (floor + 2).min(ceiling)),
+            _ => numbers.within(floor, ceiling),
+        };
+        let levels = (0..self.net.specs[layer].units).map(level).map(|v| v as u16).collect();
+        self.ops.push(Op::Levels { layer, array, row, levels });
+    }
+
+    fn codes(&mut self) -> Vec<u8> {
+        let most = (600_000 / self.net.cells()).clamp(1, 20);
+        self.samples = 1 + self.pick(most);
+        let inputs = self.net.specs[0].inputs;
+        let greatest = (1i64 << self.net.hardware.drive_bits.get()) - 1;
+        let style = self.pick(7);
+        let numbers = &mut self.numbers;
+        let code = |at: usize| match style {
+            0 => greatest,
+            1 => 0,
+            // rows that are dark in every sample, whole blocks of them among others
+            2 if (at % inputs / 64).is_multiple_of(2) => 0,
+            3 if numbers.within(0, 9) > 0 => 0,
+            _ => numbers.within(0, greatest),
+        };
+        (0..self.samples * inputs).map(code).map(|code| code as u8).collect()
+    }
+
+    fn loaded(&mut self) {
+        self.read = 0;
+        self.gates = vec![vec![false; self.samples]; self.net.specs.len()];
+    }
+
+    fn write_pending(&mut self, layer: usize) {
+        if self.pending[layer] > 0 {
+            self.program(layer);
+        }
+    }
+
+    fn batch(&mut self) {
+        (0..self.net.specs.len()).for_each(|layer| self.write_pending(layer));
+        let codes = self.codes();
+        self.ops.push(Op::Drives(codes));
+        self.loaded();
+    }
+
+    /// Reads one layer whose drives are there.
+    fn forward(&mut self, layer: usize) {
+        if self.samples == 0 {
+            self.batch();
+        }
+        let layer = layer.min(self.read);
+        if layer + 1 < self.net.specs.len() {
+            self.write_pending(layer + 1);
+        }
+        self.ops.push(Op::Forward(layer));
+        self.read = self.read.max(layer + 1);
+    }
+
+    fn error(&mut self, layer: usize, all: bool) {
+        while self.read <= layer {
+            self.forward(self.read);
+        }
+        let from = if all { 0 } else { self.pick(self.samples) };
+        let to = if all { self.samples } else { from + self.pick(self.samples - from + 1) };
+        if from < to && from < self.pending[layer] {
+            self.program(layer);
+        }
+        let rail = (1i64 << (self.net.hardware.error_bits.get() - 1)) - 1;
+        let width = self.net.taps[layer].width;
+        let style = self.pick(6);
+        let numbers = &mut self.numbers;
+        let word = |_| match style {
+            0 => rail,
+            1 => -rail,
+            2 => 0,
+            3 if numbers.within(0, 9) > 0 => 0,
+            // wider than a bus: every clamp behind it is reached
+            4 => numbers.within(-1000, 1000),
+            _ => numbers.within(-rail, rail),
+        };
+        let words = (0..(to - from) * width).map(word).map(|word| word as i16).collect();
+        self.ops.push(Op::Error { layer, samples: from..to, words });
+        self.gates[layer][from..to].fill(true);
+    }
+
+    /// A shift that often moves cells, and sometimes any.
+    fn shift(&mut self) -> u32 {
+        let shift =
+            if self.pick(4) == 0 { self.numbers.within(0, 30) } else { self.numbers.within(6, 18) };
+        shift as u32
+    }
+
+    fn program(&mut self, layer: usize) {
+        let shift = self.shift();
+        self.ops.push(Op::Update { layer, write: Write::Program, samples: 0..0, shift });
+        self.pending[layer] = 0;
+    }
+
+    /// Adds some of the samples that come next and have gates.
+    fn add(&mut self, layer: usize, all: bool) {
+        let from = self.pending[layer];
+        if !self.gates[layer].get(from).copied().unwrap_or(false) {
+            if from > 0 || self.samples == 0 {
+                return self.program(layer);
+            }
+            self.error(layer, true);
+        }
+        let ready = self.gates[layer][from..].iter().take_while(|ready| **ready).count();
+        let to = from + if all { ready } else { 1 + self.pick(ready) };
+        self.ops.push(Op::Update { layer, write: Write::Add, samples: from..to, shift: 0 });
+        self.pending[layer] = to;
+    }
+
+    fn now(&mut self, layer: usize) {
+        self.write_pending(layer);
+        if self.samples == 0 || !self.gates[layer].iter().any(|ready| *ready) {
+            self.error(layer, true);
+        }
+        let ready: Vec<usize> =
+            (0..self.samples).filter(|&sample| self.gates[layer][sample]).collect();
+        let sample = ready[self.pick(ready.len())];
+        let shift = self.shift();
+        self.ops.push(Op::Update { layer, write: Write::Now, samples: sample..sample + 1, shift });
+    }
+
+    fn choose(&mut self, kind: u8) {
+        let count = self.net.specs.len();
+        let layer = self.pick(count);
+        match kind {
+            0 => self.batch(),
+            1 => self.forward(layer),
+            2 => self.error(layer, false),
+            3 => self.now(layer),
+            4 => self.add(layer, false),
+            5 => self.program(layer),
+            6 => {
+                let spec = &self.net.specs[layer];
+                let rows = spec.inputs + usize::from(spec.constant_row);
+                let arrays = spec.wiring.pathways().len();
+                let (array, row, style) = (self.pick(arrays), self.pick(rows), self.pick(6));
+                self.levels(layer, array, row, style as i64);
+            }
+            7 | 8 if self.net.hardware.transposed_read && self.net.hardware.adc == Adc::Ideal => {
+                if self.gates[layer].is_empty() || self.gates[layer].contains(&false) {
+                    self.error(layer, true);
+                }
+                self.ops.push(Op::Backward(layer));
+            }
+            9 if self.net.hardware.adc != Adc::Ideal => {
+                (0..count).for_each(|layer| self.write_pending(layer));
+                let codes = self.codes();
+                self.ops.push(Op::Calibrate(codes));
+                self.loaded();
+                self.read = count;
+            }
+            10 => {
+                let phase = Phase::ALL[self.pick(3)];
+                self.ops.push(Op::Charge(phase));
+            }
+            _ => {
+                self.batch();
+                (0..count).for_each(|layer| self.forward(layer));
+                (0..count).for_each(|layer| self.error(layer, true));
+                for layer in 0..count {
+                    if kind == 11 {
+                        self.now(layer);
+                    } else {
+                        self.add(layer, true);
+                        self.program(layer);
+                    }
+                }
+            }
+        }
+    }
+}
+
+pub(crate) fn engine(net: &Net, backend: Backend) -> Engine {
+    let layers = net.specs.iter().zip(&net.taps).zip(0u16..);
+    let layers = layers
+        .map(|((spec, taps), index)| Layer::new(index, spec.clone(), taps.clone(), &net.hardware));
+    let mut engine = Engine::new(net.hardware, backend, net.seed, layers.collect());
+    engine.set_mantissa(net.mantissa);
+    engine.set_potentiation_only(net.potentiation_only);
+    engine
+}
+
+pub(crate) fn execute(engine: &mut Engine, op: &Op) -> Option<Calibration> {
+    let operation = match op {
+        Op::Levels { layer, array, row, levels } => {
+            Operation::LoadWeights { layer: *layer, array: *array, row: *row, levels }
+        }
+        Op::Drives(codes) => Operation::LoadDrives { codes },
+        Op::Forward(layer) => Operation::Forward { layer: *layer, side: Side::Rows },
+        Op::Backward(layer) => Operation::Forward { layer: *layer, side: Side::Columns },
+        Op::Error { layer, samples, words } => {
+            Operation::Error { layer: *layer, samples: samples.clone(), words }
+        }
+        Op::Update { layer, write, samples, shift } => Operation::Update {
+            layer: *layer,
+            write: *write,
+            samples: samples.clone(),
+            shift: *shift,
+        },
+        Op::Calibrate(codes) => return engine.calibrate(codes),
+        Op::Charge(phase) => {
+            engine.set_phase(*phase);
+            return None;
+        }
+    };
+    engine.execute(&operation);
+    None
+}
+
+fn shadow_execute(shadow: &mut Shadow, pending: &mut [usize], op: &Op) -> Option<Calibration> {
+    match op {
+        Op::Levels { layer, array, row, levels } => {
+            shadow.load_weights(*layer, *array, *row, levels);
+        }
+        Op::Drives(codes) => shadow.load_drives(codes),
+        Op::Forward(layer) => shadow.forward(*layer),
+        Op::Backward(layer) => shadow.forward_columns(*layer),
+        Op::Error { layer, samples, words } => shadow.error(*layer, samples.clone(), words),
+        Op::Update { layer, write, samples, shift } => {
+            if *write != Write::Program {
+                shadow.add(*layer, samples.clone());
+                pending[*layer] += samples.len();
+            }
+            if *write != Write::Add {
+                let nothing = std::mem::take(&mut pending[*layer]) == 0;
+                shadow.program(*layer, *shift, nothing);
+            }
+        }
+        Op::Calibrate(codes) => return shadow.calibrate(codes),
+        Op::Charge(phase) => shadow.charge_to(*phase),
+    }
+    None
+}
+
+/// Carries out `ops` on the shadow and on every back end, and compares them after each.
+pub(crate) fn law(
+    net: &Net,
+    ops: &[Op],
+    backends: &[Backend],
+    fault: Option<Fault>,
+) -> Result<(), String> {
+    let mut shadow = Shadow::new(net, fault);
+    let mut engines: Vec<Engine> = backends.iter().map(|&b| engine(net, b)).collect();
+    let mut pending = vec![0; net.specs.len()];
+    for (at, op) in ops.iter().enumerate() {
+        let found = shadow_execute(&mut shadow, &mut pending, op);
+        for engine in &mut engines {
+            let name = engine.backend().name();
+            let fail = |what: String| format!("{name} after operation {at}, {op:?}: {what}");
+            let calibration = execute(engine, op);
+            if calibration != found {
+                return Err(fail(format!("{calibration:?}, but the law says {found:?}")));
+            }
+            compare_step(engine, &shadow, op).map_err(fail)?;
+        }
+    }
+    for engine in &engines {
+        (0..net.specs.len()).try_for_each(|layer| compare_cells(engine, &shadow, layer))?;
+    }
+    Ok(())
+}
+
+fn compare_step(engine: &Engine, shadow: &Shadow, op: &Op) -> Result<(), String> {
+    for (phase, want) in Phase::ALL.into_iter().zip(&shadow.ledgers) {
+        compare_ledgers(engine.ledger(phase), want)?;
+    }
+    let last = shadow.layers.len() - 1;
+    match op {
+        Op::Forward(layer) if *layer == last => compare_outputs(engine, shadow),
+        Op::Calibrate(_) => compare_outputs(engine, shadow),
+        Op::Backward(layer) if engine.backward(*layer) != shadow.layers[*layer].backward => {
+            Err("row sums differ".into())
+        }
+        Op::Update { layer, .. } | Op::Levels { layer, .. } => {
+            compare_cells(engine, shadow, *layer)
+        }
+        _ => Ok(()),
+    }
+}
+
+fn compare_ledgers(got: &Ledger, want: &Ledger) -> Result<(), String> {
+    if got == want {
+        return Ok(());
+    }
+    let entry = |(layer, code, during, event, count)| {
+        format!("layer {layer} code {code} {during:?} {event:?} {count}")
+    };
+    let lines = |ledger: &Ledger| ledger.entries().map(entry).collect::<Vec<_>>();
+    let (got, want) = (lines(got), lines(want));
+    let only = |these: &[String], those: &[String]| -> Vec<String> {
+        these.iter().filter(|line| !those.contains(line)).cloned().collect()
+    };
+    Err(format!("counts {:?}, but the law says {:?}", only(&got, &want), only(&want, &got)))
+}
+
+fn compare_outputs(engine: &Engine, shadow: &Shadow) -> Result<(), String> {
+    let layer = shadow.layers.last().unwrap();
+    for (sample, row) in layer.accumulators[0].iter().enumerate() {
+        for (unit, &want) in row.iter().enumerate() {
+            let got = engine.output_accumulator(sample, unit);
+            if got != want {
+                return Err(format!("accumulator {sample}, {unit} is {got}, not {want}"));
+            }
+            let (got, want) =
+                (engine.output_activity(sample, unit), layer.activity[0][sample][unit]);
+            if i64::from(got) != want {
+                return Err(format!("activity {sample}, {unit} is {got}, not {want}"));
+            }
+        }
+    }
+    Ok(())
+}
+
+fn compare_cells(engine: &Engine, shadow: &Shadow, layer: usize) -> Result<(), String> {
+    let (got, want) = (&engine.layers()[layer], &shadow.layers[layer]);
+    let window = shadow.net.hardware.window;
+    let flat = |table: &Table| -> Vec<i64> { table.concat() };
+    for (at, (array, want)) in got.arrays.iter().zip(&want.arrays).enumerate() {
+        let levels: Vec<i64> = array.levels().map(i64::from).collect();
+        let inside =
+            |v: &i64| (i64::from(window.floor())..=i64::from(window.ceiling())).contains(v);
+        if !levels.iter().all(inside) {
+            return Err(format!("layer {layer} array {at}: a level left the window"));
+        }
+        if levels != flat(&want.level) {
+            let cell = levels.iter().zip(flat(&want.level)).position(|(a, b)| *a != b);
+            return Err(format!("layer {layer} array {at}: the level of cell {cell:?} differs"));
+        }
+        let left =
+            array.residuals().map(|left| left.into_iter().map(i64::from).collect::<Vec<_>>());
+        if left.is_some_and(|left| left != flat(&want.residual)) {
+            return Err(format!("layer {layer} array {at}: remainders differ"));
+        }
+        let gone = array.pruned().map(|bits| bits.iter().by_vals().collect::<Vec<_>>());
+        if gone.is_some_and(|gone| gone != want.pruned.concat()) {
+            return Err(format!("layer {layer} array {at}: pruned cells differ"));
+        }
+        if got.writes[at] != want.writes {
+            return Err(format!("layer {layer} array {at}: write counts differ"));
+        }
+    }
+    if got.adc_shifts != want.adc_shifts {
+        return Err(format!("layer {layer}: converter shifts differ"));
+    }
+    Ok(())
+}

@@ -1,0 +1,204 @@
+//! Law 3: a run has one state, however it is carried out.
+
+use dalean::chip::crossbar::kernel::Backend;
+use dalean::chip::engine::Phase;
+use dalean::chip::hardware::{Adc, AdcRange};
+use dalean::chip::layer::LayerSpec;
+use dalean::chip::ledger::Event;
+use dalean::chip::population::Wiring;
+use dalean::lab::store::checkpoint::{self, Identity};
+use dalean::lab::store::hash;
+use dalean::learn::error::Centre;
+use dalean::learn::route::Route;
+use dalean::learn::rule::{Rule, UpdateMode};
+use dalean::num::fixed::{Batch, RateMantissa};
+use dalean::num::tables::{Decay, Positive};
+use dalean::task::classify::{Augment, Examples, Experiment, Trainer};
+use proptest::prelude::*;
+
+use super::choose::{Numbers, activation, hardware, side};
+use super::config;
+
+/// A small random training.
+#[derive(Debug, Clone)]
+struct Run {
+    experiment: Experiment,
+    data: Examples,
+    /// Epochs before the interruption.
+    stop: u32,
+}
+
+fn examples(seed: u64, features: usize, classes: usize) -> Examples {
+    let mut numbers = Numbers(seed);
+    let count = numbers.within(1, 30) as usize;
+    let values = (0..count * features).map(|_| numbers.within(0, 16) * numbers.within(0, 1));
+    let values = values.map(|v| v as u8).collect();
+    let labels = (0..count).map(|i| (i % classes) as u8).collect();
+    Examples::new(values, labels, features, 16, classes).unwrap()
+}
+
+fn rule() -> impl Strategy<Value = Rule> {
+    prop::sample::select(vec![Rule::Ed, Rule::Ed, Rule::Kaneko, Rule::Dfa, Rule::Bp])
+}
+
+fn route(raw: [u8; 2], outputs: usize) -> Route {
+    let taps = 1 + usize::from(raw[1]) % outputs.min(4);
+    match raw[0] % 6 {
+        0 => Route::RandomSparse,
+        1 => Route::ScalarBroadcast,
+        2 => Route::RandomDense { shift: None },
+        3 => Route::Modulo { taps, shift: Some(0) },
+        _ => Route::Modulo { taps, shift: None },
+    }
+}
+
+fn run() -> impl Strategy<Value = Run> {
+    let sides = (prop::collection::vec(side(), 1..=3), prop_oneof![Just(1usize), 2usize..=6]);
+    let chip = sides.prop_flat_map(|(mut sides, outputs)| {
+        sides.push(outputs);
+        let widest = *sides.iter().max().unwrap();
+        let layers = prop::collection::vec(
+            (activation(), -1i32..=4, any::<bool>(), 0..4usize),
+            sides.len() - 1,
+        );
+        (Just(sides), hardware(widest), layers)
+    });
+    let centres = vec![Centre::None, Centre::Batch, Centre::Running];
+    let modes = vec![UpdateMode::Accumulate, UpdateMode::Replay, UpdateMode::Online];
+    let learning = (
+        rule(),
+        prop::sample::select(modes),
+        prop::sample::select(centres),
+        any::<[u8; 2]>(),
+        1i64..=12,
+        1i64..=15,
+        prop::sample::select(vec![Decay::Constant, Decay::Cosine]),
+    );
+    let times = (any::<u64>(), 2u32..=3, 0u32..=2, any::<bool>());
+    (chip, learning, times).prop_map(|((sides, mut hardware, layers), learning, times)| {
+        let (rule, mode, mut centre, raw, batch, mantissa, decay) = learning;
+        let (seed, epochs, stop, moved) = times;
+        let outputs = *sides.last().unwrap();
+        if mode == UpdateMode::Online && centre == Centre::Batch {
+            centre = Centre::None;
+        }
+        if rule == Rule::Bp {
+            (hardware.adc, hardware.transposed_read) = (Adc::Ideal, true);
+        }
+        let count = layers.len();
+        let rates = [1.0, 20.0, 300.0, 5000.0];
+        let rates = layers.iter().map(|layer| Positive::new(rates[layer.3]).unwrap()).collect();
+        let specs =
+            layers.into_iter().enumerate().map(|(at, (activation, weight, row, _))| LayerSpec {
+                inputs: sides[at],
+                units: sides[at + 1],
+                wiring: match rule {
+                    Rule::Dfa | Rule::Bp => Wiring::Single,
+                    _ if at + 1 == count => Wiring::DualReadout,
+                    _ => Wiring::Dual,
+                },
+                activation,
+                weight_max_log2: weight,
+                gain_64ths: [96, 32],
+                constant_row: row,
+            });
+        let image = Augment { pixels: 1, height: 1, width: sides[0], channels: 1 };
+        let experiment = Experiment {
+            seed,
+            hardware,
+            layers: specs.collect(),
+            rule,
+            mode,
+            centre,
+            route: route(raw, outputs),
+            batch: Batch::new(batch).unwrap(),
+            mantissa: RateMantissa::new(mantissa).unwrap(),
+            rates,
+            decay,
+            epochs,
+            augment: moved.then_some(image),
+        };
+        let data = examples(seed, sides[0], outputs.max(2));
+        Run { experiment, data, stop: stop.min(epochs) }
+    })
+}
+
+const IDENTITY: Identity<'_> = Identity { config: "config", data: "data" };
+
+fn fresh(run: &Run, backend: Backend) -> Trainer {
+    let seeded = run.experiment.build(backend, run.data.len()).unwrap();
+    let mut trainer = Trainer::new(run.experiment.clone(), seeded);
+    trainer.calibrate(&run.data);
+    trainer
+}
+
+/// Trains up to an epoch; the state after each.
+fn go_on(run: &Run, trainer: &mut Trainer, until: u32) -> Vec<String> {
+    let mut hashes = vec![hash::state(trainer.driver())];
+    let again = matches!(
+        run.experiment.hardware.adc,
+        Adc::Finite { range: AdcRange::Calibrated { every_epoch: true, .. }, .. }
+    );
+    while trainer.epoch() < until {
+        if again && trainer.epoch() > 0 {
+            trainer.calibrate(&run.data);
+        }
+        trainer.learn(&run.data, &mut |_| true).unwrap();
+        trainer.evaluate(&run.data);
+        hashes.push(hash::state(trainer.driver()));
+    }
+    hashes
+}
+
+fn whole(run: &Run, backend: Backend, threads: usize) -> (Trainer, Vec<String>) {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+    pool.install(|| {
+        let mut trainer = fresh(run, backend);
+        let hashes = go_on(run, &mut trainer, run.experiment.epochs);
+        (trainer, hashes)
+    })
+}
+
+/// Stops after some epochs, learns a little more that is lost, and goes on from the checkpoint.
+fn interrupted(run: &Run) -> String {
+    let mut first = fresh(run, Backend::best());
+    go_on(run, &mut first, run.stop);
+    let bytes = checkpoint::write(&first, IDENTITY);
+    if first.epoch() < run.experiment.epochs {
+        let _ = first.learn(&run.data, &mut |_| false);
+    }
+    let mut second = fresh(run, Backend::best());
+    checkpoint::read(&bytes, &mut second, IDENTITY).unwrap();
+    go_on(run, &mut second, run.experiment.epochs).pop().unwrap()
+}
+
+/// Everything but the events whose number tiles decide.
+fn untiled(trainer: &Trainer) -> impl PartialEq + std::fmt::Debug + use<> {
+    let engine = trainer.driver().engine();
+    let cells = engine.layers().iter().flat_map(|l| l.arrays.iter().cloned()).collect::<Vec<_>>();
+    let writes: Vec<_> = engine.layers().iter().flat_map(|l| l.writes.clone()).collect();
+    let tiled = [Event::DacSlices, Event::Holds, Event::Conversions, Event::ShiftAdds];
+    let events = Event::ALL.into_iter().filter(move |event| !tiled.contains(event));
+    let counts: Vec<_> = events.map(|e| Phase::ALL.map(|p| engine.ledger(p).total(e))).collect();
+    (cells, writes, counts, trainer.driver().unit().means().to_vec())
+}
+
+proptest! {
+    #![proptest_config(config(16))]
+
+    #[test]
+    fn law_3_a_run_has_one_state(run in run(), tiles in (1usize..=200, 1usize..=200)) {
+        let (trainer, want) = whole(&run, Backend::best(), 1);
+        for backend in Backend::available() {
+            let (_, got) = whole(&run, backend, 2);
+            prop_assert_eq!(&got, &want, "{} on 2 threads", backend.name());
+        }
+        prop_assert_eq!(Some(&interrupted(&run)), want.last(), "stopped after {}", run.stop);
+        if run.experiment.hardware.adc == Adc::Ideal {
+            let mut cut = run.clone();
+            (cut.experiment.hardware.tile_rows, cut.experiment.hardware.tile_columns) = tiles;
+            let (recut, _) = whole(&cut, Backend::best(), 1);
+            prop_assert_eq!(untiled(&recut), untiled(&trainer));
+        }
+    }
+}

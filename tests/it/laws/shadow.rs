@@ -1,0 +1,411 @@
+//! A second chip beside the engine: plain `i64`, rows of rows, one cell after the other, nothing skipped.
+//!
+//! It shares with the engine the names of wirings and events, the activation tables and the random words, and
+//! no arithmetic: rounding, sums, converters, gates, pulses and counts are written again from the specification.
+
+use std::ops::Range;
+
+use dalean::chip::engine::{Calibration, Phase};
+use dalean::chip::hardware::{Adc, AdcRange, Subtract};
+use dalean::chip::layer::{self, LayerSpec, Taps};
+use dalean::chip::ledger::{During, Event, Ledger};
+use dalean::chip::population::{Polarity, Stream};
+use dalean::num::tables::Lut;
+
+use super::choose::Net;
+use super::fault::Fault;
+
+mod write;
+
+/// `(v + 2^(s-1)) >> s`, in numbers so wide that nothing can wrap.
+pub(crate) fn rsh(v: i64, s: u32) -> i64 {
+    if s == 0 {
+        return v;
+    }
+    let unit = 1i128 << s;
+    i64::try_from((i128::from(v) + unit / 2).div_euclid(unit)).unwrap()
+}
+
+/// The symmetric range of `bits`, and whether it changed the value.
+pub(crate) fn sat(v: i64, bits: u32) -> (i64, bool) {
+    let rail = 2i64.pow(bits - 1) - 1;
+    (v.clamp(-rail, rail), v.abs() > rail)
+}
+
+/// Rows of numbers.
+pub(crate) type Table = Vec<Vec<i64>>;
+
+/// One array: `[row][column]`.
+#[derive(Debug, Clone)]
+pub(crate) struct Array {
+    pub(crate) level: Table,
+    pub(crate) residual: Table,
+    pub(crate) pruned: Vec<Vec<bool>>,
+    pub(crate) writes: u64,
+    /// The tile's digital accumulators.
+    sums: Table,
+}
+
+/// One layer. What belongs to a stream is `[stream][sample][row or column]`.
+#[derive(Debug, Clone)]
+pub(crate) struct Side {
+    pub(crate) spec: LayerSpec,
+    taps: Taps,
+    lut: Lut,
+    rows: usize,
+    pub(crate) arrays: Vec<Array>,
+    pub(crate) adc_shifts: Vec<Vec<u32>>,
+    drives: [Table; 2],
+    pub(crate) accumulators: [Table; 2],
+    pub(crate) activity: [Table; 2],
+    derivative: [Table; 2],
+    gates: [Table; 2],
+    pub(crate) backward: Vec<i64>,
+}
+
+/// The network, all its registers and what happened so far.
+#[derive(Debug, Clone)]
+pub(crate) struct Shadow {
+    pub(crate) net: Net,
+    fault: Option<Fault>,
+    pub(crate) layers: Vec<Side>,
+    samples: usize,
+    phase: Phase,
+    pub(crate) ledgers: [Ledger; 3],
+}
+
+fn table(rows: usize, columns: usize, value: i64) -> Table {
+    vec![vec![value; columns]; rows]
+}
+
+impl Shadow {
+    pub(crate) fn new(net: &Net, fault: Option<Fault>) -> Self {
+        let hw = net.hardware;
+        let floor = i64::from(hw.window.floor());
+        let layers = net.specs.iter().zip(&net.taps).map(|(spec, taps)| {
+            let rows = spec.inputs + usize::from(spec.constant_row);
+            let array = Array {
+                level: table(rows, spec.units, floor),
+                residual: table(rows, spec.units, 0),
+                pruned: vec![vec![false; spec.units]; rows],
+                writes: 0,
+                sums: table(rows, spec.units, 0),
+            };
+            let shifts = match hw.adc {
+                Adc::Ideal => vec![],
+                Adc::Finite { bits, subtract, range } => {
+                    let slice = (1i64 << hw.dac_bits.min(hw.drive_bits.get())) - 1;
+                    let tallest = rows.min(hw.tile_rows) as i64;
+                    let worst = tallest * i64::from(hw.window.ceiling()) * slice;
+                    let sign = u32::from(subtract == Subtract::Current);
+                    let rail = (1i64 << (bits.get() - sign)) - 1;
+                    let shift = match range {
+                        AdcRange::Shift(shift) => shift,
+                        _ => (0..60).find(|&s| rsh(worst, s) <= rail).unwrap(),
+                    };
+                    let slices = hw.drive_bits.get().div_ceil(hw.dac_bits) as usize;
+                    vec![vec![shift; slices]; spec.wiring.targets().len()]
+                }
+            };
+            Side {
+                spec: spec.clone(),
+                taps: taps.clone(),
+                lut: Lut::new(spec.activation, hw.lut_bits, layer::unit(spec, &hw)),
+                rows,
+                arrays: vec![array; spec.wiring.pathways().len()],
+                adc_shifts: shifts,
+                drives: Default::default(),
+                accumulators: Default::default(),
+                activity: Default::default(),
+                derivative: Default::default(),
+                gates: Default::default(),
+                backward: vec![],
+            }
+        });
+        let ledger = Ledger::new(net.specs.len());
+        Self {
+            net: net.clone(),
+            fault,
+            layers: layers.collect(),
+            samples: 0,
+            phase: Phase::Training,
+            ledgers: [ledger.clone(), ledger.clone(), ledger],
+        }
+    }
+
+    fn is(&self, fault: Fault) -> bool {
+        self.fault == Some(fault)
+    }
+
+    fn count(&mut self, layer: usize, code: u8, during: During, event: Event, count: u64) {
+        self.ledgers[self.phase as usize].add(layer, code, during, event, count);
+    }
+
+    fn code(&self, layer: usize, array: usize) -> u8 {
+        self.layers[layer].spec.wiring.pathways()[array].code
+    }
+
+    /// Units are counted at their excitatory bank.
+    fn unit_code(&self, layer: usize, target: Stream) -> u8 {
+        self.code(layer, self.layers[layer].spec.wiring.banks(target)[0])
+    }
+
+    pub(crate) fn charge_to(&mut self, phase: Phase) {
+        self.phase = phase;
+    }
+
+    pub(crate) fn load_weights(&mut self, layer: usize, array: usize, row: usize, levels: &[u16]) {
+        self.layers[layer].arrays[array].level[row] =
+            levels.iter().map(|&v| i64::from(v)).collect();
+        let (code, cells) = (self.code(layer, array), levels.len() as u64);
+        self.count(layer, code, During::LoadWeights, Event::CellLoads, cells);
+    }
+
+    fn with_constant(&self, layer: usize, mut row: Vec<i64>) -> Vec<i64> {
+        if self.layers[layer].spec.constant_row {
+            let dark = self.is(Fault::ConstantRowDark);
+            row.push(if dark { 0 } else { (1 << self.net.hardware.drive_bits.get()) - 1 });
+        }
+        row
+    }
+
+    pub(crate) fn load_drives(&mut self, codes: &[u8]) {
+        let rows = codes.chunks_exact(self.layers[0].spec.inputs);
+        let rows: Table = rows.map(|row| row.iter().map(|&x| i64::from(x)).collect()).collect();
+        self.samples = rows.len();
+        let rows: Table = rows.into_iter().map(|row| self.with_constant(0, row)).collect();
+        self.layers[0].drives = [rows.clone(), rows];
+    }
+
+    /// Rows of each tile of a column, from the top.
+    fn row_tiles(&self, layer: usize) -> Vec<Range<usize>> {
+        let (rows, step) = (self.layers[layer].rows, self.net.hardware.tile_rows);
+        (0..rows.div_ceil(step)).map(|t| t * step..rows.min((t + 1) * step)).collect()
+    }
+
+    /// Reads a layer and drives the next one.
+    pub(crate) fn forward(&mut self, layer: usize) {
+        for &target in self.layers[layer].spec.wiring.targets() {
+            self.read(layer, target, false);
+        }
+        self.count_read(layer);
+        self.pass_on(layer);
+    }
+
+    /// Currents of both banks in one column, one tile and one slice.
+    fn current(
+        &self,
+        layer: usize,
+        bank: usize,
+        at: [usize; 2],
+        rows: Range<usize>,
+        s: u32,
+    ) -> i64 {
+        let this = &self.layers[layer];
+        let [sample, column] = at;
+        let source = this.spec.wiring.pathways()[bank].source;
+        let drives = &this.drives[source.index()][sample];
+        let mask = (1i64 << self.net.hardware.dac_bits) - 1;
+        let whole = self.net.hardware.adc == Adc::Ideal;
+        let mut rows = rows;
+        if self.is(Fault::TileEdgeLost) && rows.end < this.rows {
+            rows.end -= 1;
+        }
+        rows.map(|row| {
+            let slice = (drives[row] >> (s * self.net.hardware.dac_bits)) & mask;
+            this.arrays[bank].level[row][column] * if whole { drives[row] } else { slice }
+        })
+        .sum()
+    }
+
+    /// Reads one target stream. Returns the currents every converter saw, by slice, when `probe` reads with
+    /// ideal converters.
+    fn read(&mut self, layer: usize, target: Stream, probe: bool) -> Vec<Vec<i64>> {
+        let hw = self.net.hardware;
+        let (units, t) = (self.layers[layer].spec.units, target.index());
+        let banks = self.layers[layer].spec.wiring.banks(target);
+        let tiles = self.row_tiles(layer);
+        let slices =
+            if hw.adc == Adc::Ideal { 1 } else { hw.drive_bits.get().div_ceil(hw.dac_bits) };
+        let mut seen = vec![vec![]; slices as usize];
+        let (mut accumulators, mut saturated, mut look_ups) = (vec![], [0; 2], 0);
+        for sample in 0..self.samples {
+            let mut row = vec![];
+            for column in 0..units {
+                let mut acc = 0;
+                for (tile, s) in tiles.iter().flat_map(|tile| (0..slices).map(move |s| (tile, s))) {
+                    let at = [sample, column];
+                    let [e, i] = banks.map(|bank| self.current(layer, bank, at, tile.clone(), s));
+                    let weight =
+                        if self.is(Fault::SliceShiftMissing) { 0 } else { s * hw.dac_bits };
+                    let d = match hw.adc {
+                        Adc::Finite { bits, subtract, .. } if !probe => {
+                            let ash = self.layers[layer].adc_shifts[t][s as usize];
+                            let bits = bits.get();
+                            let d = match subtract {
+                                Subtract::Digital => {
+                                    let max = (1 << bits) - 1;
+                                    self.convert(e, ash, 0, max, &mut saturated[0])
+                                        - self.convert(i, ash, 0, max, &mut saturated[1])
+                                }
+                                Subtract::Current => {
+                                    let half = 1 << (bits - 1);
+                                    self.convert(e - i, ash, -half, half - 1, &mut saturated[0])
+                                }
+                            };
+                            d << ash
+                        }
+                        Adc::Finite { subtract: Subtract::Digital, .. } => {
+                            seen[s as usize].extend([e, i]);
+                            e - i
+                        }
+                        _ => {
+                            seen[s as usize].push(e - i);
+                            e - i
+                        }
+                    };
+                    acc += (if self.is(Fault::SubtractSwapped) { -d } else { d }) << weight;
+                }
+                row.push(acc);
+            }
+            accumulators.push(row);
+        }
+        let lut = &self.layers[layer].lut;
+        let half = 1i64 << (hw.lut_bits.get() - 1);
+        let look = |acc: i64, saturated: &mut u64| {
+            let exact =
+                if self.is(Fault::IndexTruncates) { acc >> lut.shift } else { rsh(acc, lut.shift) };
+            *saturated += u64::from(exact < -half || exact >= half);
+            (exact.clamp(-half, half - 1) + half) as usize
+        };
+        let (mut activity, mut derivative) = (vec![], vec![]);
+        for row in &accumulators {
+            let places: Vec<_> = row.iter().map(|&acc| look(acc, &mut look_ups)).collect();
+            activity.push(places.iter().map(|&at| i64::from(lut.activity[at])).collect());
+            derivative.push(places.iter().map(|&at| i64::from(lut.derivative[at])).collect());
+        }
+        let this = &mut self.layers[layer];
+        this.accumulators[t] = accumulators;
+        this.activity[t] = activity;
+        this.derivative[t] = derivative;
+        for (bank, saturated) in banks.into_iter().zip(saturated) {
+            let code = self.code(layer, bank);
+            self.count(layer, code, During::ForwardRows, Event::SaturatedConversions, saturated);
+        }
+        let code = self.unit_code(layer, target);
+        self.count(layer, code, During::ForwardRows, Event::SaturatedLookUps, look_ups);
+        seen
+    }
+
+    fn convert(&self, v: i64, ash: u32, min: i64, max: i64, saturated: &mut u64) -> i64 {
+        let steps = if self.is(Fault::ConverterTruncates) { v >> ash } else { rsh(v, ash) };
+        let max = if self.is(Fault::RailOffByOne) { max - 1 } else { max };
+        let code = steps.clamp(min, max);
+        *saturated += u64::from(code != steps || (self.is(Fault::RailCounts) && code == max));
+        code
+    }
+
+    /// What one read of all loaded samples costs, tile by tile.
+    fn count_read(&mut self, layer: usize) {
+        let hw = self.net.hardware;
+        let wiring = self.layers[layer].spec.wiring;
+        let (rows, columns) = (self.layers[layer].rows, self.layers[layer].spec.units);
+        let slices = u64::from(hw.drive_bits.get().div_ceil(hw.dac_bits));
+        let current = matches!(hw.adc, Adc::Finite { subtract: Subtract::Current, .. });
+        let times = self.samples as u64 * slices;
+        for &target in wiring.targets() {
+            for (bank, at) in wiring.banks(target).into_iter().enumerate() {
+                let code = self.code(layer, at);
+                for (high, wide) in tile_sizes(rows, columns, hw.tile_rows, hw.tile_columns) {
+                    let converted = if current && bank == 1 { 0 } else { wide };
+                    for (event, count) in [
+                        (Event::DacSlices, high),
+                        (Event::CellReads, high * wide),
+                        (Event::Holds, wide),
+                        (Event::Conversions, converted),
+                        (Event::ShiftAdds, converted),
+                    ] {
+                        self.count(layer, code, During::ForwardRows, event, times * count);
+                    }
+                }
+            }
+            let (code, units) = (self.unit_code(layer, target), (self.samples * columns) as u64);
+            self.count(layer, code, During::ForwardRows, Event::LookUps, units);
+        }
+    }
+
+    fn pass_on(&mut self, layer: usize) {
+        if layer + 1 == self.layers.len() {
+            return;
+        }
+        let bits = self.net.hardware.drive_bits.get();
+        for stream in 0..2 {
+            let code = |&a: &i64| {
+                let round =
+                    if self.is(Fault::DriveTruncates) { a >> (8 - bits) } else { rsh(a, 8 - bits) };
+                round.min((1 << bits) - 1)
+            };
+            let rows = self.layers[layer].activity[stream].iter();
+            let rows: Table = rows.map(|row| row.iter().map(code).collect()).collect();
+            let rows = rows.into_iter().map(|row| self.with_constant(layer + 1, row)).collect();
+            self.layers[layer + 1].drives[stream] = rows;
+        }
+    }
+
+    /// Reads the samples with ideal converters and sets the shifts: at most one conversion in 1,024 on the rail.
+    pub(crate) fn calibrate(&mut self, codes: &[u8]) -> Option<Calibration> {
+        let Adc::Finite { bits, subtract, range } = self.net.hardware.adc else { return None };
+        let phase = std::mem::replace(&mut self.phase, Phase::Calibration);
+        self.load_drives(codes);
+        let mut found = Calibration { shifts: vec![], code_max: vec![] };
+        for layer in 0..self.layers.len() {
+            let mut code_max = 0;
+            for (t, &target) in self.layers[layer].spec.wiring.targets().iter().enumerate() {
+                for (s, seen) in self.read(layer, target, true).into_iter().enumerate() {
+                    let on_rail = |shift: u32| {
+                        let code = |v: i64| rsh(v, shift);
+                        let half = 1i64 << (bits.get() - 1);
+                        let rails = |v: &&i64| match subtract {
+                            Subtract::Digital => code(**v) >= 2 * half - 1,
+                            Subtract::Current => code(**v) >= half - 1 || code(**v) <= -half,
+                        };
+                        seen.iter().filter(rails).count()
+                    };
+                    if let AdcRange::Calibrated { headroom, .. } = range {
+                        let least = (0..64).find(|&s| on_rail(s) * 1024 <= seen.len()).unwrap();
+                        let least =
+                            least - u32::from(self.is(Fault::CalibrationOneLower) && least > 0);
+                        let headroom = if self.is(Fault::HeadroomForgotten) { 0 } else { headroom };
+                        self.layers[layer].adc_shifts[t][s] = least + headroom;
+                    }
+                    let shift = self.layers[layer].adc_shifts[t][s];
+                    let greatest = seen.iter().map(|v| v.abs()).max().unwrap_or(0);
+                    code_max = code_max.max(rsh(greatest, shift));
+                }
+            }
+            self.count_read(layer);
+            self.pass_on(layer);
+            found.shifts.push(self.layers[layer].adc_shifts.clone());
+            found.code_max.push(code_max);
+        }
+        self.phase = phase;
+        Some(found)
+    }
+}
+
+/// Rows and columns of every tile.
+fn tile_sizes(rows: usize, columns: usize, high: usize, wide: usize) -> Vec<(u64, u64)> {
+    let parts = |all: usize, part: usize| -> Vec<u64> {
+        (0..all.div_ceil(part)).map(|t| part.min(all - t * part) as u64).collect()
+    };
+    let across = parts(columns, wide);
+    parts(rows, high).into_iter().flat_map(|h| across.iter().map(move |&w| (h, w))).collect()
+}
+
+/// What a pathway's polarity does to a sum.
+const fn sign(polarity: Polarity) -> i64 {
+    match polarity {
+        Polarity::Excites => 1,
+        Polarity::Inhibits => -1,
+    }
+}
