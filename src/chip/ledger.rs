@@ -72,6 +72,13 @@ impl Event {
         Self::SaturatedGates,
     ];
 
+    /// Whether the count depends on how arrays are cut into tiles. It then follows from the plan, and the state
+    /// hash leaves it out: re-tiling with ideal converters changes no state.
+    #[must_use]
+    pub const fn follows_tiling(self) -> bool {
+        matches!(self, Self::DacSlices | Self::Holds | Self::Conversions | Self::ShiftAdds)
+    }
+
     /// Name in files.
     #[must_use]
     pub const fn name(self) -> &'static str {
@@ -178,12 +185,6 @@ impl Ledger {
     #[must_use]
     pub fn of_pathway(&self, layer: usize, pathway: u8, event: Event) -> u64 {
         self.counts[layer][usize::from(pathway)].iter().map(|events| events[event as usize]).sum()
-    }
-
-    /// Totals of all events, in the order of [`Event::ALL`].
-    #[must_use]
-    pub fn totals(&self) -> [u64; EVENTS] {
-        Event::ALL.map(|event| self.total(event))
     }
 
     /// The non-zero counts, in order.

@@ -28,8 +28,8 @@ fn threads_kernels_and_tiles_do_not_move_a_bit() {
     ];
     for (number, variant) in variants.into_iter().enumerate() {
         let (folder, done) = trained(out.path(), variant);
-        // what is counted by tile or slice is part of the state hash: compare levels there
-        if number < 5 {
+        // reads are counted by slice, and counts are part of the state hash: compare levels there
+        if number < 7 {
             assert_eq!(hash(&done), GOLDEN.trim(), "{variant:?}");
         }
         assert_eq!(levels(&folder), levels(&out.path().join("optdigits-ed-seed1")), "{variant:?}");

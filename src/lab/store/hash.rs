@@ -5,13 +5,16 @@
 //!              each layer and existing pathway in code order: rows, columns (u32 LE), levels row-major u16 LE,
 //!                  pruned bits row-major LSB first (absorbing floor only), residuals u16 LE (F > 0 only)
 //!              then as i64 LE: running centres; converter shifts (layer, stream, slice); write counts (layer, pathway);
-//!                  ledger totals (training, calibration, evaluation) in the order of the ledger's table
+//!                  ledger totals (training, calibration, evaluation) in the order of the ledger's table, without those
+//!                  that follow from how arrays are cut into tiles
 //! ```
 //!
-//! Logical order, unpadded; what a run does not have is left out.
+//! Logical order, unpadded; what a run does not have is left out. Re-tiling with ideal converters is no other run, so
+//! DAC slices, holds, conversions and shift-adds, which the plan tells, are not part of it.
 
 use super::ARITHMETIC;
 use crate::chip::engine::Phase;
+use crate::chip::ledger::Event;
 use crate::learn::driver::Driver;
 
 /// Hash of the state, in hexadecimal.
@@ -49,7 +52,8 @@ pub fn state(driver: &Driver) -> String {
         layer.writes.iter().for_each(|&writes| number(count(writes)));
     }
     for phase in Phase::ALL {
-        engine.ledger(phase).totals().iter().for_each(|&total| number(count(total)));
+        let events = Event::ALL.into_iter().filter(|event| !event.follows_tiling());
+        events.for_each(|event| number(count(engine.ledger(phase).total(event))));
     }
     hash.finalize().to_hex().to_string()
 }
