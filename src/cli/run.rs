@@ -118,6 +118,11 @@ pub(super) fn train(args: &TrainArgs) -> Done {
                 }
             }
             Event::Batch(progress) => meter.batch(progress),
+            Event::Warning(warning) if json => {
+                say(&json!({"event": "warning", "message": warning}).to_string());
+            }
+            Event::Warning(warning) if quiet => eprintln!("warning: {warning}"),
+            Event::Warning(warning) => meter.line(&format!("warning: {warning}")),
             Event::Epoch(record) => {
                 meter.epoch(record);
                 if json {

@@ -105,8 +105,8 @@ impl Session {
         for (layer, &code) in calibration.code_max.iter().enumerate() {
             if code <= 3 {
                 self.warnings.push(format!(
-                    "layer {layer}: converters never read above code {code} on the first training examples; set \
-                     hw.adc.range = \"calibrated\" or use more hw.adc.bits"
+                    "layer {layer}: on the first training examples the converters use codes 0 to {code} only; currents \
+                     grow while learning, but if accuracy stays low, give them more hw.adc.bits or a smaller range"
                 ));
             }
         }
@@ -128,6 +128,21 @@ impl Session {
     #[must_use]
     pub fn warnings(&self) -> &[String] {
         &self.warnings
+    }
+
+    /// Warns, once, when many conversions of the epochs so far saturated. Returns the warning.
+    pub fn warn_of_saturation(&mut self) -> Option<String> {
+        let ledger = self.trainer.driver().engine().ledger(Phase::Training);
+        let saturated = ledger.total(Event::SaturatedConversions);
+        let conversions = ledger.total(Event::Conversions);
+        let warning = "of the conversions so far saturate; converter ranges come from a net that has not learnt yet. \
+                       Raise hw.adc.headroom (4 or 5 trained MNIST)";
+        if saturated * 20 <= conversions || self.warnings.iter().any(|w| w.contains(warning)) {
+            return None;
+        }
+        let text = format!("{} % {warning}", saturated * 100 / conversions);
+        self.warnings.push(text.clone());
+        Some(text)
     }
 
     /// The training.

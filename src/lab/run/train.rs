@@ -34,6 +34,8 @@ pub enum Event<'a> {
     Batch(Progress),
     /// An epoch is finished and on disk.
     Epoch(&'a EpochRecord),
+    /// Something to know came up.
+    Warning(&'a str),
 }
 
 /// A finished run.
@@ -190,8 +192,12 @@ impl Run<'_> {
             let Some(record) = record else {
                 return Err(RunError::Stopped { epoch, path: path.display().to_string() });
             };
+            let warning = self.session.warn_of_saturation();
             self.keep(record)?;
             on_event(Event::Epoch(self.records.last().expect("just kept")));
+            if let Some(warning) = warning {
+                on_event(Event::Warning(&warning));
+            }
         }
         self.finish()
     }
