@@ -243,7 +243,8 @@ class Net:
         self.mu = np.zeros(s["classes"], I64)
         self.sat_train = self.new_sat()
         self.taps = [tap_table(widths[l + 1], s["classes"], s["taps"]) for l in range(nl - 1)]
-        self.alt_residual = self.alt_tap = False
+        # level and remainder are clamped as one number: the page's "no wind-up", of two readings
+        self.alt_residual, self.alt_tap = True, False
         self.first = None
         self.calib_other = None
         self.set_converters()
@@ -430,7 +431,7 @@ class Net:
         after[dead] = before[dead]
         if F:
             rest = t - (pulses << F)
-            if self.alt_residual:       # the other reading: level and remainder clamped as one number
+            if self.alt_residual:       # level and remainder clamped as one number
                 rest = np.where(before + pulses < s["floor"], 0, np.where(before + pulses > s["ceiling"], (1 << F) - 1, rest))
             self.rest[l, p] = np.clip(rest, 0, (1 << F) - 1)
         if s["floor_kind"] == "absorbing":
@@ -525,7 +526,7 @@ def run_case(name, note, **over):
             if flag == "alt_rail":
                 other.ash = other.calib_other
             else:
-                setattr(other, flag, True)
+                setattr(other, flag, flag != "alt_residual")  # the reading not taken
             for e in range(other.s["epochs"]):
                 other.epoch(e)
             alt[flag] = other.snapshot()["state_level_part_sha256"]
@@ -646,8 +647,8 @@ NOTES = {
                "levels u16 LE, pruned bits LSB first (a pathway ends on a byte), residuals u16 LE: the head of DESIGN section 6.",
     "counts": "cumulative from the first update; saturations_training: forward passes of updates only, evaluation and calibration apart; "
               "error words are booked on the output layer, tap sums on their layer, once for both streams.",
-    "other_readings": "state_level_part after the last epoch had the page been read otherwise: alt_residual: at floor or ceiling level and remainder are "
-                      "clamped as one number (remainder 0 below the floor, 2^F-1 above the ceiling); alt_tap: stream n sums -S over its taps and rounds, "
+    "other_readings": "state_level_part after the last epoch had the page been read otherwise: alt_residual: the remainder keeps what "
+                      "is left of the request when its cell is held at floor or ceiling; alt_tap: stream n sums -S over its taps and rounds, "
                       "instead of negating the rounded sum; alt_rail: calibration counts conversions the clamp changed, not codes that lie on a rail.",
     "batches": "order = shuffle of 0..47 from the identity each epoch; cut in runs of `batch`, the last short; online: one sample a time, k from the configured batch.",
     "tables": "adc ideal: ash null, dac_bits and tile_rows change nothing. ash[layer][stream][slice].",

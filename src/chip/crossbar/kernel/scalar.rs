@@ -7,10 +7,11 @@
 //! pulses      p = clamp( SR(s * mantissa, k), -d_max, +d_max )
 //! SR(s, k)    = (q + r) >> D,  q = rsh(s, k - D) or s << (D - k),  r uniform in 0..2^D-1;  D = 0: rsh(s, k)
 //! residual    t = residual + SR(s * mantissa, k - F);  p = clamp(t >> F, +-d_max);  residual = clamp(t - (p << F), 0, 2^F - 1)
-//! level       clamp( level + p, floor, ceiling )
+//! level       clamp( level + p, floor, ceiling );  a clamp that moved the level also puts the residual at that end
 //! ```
 //!
-//! See docs/MODEL.md, 3.
+//! Level and residual are one number: without that, a cell pushed below its floor would keep a full residual and the
+//! next small push upward would lift it. //! See docs/MODEL.md, 3.
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
 use std::ops::Range;
@@ -125,7 +126,12 @@ pub(super) fn program(
                 high[at] = (level >> 8) as u8;
             }
             if let Some(residual) = cells.residual.as_mut() {
-                let left = (total - (pulses << fraction)).clamp(0, (1 << fraction) - 1);
+                let (least, most) = (0, (1 << fraction) - 1);
+                let left = match before + pulses {
+                    reached if reached < floor => least,
+                    reached if reached > ceiling => most,
+                    _ => (total - (pulses << fraction)).clamp(least, most),
+                };
                 residual[at] = u16::try_from(left).expect("at most 15 fractional bits");
             }
             if let Some(pruned) = cells.pruned.as_mut() {

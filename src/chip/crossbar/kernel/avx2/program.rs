@@ -14,7 +14,8 @@
 //! With a remainder of `F` bits, `shift` is `k - F`, and
 //!
 //! ```text
-//! total   residual + rounded;  wanted = total >> F;  residual = clamp( total - (pulses << F), 0, 2^F - 1 )
+//! total   residual + rounded;  wanted = total >> F;  residual = clamp( total - (pulses << F), 0, 2^F - 1 ),
+//!           0 below the floor, 2^F - 1 above the ceiling
 //! ```
 //!
 //! For `k < F` the law shifts left by `n = F - k` and no word matters: `(s * 2^(D+n) + word) >> D = s * 2^n`.
@@ -235,6 +236,8 @@ fn cells<const DITHER: u8, const RESIDUAL: bool>(
     let flip = _mm256_set1_epi8(i8::MIN);
     let bound = i16::try_from(write.increment_max).expect("checked: at most 127");
     let (most, least) = (_mm256_set1_epi16(bound), _mm256_set1_epi16(-bound));
+    let (floor_wide, ceiling_wide) =
+        (_mm256_set1_epi32(floor.into()), _mm256_set1_epi32(ceiling.into()));
     // Levels less 128, so that the signed saturating addition ends at 0 and 255.
     let floor = _mm256_set1_epi8((floor ^ 0x80).cast_signed());
     let ceiling = _mm256_set1_epi8((ceiling ^ 0x80).cast_signed());
@@ -258,12 +261,19 @@ fn cells<const DITHER: u8, const RESIDUAL: bool>(
             }
             if RESIDUAL {
                 let mut remainder = dither_rows::<WORD>(&[0; 32], left);
-                for (w, remainder) in w.iter_mut().zip(&mut remainder) {
+                let levels = dither_rows::<BYTE>(low, &[0; 32]);
+                for ((w, remainder), level) in w.iter_mut().zip(&mut remainder).zip(&levels) {
                     let total = _mm256_add_epi32(*remainder, *w);
                     *w = _mm256_srav_epi32(total, fraction);
                     let pulses = _mm256_max_epi32(_mm256_min_epi32(*w, most_wide), least_wide);
                     let rest = _mm256_sub_epi32(total, _mm256_sllv_epi32(pulses, fraction));
-                    *remainder = _mm256_max_epi32(_mm256_min_epi32(rest, most_left), zero);
+                    let rest = _mm256_max_epi32(_mm256_min_epi32(rest, most_left), zero);
+                    // a level that its window held puts the remainder at the same end
+                    let reached = _mm256_add_epi32(*level, pulses);
+                    let under = _mm256_cmpgt_epi32(floor_wide, reached);
+                    let over = _mm256_cmpgt_epi32(reached, ceiling_wide);
+                    let rest = _mm256_andnot_si256(under, rest);
+                    *remainder = _mm256_blendv_epi8(rest, most_left, over);
                 }
                 store_rows(left, remainder);
             }

@@ -3,7 +3,7 @@
 //! ```text
 //! rounded   SR(sum * mantissa, k - F)
 //! total     residual + rounded;  wanted = total >> F;  pulses = clamp(wanted, -d_max, d_max)
-//! residual  clamp( total - (pulses << F), 0, 2^F - 1 )
+//! residual  clamp( total - (pulses << F), 0, 2^F - 1 );  0 below the floor, 2^F - 1 above the ceiling
 //! ```
 //!
 //! For `k < F` the law shifts left by `n = F - k` and no word matters: `(s * 2^(D+n) + word) >> D = s * 2^n`.
@@ -13,7 +13,7 @@
 
 use std::arch::x86_64::*;
 
-use super::{NEAREST, PLUS, WORD, counts, dither_rows, quotient, scale, settle, tally};
+use super::{NEAREST, PLUS, WIDE, WORD, counts, dither_rows, quotient, scale, settle, tally};
 use crate::chip::crossbar::kernel::avx512::load_sums;
 use crate::chip::crossbar::kernel::{Half, Write, WriteCounts};
 
@@ -39,6 +39,7 @@ pub(super) fn residual<const DITHER: u8>(
     let most = _mm512_set1_epi32(write.increment_max);
     let least = _mm512_set1_epi32(-write.increment_max);
     let zero = _mm512_setzero_si512();
+    let (floor, ceiling) = (_mm512_set1_epi32(window.0.into()), _mm512_set1_epi32(window.1.into()));
     let mut tally = tally(write, window);
     let groups = sums.as_chunks::<64>().0.iter().zip(low.as_chunks_mut::<64>().0);
     let groups = groups.zip(left.as_chunks_mut::<64>().0);
@@ -47,6 +48,7 @@ pub(super) fn residual<const DITHER: u8>(
         let dither =
             if DITHER == NEAREST { [zero; 4] } else { dither_rows::<DITHER>(bytes, words) };
         let mut remainder = dither_rows::<WORD>(&[0; 64], left);
+        let levels = dither_rows::<WIDE>(low, &[0; 64]);
         let mut wanted = [zero; 4];
         for (row, sums) in sums.as_chunks::<16>().0.iter().enumerate() {
             let sum = _mm512_mullo_epi32(load_sums(sums), scale.mantissa);
@@ -62,7 +64,13 @@ pub(super) fn residual<const DITHER: u8>(
             wanted[row] = _mm512_srav_epi32(total, fraction);
             let pulses = _mm512_max_epi32(_mm512_min_epi32(wanted[row], most), least);
             let rest = _mm512_sub_epi32(total, _mm512_sllv_epi32(pulses, fraction));
-            remainder[row] = _mm512_max_epi32(_mm512_min_epi32(rest, most_left), zero);
+            let rest = _mm512_max_epi32(_mm512_min_epi32(rest, most_left), zero);
+            // a level that its window held puts the remainder at the same end
+            let reached = _mm512_add_epi32(levels[row], pulses);
+            let under = _mm512_cmplt_epi32_mask(reached, floor);
+            let over = _mm512_cmpgt_epi32_mask(reached, ceiling);
+            let rest = _mm512_mask_mov_epi32(rest, under, zero);
+            remainder[row] = _mm512_mask_mov_epi32(rest, over, most_left);
         }
         store_rows(left, remainder);
         let a = _mm512_packs_epi32(wanted[0], wanted[1]);
