@@ -18,6 +18,7 @@ mod bounds;
 mod caught;
 mod choose;
 mod fault;
+mod order;
 mod play;
 mod product;
 mod runs;
@@ -42,7 +43,7 @@ fn wide_net() -> impl Strategy<Value = choose::Net> {
 }
 
 proptest! {
-    #![proptest_config(config(48))]
+    #![proptest_config(config(40))]
 
     #[test]
     fn law_1_every_operation_is_its_equation(
@@ -54,7 +55,7 @@ proptest! {
 }
 
 proptest! {
-    #![proptest_config(config(12))]
+    #![proptest_config(config(6))]
 
     #[test]
     fn law_2_skipping_changes_nothing(net in wide_net(), choices in choose::choices()) {
