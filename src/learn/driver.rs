@@ -197,6 +197,99 @@ fn backward_words(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::chip::crossbar::kernel::Backend;
+    use crate::chip::engine::Phase;
+    use crate::chip::hardware::{Adc, DitherBits, DitherPattern, FloorKind, Hardware, Window};
+    use crate::chip::layer::{Layer, LayerSpec};
+    use crate::chip::population::Wiring;
+    use crate::learn::error::Centre;
+    use crate::learn::route::Route;
+    use crate::num::fixed::{DriveBits, IncrementMax, LevelBits, LutBits, ResidualBits};
+    use crate::num::tables::Activation;
+
+    /// Two layers of a single stream, 2 to 2 to 2, with the given shifts; the first one's words come by `route`.
+    fn driver(mode: UpdateMode, route: Route, shifts: &[(u64, u32)]) -> Driver {
+        let level_bits = LevelBits::new(8).unwrap();
+        let bits = ErrorBits::new(8).unwrap();
+        let hardware = Hardware {
+            level_bits,
+            window: Window::new(0, 255, level_bits).unwrap(),
+            floor_kind: FloorKind::Recoverable,
+            tile_rows: 64,
+            tile_columns: 64,
+            tiles_max: None,
+            transposed_read: true,
+            drive_bits: DriveBits::new(8).unwrap(),
+            dac_bits: 8,
+            adc: Adc::Ideal,
+            lut_bits: LutBits::new(10).unwrap(),
+            error_bits: bits,
+            increment_max: IncrementMax::new(127).unwrap(),
+            dither_bits: DitherBits::Zero,
+            dither_pattern: DitherPattern::PerCell,
+            residual_bits: ResidualBits::new(0).unwrap(),
+        };
+        let spec = LayerSpec {
+            inputs: 2,
+            units: 2,
+            wiring: Wiring::Single,
+            activation: Activation::Identity,
+            weight_max_log2: 2,
+            gain_64ths: [64, 64],
+            constant_row: false,
+        };
+        let deliveries = vec![Delivery::hidden(route, 2, 2, bits, 1, 0), Delivery::output(2, bits)];
+        let layers = deliveries.iter().zip(0..).map(|(delivery, index)| {
+            Layer::new(index, spec.clone(), delivery.taps().clone(), &hardware)
+        });
+        let engine = Engine::new(hardware, Backend::Scalar, 1, layers.collect());
+        let shifts = vec![shifts.to_vec(); 2];
+        let learning = Learning { rule: Rule::Dfa, mode, deliveries, shifts };
+        Driver::new(engine, learning, ErrorUnit::new(Centre::None, bits, 2))
+    }
+
+    const DENSE: Route = Route::RandomDense { shift: Some(0) };
+
+    #[test]
+    fn a_shift_holds_from_its_first_update_to_the_next_one() {
+        let mut driver = driver(UpdateMode::Accumulate, DENSE, &[(0, 3), (2, 4), (5, 6)]);
+        let shifts = [0, 1, 2, 4, 5, 100].map(|updates| {
+            driver.set_updates(updates);
+            driver.shift(1)
+        });
+        assert_eq!(shifts, [3, 3, 4, 4, 6, 6]);
+    }
+
+    #[test]
+    fn a_batch_is_one_update_however_often_it_writes() {
+        for (mode, writes) in [(UpdateMode::Accumulate, 1), (UpdateMode::Online, 3)] {
+            let mut driver = driver(mode, DENSE, &[(0, 10)]);
+            for batch in 1..=2 {
+                driver.learn(&[9; 6], |engine, _, list| list.extend(vec![0; 2 * engine.samples()]));
+                assert_eq!(driver.updates(), batch);
+            }
+            assert_eq!(driver.engine().layers()[0].writes, [2 * writes; 2]);
+        }
+    }
+
+    #[test]
+    fn what_the_error_unit_clamps_and_multiplies_is_counted() {
+        let mut driver = driver(UpdateMode::Accumulate, DENSE, &[(0, 10)]);
+        driver.learn(&[9; 4], |_, _, list| list.extend([255, 255, 0, 0]));
+        let ledger = driver.engine().ledger(Phase::Training);
+        let count = |layer, event| ledger.get(layer, 0, During::Error, event);
+        // both output words, and on the dense route every sum of two words that agree in sign
+        assert_eq!(count(1, Event::SaturatedErrors), 2);
+        let signs: Vec<bool> = crate::num::draw::Place::global(1, crate::num::draw::Site::Route, 0)
+            .words()
+            .take(4)
+            .map(|word| word >> 31 == 1)
+            .collect();
+        let agree = signs.chunks(2).filter(|pair| pair[0] == pair[1]).count() as u64;
+        assert_eq!(count(0, Event::SaturatedErrors), agree);
+        // two samples, two units: two products each of the dense route, and one of each unit's gate
+        assert_eq!([count(0, Event::Multiplies), count(1, Event::Multiplies)], [8 + 4, 4]);
+    }
 
     #[test]
     fn backward_sums_are_scaled_by_the_worth_of_a_level_and_bounded() {
