@@ -87,7 +87,7 @@ fault "2 a sum of nothing is all it sees" src/chip/crossbar.rs \
     'if sums.iter().all(|&sum| sum <= 0) {' laws::law_2
 fault "2 one back end bounds one side" src/chip/crossbar/kernel/avx2/program.rs \
     'let pulses_b = _mm256_max_epi16(_mm256_min_epi16(b, most), least);' \
-    'let pulses_b = _mm256_min_epi16(b, most);' laws::law_2
+    'let pulses_b = _mm256_min_epi16(b, most);' laws::law_
 fault "3 means are not restored" src/learn/error.rs \
     'self.means.copy_from_slice(means);' '' laws::runs
 fault "3 write counts are not restored" src/lab/store/checkpoint.rs \

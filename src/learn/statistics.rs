@@ -198,12 +198,12 @@ mod tests {
     #[test]
     fn tiles_are_numbered_row_by_row() {
         let hardware = hardware(8, 0);
-        // five columns are three tiles across; the cells that are up lie in the last tile of the
-        // first row of tiles, and in the middle one of the last
-        let rows: [&[u16]; 3] = [&[0, 0, 0, 0, 1], &[0; 5], &[0, 0, 0, 1, 0]];
+        // five columns are three tiles across; the cells that are up lie in the first and the last tile
+        // of the upper row of tiles, and in the middle one of the lower
+        let rows: [&[u16]; 3] = [&[1, 0, 0, 0, 1], &[0; 5], &[0, 0, 0, 1, 0]];
         let one = of(&array(&hardware, &rows), &hardware, &[true; 15]);
-        assert_eq!(one.idle, [[1, 3], [3, 5], [4, 6]]);
-        assert_eq!((one.births, one.deaths), (2, 0));
+        assert_eq!(one.idle, [[1, 3], [2, 5], [3, 6]]);
+        assert_eq!((one.births, one.deaths), (3, 0));
     }
 
     #[test]
