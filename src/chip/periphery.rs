@@ -138,6 +138,25 @@ mod tests {
     }
 
     #[test]
+    fn a_table_is_entered_at_its_middle_and_left_at_its_ends() {
+        let lut = Lut { activity: vec![0; 4], derivative: vec![0; 4], shift: 1 };
+        assert_eq!(
+            [-6, -5, -4, -1, 0, 1, 2, 3, 1 << 40].map(|acc| index(acc, &lut)),
+            [
+                (0, true),
+                (0, false),
+                (0, false),
+                (2, false),
+                (2, false),
+                (3, false),
+                (3, false),
+                (3, true),
+                (3, true)
+            ]
+        );
+    }
+
+    #[test]
     fn drives_and_gates_at_their_edges() {
         let four = DriveBits::new(4).unwrap();
         assert_eq!([0, 7, 8, 247, 248, 255].map(|a| drive(a, four)), [0, 0, 1, 15, 15, 15]);

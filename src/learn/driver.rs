@@ -197,6 +197,102 @@ fn backward_words(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::chip::crossbar::kernel::Backend;
+    use crate::chip::engine::Phase;
+    use crate::chip::hardware::{Adc, DitherBits, DitherPattern, FloorKind, Hardware, Window};
+    use crate::chip::layer::{Layer, LayerSpec};
+    use crate::chip::population::Wiring;
+    use crate::learn::error::Centre;
+    use crate::learn::route::Route;
+    use crate::num::fixed::{DriveBits, IncrementMax, LevelBits, LutBits, ResidualBits};
+    use crate::num::tables::Activation;
+
+    /// Two layers of a single stream, 2 to 2 to 2, with the given shifts.
+    fn driver(rule: Rule, mode: UpdateMode, shifts: &[(u64, u32)]) -> Driver {
+        let level_bits = LevelBits::new(8).unwrap();
+        let bits = ErrorBits::new(8).unwrap();
+        let hardware = Hardware {
+            level_bits,
+            window: Window::new(0, 255, level_bits).unwrap(),
+            floor_kind: FloorKind::Recoverable,
+            tile_rows: 64,
+            tile_columns: 64,
+            tiles_max: None,
+            transposed_read: true,
+            drive_bits: DriveBits::new(8).unwrap(),
+            dac_bits: 8,
+            adc: Adc::Ideal,
+            lut_bits: LutBits::new(10).unwrap(),
+            error_bits: bits,
+            increment_max: IncrementMax::new(127).unwrap(),
+            dither_bits: DitherBits::Zero,
+            dither_pattern: DitherPattern::PerCell,
+            residual_bits: ResidualBits::new(0).unwrap(),
+        };
+        let spec = LayerSpec {
+            inputs: 2,
+            units: 2,
+            wiring: Wiring::Single,
+            activation: Activation::Identity,
+            weight_max_log2: 2,
+            gain_64ths: [64, 64],
+            constant_row: false,
+        };
+        let dense = Route::RandomDense { shift: Some(0) };
+        let first = match rule {
+            Rule::Bp => Delivery::own(2, bits),
+            _ => Delivery::hidden(dense, 2, 2, bits, 1, 0),
+        };
+        let deliveries = vec![first, Delivery::output(2, bits)];
+        let layers = deliveries.iter().zip(0..).map(|(delivery, index)| {
+            Layer::new(index, spec.clone(), delivery.taps().clone(), &hardware)
+        });
+        let engine = Engine::new(hardware, Backend::Scalar, 1, layers.collect());
+        let shifts = vec![shifts.to_vec(); 2];
+        let learning = Learning { rule, mode, deliveries, shifts };
+        Driver::new(engine, learning, ErrorUnit::new(Centre::None, bits, 2))
+    }
+
+    #[test]
+    fn a_shift_holds_from_its_first_update_to_the_next_one() {
+        let mut driver = driver(Rule::Dfa, UpdateMode::Accumulate, &[(0, 3), (2, 4), (5, 6)]);
+        let shifts = [0, 1, 2, 4, 5, 100].map(|updates| {
+            driver.set_updates(updates);
+            driver.shift(1)
+        });
+        assert_eq!(shifts, [3, 3, 4, 4, 6, 6]);
+    }
+
+    #[test]
+    fn a_batch_is_one_update_however_often_it_writes() {
+        for (mode, writes) in [(UpdateMode::Accumulate, 1), (UpdateMode::Online, 3)] {
+            let mut driver = driver(Rule::Dfa, mode, &[(0, 10)]);
+            for batch in 1..=2 {
+                driver.learn(&[9; 6], |engine, _, list| list.extend(vec![0; 2 * engine.samples()]));
+                assert_eq!(driver.updates(), batch);
+            }
+            assert_eq!(driver.engine().layers()[0].writes, [2 * writes; 2]);
+        }
+    }
+
+    #[test]
+    fn what_the_error_unit_clamps_and_multiplies_is_counted() {
+        let mut driver = driver(Rule::Dfa, UpdateMode::Accumulate, &[(0, 10)]);
+        driver.learn(&[9; 4], |_, _, list| list.extend([255, 255, 0, 0]));
+        let ledger = driver.engine().ledger(Phase::Training);
+        let count = |layer, event| ledger.get(layer, 0, During::Error, event);
+        // both output words, and on the dense route every sum of two words that agree in sign
+        assert_eq!(count(1, Event::SaturatedErrors), 2);
+        let signs: Vec<bool> = crate::num::draw::Place::global(1, crate::num::draw::Site::Route, 0)
+            .words()
+            .take(4)
+            .map(|word| word >> 31 == 1)
+            .collect();
+        let agree = signs.chunks(2).filter(|pair| pair[0] == pair[1]).count() as u64;
+        assert_eq!(count(0, Event::SaturatedErrors), agree);
+        // two samples, two units: two products each of the dense route, and one of each unit's gate
+        assert_eq!([count(0, Event::Multiplies), count(1, Event::Multiplies)], [8 + 4, 4]);
+    }
 
     #[test]
     fn backward_sums_are_scaled_by_the_worth_of_a_level_and_bounded() {
@@ -207,5 +303,33 @@ mod tests {
         assert_eq!((words, saturated), (vec![1, 1, 0, 0, 127, 127], 1));
         // 1 bit, weight_max 4: a level is worth 2
         assert_eq!(backward_words(&[3, -5], 1, 2, eight).0, [6, -10]);
+    }
+
+    #[test]
+    fn sums_are_written_with_the_shift_of_the_update() {
+        for (shift, moved) in [(30, false), (10, true)] {
+            let mut driver = driver(Rule::Dfa, UpdateMode::Accumulate, &[(0, shift)]);
+            driver.learn(&[255; 4], |_, _, list| list.extend([200, -200, 200, -200]));
+            let ledger = driver.engine().ledger(Phase::Training);
+            assert_eq!(ledger.total(Event::PulsesAttempted) > 0, moved, "k = {shift}");
+        }
+    }
+
+    #[test]
+    fn back_propagation_hands_down_the_row_sums_of_the_layer_above() {
+        let mut driver = driver(Rule::Bp, UpdateMode::Accumulate, &[(0, 10)]);
+        for (row, levels) in [[64, 0], [0, 255]].iter().enumerate() {
+            let load = Operation::LoadWeights { layer: 1, array: 0, row, levels };
+            driver.engine_mut().execute(&load);
+        }
+        driver.learn(&[255, 0], |_, _, list| list.extend([40, 254]));
+        // words 20 and 127 give gates 20 and 127; 64 levels are a weight of 1
+        assert_eq!(driver.engine().backward(1), [20 * 64, 127 * 255]);
+        assert_eq!(driver.backward(1), (vec![20, 127], 1));
+        let ledger = driver.engine().ledger(Phase::Training);
+        assert_eq!(ledger.get(0, 0, During::Error, Event::SaturatedErrors), 1);
+        // units 0 and 1 of the first layer hear them: rsh(255 x 20, 11) and rsh(255 x 127, 11)
+        let levels: Vec<u16> = driver.engine().layers()[0].arrays[0].levels().collect();
+        assert_eq!(levels, [2, 16, 0, 0]);
     }
 }

@@ -185,6 +185,21 @@ mod tests {
     }
 
     #[test]
+    fn a_dense_route_negates_where_the_top_bit_of_its_word_is_set() {
+        let route = Route::RandomDense { shift: Some(0) };
+        let dense = Delivery::hidden(route, 20, 3, bits(), 9, 2);
+        let place = Place { layer: 2, ..Place::global(9, Site::Route, 0) };
+        let signs: Vec<i16> =
+            place.words().take(60).map(|word| if word < 1 << 31 { 1 } else { -1 }).collect();
+        for output in 0..3 {
+            let mut one = [0; 3];
+            one[output] = 1;
+            let column: Vec<i16> = signs.iter().skip(output).step_by(3).copied().collect();
+            assert_eq!(dense.words(&one, 3).0, column);
+        }
+    }
+
+    #[test]
     fn random_routes_depend_on_seed_and_layer() {
         let taps = |seed, layer| {
             let made = Delivery::hidden(Route::RandomSparse, 200, 10, bits(), seed, layer);

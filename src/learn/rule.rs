@@ -129,6 +129,12 @@ mod tests {
     }
 
     #[test]
+    fn differential_pairs_break_dales_law() {
+        let rules = [Rule::Ed, Rule::Kaneko, Rule::Dfa, Rule::Bp];
+        assert_eq!(rules.map(Rule::is_dalean), [true, true, false, false]);
+    }
+
+    #[test]
     fn bp_reads_each_layer_above_before_it_is_written() {
         let steps = Rule::Bp.steps(UpdateMode::Replay, 2, 2);
         assert_eq!(

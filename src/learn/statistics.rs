@@ -135,3 +135,124 @@ pub fn balance(statistics: &[PathwayStatistics], layer: usize) -> [u64; 2] {
     };
     [sum(true), sum(false)]
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::chip::crossbar::kernel::Backend;
+    use crate::chip::crossbar::layout::Layout;
+    use crate::chip::hardware::{Adc, DitherBits, DitherPattern, FloorKind, Window};
+    use crate::chip::layer::{Layer, LayerSpec, Taps};
+    use crate::chip::population::Wiring;
+    use crate::num::fixed::{DriveBits, ErrorBits, IncrementMax, LevelBits, LutBits, ResidualBits};
+    use crate::num::tables::Activation;
+    use bitvec::prelude::*;
+
+    /// Tiles of 2 x 2, window from `floor` to the greatest level, an absorbing floor.
+    fn hardware(level_bits: i64, floor: i64) -> Hardware {
+        let level_bits = LevelBits::new(level_bits).unwrap();
+        Hardware {
+            level_bits,
+            window: Window::new(floor, i64::from(level_bits.level_max()), level_bits).unwrap(),
+            floor_kind: FloorKind::Absorbing,
+            tile_rows: 2,
+            tile_columns: 2,
+            tiles_max: None,
+            transposed_read: false,
+            drive_bits: DriveBits::new(8).unwrap(),
+            dac_bits: 8,
+            adc: Adc::Ideal,
+            lut_bits: LutBits::new(10).unwrap(),
+            error_bits: ErrorBits::new(8).unwrap(),
+            increment_max: IncrementMax::new(7).unwrap(),
+            dither_bits: DitherBits::Eight,
+            dither_pattern: DitherPattern::PerCell,
+            residual_bits: ResidualBits::new(0).unwrap(),
+        }
+    }
+
+    fn array(hardware: &Hardware, rows: &[&[u16]]) -> Crossbar {
+        let layout = Layout { rows: rows.len(), columns: rows[0].len() };
+        let mut array = Crossbar::new(layout, hardware);
+        rows.iter().enumerate().for_each(|(row, levels)| array.load_row(row, levels));
+        array
+    }
+
+    #[test]
+    fn cells_are_counted_by_where_they_lie_and_where_they_came_from() {
+        let hardware = hardware(8, 0);
+        let mut array = array(&hardware, &[&[0, 0, 7], &[0, 0, 0], &[0, 9, 255]]);
+        array.load_pruned(bits![u8, Lsb0; 1, 0, 0, 1, 0, 0, 0, 0, 0]);
+        // at the start, the first five lay on the floor, and so did the last
+        let start = [true, true, true, true, true, false, false, false, true];
+        let one = of(&array, &hardware, &start);
+        assert_eq!((one.cells, one.floor, one.zero, one.pruned), (9, 6, 6, 2));
+        assert_eq!((one.births, one.deaths, one.levels), (2, 2, 271));
+        // one row and one column; of the four tiles, the one at the top left
+        assert_eq!(one.idle, [[1, 3], [1, 3], [1, 4]]);
+        let mut histogram = vec![0; 64];
+        (histogram[0], histogram[1], histogram[2], histogram[63]) = (6, 1, 1, 1);
+        assert_eq!(one.histogram, histogram);
+    }
+
+    #[test]
+    fn tiles_are_numbered_row_by_row() {
+        let hardware = hardware(8, 0);
+        // five columns are three tiles across; the cells that are up lie in the first and the last tile
+        // of the upper row of tiles, and in the middle one of the lower
+        let rows: [&[u16]; 3] = [&[1, 0, 0, 0, 1], &[0; 5], &[0, 0, 0, 1, 0]];
+        let one = of(&array(&hardware, &rows), &hardware, &[true; 15]);
+        assert_eq!(one.idle, [[1, 3], [2, 5], [3, 6]]);
+        assert_eq!((one.births, one.deaths), (3, 0));
+    }
+
+    #[test]
+    fn the_floor_need_not_be_level_0_and_few_bits_have_few_bins() {
+        let hardware = hardware(2, 1);
+        let one = of(&array(&hardware, &[&[1, 2], &[3, 1]]), &hardware, &[false; 4]);
+        assert_eq!((one.floor, one.zero, one.deaths, one.levels), (2, 0, 2, 7));
+        assert_eq!(one.histogram, [0, 2, 1, 1]);
+        assert_eq!(one.pruned, 0);
+    }
+
+    #[test]
+    fn pathways_are_listed_by_layer_and_balance_adds_them_by_polarity() {
+        let hardware = hardware(4, 0);
+        let spec = |wiring| LayerSpec {
+            inputs: 2,
+            units: 2,
+            wiring,
+            activation: Activation::Relu,
+            weight_max_log2: 0,
+            gain_64ths: [64, 64],
+            constant_row: false,
+        };
+        let layers = [Wiring::Dual, Wiring::DualReadout].into_iter().zip(0u16..);
+        let layers = layers
+            .map(|(wiring, index)| Layer::new(index, spec(wiring), Taps::identity(2), &hardware));
+        let mut engine = Engine::new(hardware, Backend::Scalar, 1, layers.collect());
+        let start = floor_map(&engine);
+        assert!(start.iter().flatten().flatten().all(|on| *on));
+        for (layer, of_layer) in engine.layers_mut().iter_mut().enumerate() {
+            for (at, array) in of_layer.arrays.iter_mut().enumerate() {
+                array.load_row(0, &[1 << at, u16::try_from(layer).unwrap()]);
+            }
+        }
+        assert_eq!(floor_map(&engine)[1][0], [false, false, true, true]);
+        let all = pathways(&engine, &start);
+        let names: Vec<_> = all.iter().map(|s| (s.layer, s.code, s.name, s.excites)).collect();
+        assert_eq!(
+            names,
+            [
+                (0, 0, "pp", true),
+                (0, 1, "np", false),
+                (0, 2, "nn", true),
+                (0, 3, "pn", false),
+                (1, 0, "pp", true),
+                (1, 1, "np", false)
+            ]
+        );
+        assert_eq!((all[0].births, all[4].births), (1, 2));
+        assert_eq!((balance(&all, 0), balance(&all, 1)), ([1 + 4, 2 + 8], [1 + 1, 2 + 1]));
+    }
+}

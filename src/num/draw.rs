@@ -210,6 +210,16 @@ mod tests {
     }
 
     #[test]
+    fn an_address_has_a_field_of_its_own_for_each_of_its_parts() {
+        let place =
+            Place { site: Site::Route, layer: 0xabcd, pathway: 0x5e, sub: 0x1234_5678, ..PLACE };
+        assert_eq!(place.stream(), 0x0bab_cd5e_1234_5678);
+        assert_eq!(place.counter(0x0fff_ffff), 5 << 28 | 0x0fff_ffff);
+        assert_eq!(place.key()[..8], [0xef, 0xcd, 0xab, 0x89, 0x67, 0x45, 0x23, 0x01]);
+        assert_eq!(place.key()[8..], [0; 24]);
+    }
+
+    #[test]
     fn cells_are_numbered_down_a_column_of_the_logical_array() {
         let mut all = vec![0; 64 * 6];
         PLACE.fill(0, &mut all);
@@ -229,6 +239,17 @@ mod tests {
         assert!(sorted.iter().copied().eq(0..1000));
         assert_ne!(a, shuffled(1, 1, 1000));
         assert_eq!((shuffled(1, 0, 0), shuffled(1, 0, 1)), (vec![], vec![0]));
+    }
+
+    #[test]
+    fn a_shuffle_swaps_from_the_end_one_word_a_swap() {
+        let mut words = Place::global(7, Site::Shuffle, 3).words();
+        let mut order = [0, 1, 2, 3];
+        for (i, choices) in [(3, 4), (2, 3), (1, 2)] {
+            order.swap(i, below(words.next().unwrap(), choices) as usize);
+        }
+        assert_eq!(shuffled(7, 3, 4), order);
+        assert_eq!([0, 1 << 31, u32::MAX].map(|word| below(word, 6)), [0, 3, 5]);
     }
 
     #[test]

@@ -86,7 +86,7 @@ impl Script<'_> {
     }
 
     fn codes(&mut self) -> Vec<u8> {
-        let most = (600_000 / self.net.cells()).clamp(1, 20);
+        let most = (300_000 / self.net.cells()).clamp(1, 20);
         self.samples = 1 + self.pick(most);
         let inputs = self.net.specs[0].inputs;
         let greatest = (1i64 << self.net.hardware.drive_bits.get()) - 1;

@@ -89,7 +89,7 @@ fn lossless(mut net: Net, dac_bits: u32, subtract: Subtract) -> Option<Net> {
 }
 
 proptest! {
-    #![proptest_config(config(32))]
+    #![proptest_config(config(64))]
 
     #[test]
     fn law_5_a_read_is_a_product_and_a_transposed_read_that_of_the_transpose(

@@ -184,7 +184,7 @@ fn untiled(trainer: &Trainer) -> impl PartialEq + std::fmt::Debug + use<> {
 }
 
 proptest! {
-    #![proptest_config(config(16))]
+    #![proptest_config(config(64))]
 
     #[test]
     fn law_3_a_run_has_one_state(run in run(), tiles in (1usize..=200, 1usize..=200)) {

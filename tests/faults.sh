@@ -1,0 +1,103 @@
+#!/usr/bin/env bash
+# Plants one fault at a time into a copy of the sources and runs the laws that should notice.
+#
+#   tests/faults.sh          all faults, one line each: caught, MISSED, or NOT PLANTED
+#   tests/faults.sh sign     those whose name holds "sign"
+#
+# The copy and what is built from it live in a temporary folder (FAULTS_DIR to keep them).
+# Ends with 1 when a fault was missed or could not be planted.
+set -euo pipefail
+root=$(cd "$(dirname "$0")/.." && pwd)
+work=${FAULTS_DIR:-$(mktemp -d)}
+mkdir -p "$work/tree"
+[[ -n ${FAULTS_DIR:-} ]] || trap 'rm -rf "$work"' EXIT
+export CARGO_TARGET_DIR=${FAULTS_TARGET_DIR:-$work/target} CARGO_INCREMENTAL=1
+export PROPTEST_MAX_SHRINK_ITERS=0
+only=${1:-}
+status=0
+
+copy() {
+    (cd "$root" && tar cf - --exclude=./target --exclude=./.git --exclude=./runs .) |
+        tar xf - -C "$work/tree"
+    rm -rf "$work/tree/tests/proptest-regressions"
+}
+
+# name, file, what is there (a fixed line, once), what is put there, laws that look
+fault() {
+    local name=$1 file=$2 from=$3 to=$4 laws=$5
+    [[ $name == *"$only"* ]] || return 0
+    copy
+    local found
+    found=$(grep -cF -- "$from" "$work/tree/$file" || true)
+    if [[ $found != 1 ]]; then
+        printf '%-34s NOT PLANTED (%s places)\n' "$name" "$found"
+        status=1
+        return 0
+    fi
+    local escaped_from escaped_to
+    escaped_from=$(printf '%s' "$from" | sed 's/[][\.*^$|]/\\&/g')
+    escaped_to=$(printf '%s' "$to" | sed 's/[&|\]/\\&/g')
+    sed -i "s|$escaped_from|$escaped_to|" "$work/tree/$file"
+    if ! (cd "$work/tree" && cargo test --test it --no-run) >"$work/log" 2>&1; then
+        printf '%-34s NOT PLANTED (does not compile, %s)\n' "$name" "$work/log"
+        status=1
+        return 0
+    fi
+    # shellcheck disable=SC2086
+    if (cd "$work/tree" && cargo test --test it -- $laws) >"$work/log" 2>&1; then
+        printf '%-34s MISSED\n' "$name"
+        status=1
+    else
+        local by
+        by=$(sed -n 's/^test laws::\(.*\) \.\.\. FAILED$/\1/p' "$work/log" | sed 's/.*:://' | paste -sd' ')
+        printf '%-34s caught by %s\n' "$name" "$by"
+    fi
+}
+
+scalar=src/chip/crossbar/kernel/scalar.rs
+forward=src/chip/engine/forward.rs
+update=src/chip/engine/update.rs
+
+fault "1 inhibition is not negated" $scalar \
+    'let sum = if write.negate { -sum } else { sum };' 'let sum = sum;' laws::law_1
+fault "1 bound passed by one" $scalar \
+    'let bound = i64::from(write.increment_max);' \
+    'let bound = i64::from(write.increment_max) + 1;' laws::law_1
+fault "1 remainder lost" $scalar \
+    'residual[at] = u16::try_from(left)' 'residual[at] = u16::try_from(left & !1)' laws::law_1
+fault "1 converter truncates" src/chip/periphery.rs \
+    'let steps = rsh(current, self.shift);' 'let steps = current >> self.shift;' laws::law_1
+fault "1 stream n not negated" $update \
+    'let sign = if target == Stream::N { -1 } else { 1 };' 'let sign = 1;' laws::law_1
+fault "1 write count stands still" $update \
+    'this.writes.iter_mut().for_each(|writes| *writes += 1);' '' laws::law_1
+fault "1 slices trade weight" $forward \
+    'let shift = adc.shift + slice * self.dac_bits;' \
+    'let shift = adc.shift + slice * (self.dac_bits - 1);' laws::law_1
+fault "1 np hears what pp hears" $forward \
+    'let read = &self.reads[bank][at];' 'let read = &self.reads[0][at];' laws::law_1
+fault "1 32-bit sums cut too late" src/chip/layer.rs \
+    'pub const CHUNK_BLOCKS: usize = 512;' \
+    'pub const CHUNK_BLOCKS: usize = 1024;' laws::bounds
+fault "2 a half dark block is skipped" src/chip/crossbar.rs \
+    'if drives.iter().all(|&code| code == 0) {' \
+    'if drives[..32 * stride].iter().all(|&code| code == 0) {' laws::law_2
+fault "2 a sum of nothing is all it sees" src/chip/crossbar.rs \
+    'if sums.iter().all(|&sum| sum == 0) {' \
+    'if sums.iter().all(|&sum| sum <= 0) {' laws::law_2
+fault "2 one back end bounds one side" src/chip/crossbar/kernel/avx2/program.rs \
+    'let pulses_b = _mm256_max_epi16(_mm256_min_epi16(b, most), least);' \
+    'let pulses_b = _mm256_min_epi16(b, most);' laws::law_
+fault "3 means are not restored" src/learn/error.rs \
+    'self.means.copy_from_slice(means);' '' laws::runs
+fault "3 write counts are not restored" src/lab/store/checkpoint.rs \
+    '*writes = positive(&name, number)?;' 'positive(&name, number)?;' laws::runs
+fault "3 a draw depends on the tile" $update \
+    'layer: index,' 'layer: index + (hardware.tile_rows & 1) as u16,' laws::runs
+fault "5 a tile loses its last row" $forward \
+    'sample[rows.end..blocks.end * BLOCK_ROWS].fill(0);' \
+    'sample[rows.end - 1..blocks.end * BLOCK_ROWS].fill(0);' laws::product
+fault "5 transposed phases add" $forward \
+    'let sign = i64::from(phase) * if bank == 0 { 1 } else { -1 };' \
+    'let sign = if bank == 0 { 1 } else { -1 };' laws::product
+exit $status
