@@ -182,10 +182,12 @@ impl Shadow {
                 after = before;
             }
             let left = total - (pulses << fraction);
-            let held = if self.is(Fault::ResidualWindsUp) {
-                left.clamp(0, (2 << fraction) - 1)
-            } else {
-                left.clamp(0, (1 << fraction) - 1)
+            let reached = before + pulses;
+            let held = match reached {
+                _ if self.is(Fault::ResidualWindsUp) => left.clamp(0, (1 << fraction) - 1),
+                _ if reached < floor => 0,
+                _ if reached > ceiling => (1 << fraction) - 1,
+                _ => left.clamp(0, (1 << fraction) - 1),
             };
             let kept = if self.is(Fault::ResidualNotKept) { 0 } else { held };
             let pulsed = pulses != 0 || self.is(Fault::PrunedWithoutPulse);
