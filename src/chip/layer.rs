@@ -102,6 +102,8 @@ pub const SIDE_MAX: usize = 65_535;
 pub const LAYERS_MAX: usize = 64;
 /// Blocks of 64 rows whose products of two bytes an `i32` holds for certain: 512 x 64 x 255 x 255 < 2^31.
 pub const CHUNK_BLOCKS: usize = 512;
+const _: () =
+    assert!(CHUNK_BLOCKS * 64 * 255 * 255 < 1 << 31, "a chunk of full bytes fits 32 bits");
 
 /// A layer on the chip.
 #[derive(Debug, Clone)]
@@ -205,15 +207,5 @@ pub fn check(specs: &[LayerSpec], hardware: &Hardware) -> Result<(), PlanError> 
             allowed,
         }),
         _ => Ok(()),
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_chunk_of_full_bytes_fits_32_bits() {
-        assert!(CHUNK_BLOCKS * 64 * 255 * 255 < 1 << 31);
     }
 }

@@ -1,4 +1,9 @@
 //! Tests of the whole program, through its public faces.
+#![expect(
+    clippy::unwrap_used,
+    clippy::disallowed_methods,
+    reason = "tests fail by panicking, and look at the files of runs"
+)]
 
 mod bad_input;
 mod laws;
