@@ -44,7 +44,7 @@ fn wide_net() -> impl Strategy<Value = choose::Net> {
 }
 
 proptest! {
-    #![proptest_config(config(96))]
+    #![proptest_config(config(48))]
 
     #[test]
     fn law_1_every_operation_is_its_equation(
@@ -56,7 +56,7 @@ proptest! {
 }
 
 proptest! {
-    #![proptest_config(config(24))]
+    #![proptest_config(config(12))]
 
     #[test]
     fn law_2_skipping_changes_nothing(net in wide_net(), choices in choose::choices()) {

@@ -90,13 +90,13 @@ impl Script<'_> {
         self.samples = 1 + self.pick(most);
         let inputs = self.net.specs[0].inputs;
         let greatest = (1i64 << self.net.hardware.drive_bits.get()) - 1;
-        let style = self.pick(7);
+        let (style, dark) = (self.pick(8), [4, 16, 32, 64][self.pick(4)]);
         let numbers = &mut self.numbers;
         let code = |at: usize| match style {
             0 => greatest,
             1 => 0,
-            // rows that are dark in every sample, whole blocks of them among others
-            2 if (at % inputs / 64).is_multiple_of(2) => 0,
+            // rows that are dark in every sample: whole blocks, or parts of each
+            2 | 4 if (at % inputs / dark).is_multiple_of(2) => 0,
             3 if numbers.within(0, 9) > 0 => 0,
             _ => numbers.within(0, greatest),
         };
