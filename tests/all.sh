@@ -26,7 +26,8 @@ for example in examples/*.toml; do
         continue
     fi
     step "$example, one epoch"
-    cargo run --release --quiet -- train "$example" --set learning.epochs=1 --out "$runs" --quiet
+    # the program that the release tests have just built
+    "${CARGO_TARGET_DIR:-target}/release/dalean" train "$example" --set learning.epochs=1 --out "$runs" --quiet
 done
 
 step all passed
