@@ -5,12 +5,15 @@
 //! bits a level has two byte planes: `level = low + 256 high`.
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
+use std::ops::Range;
+
+use aligned_vec::{AVec, avec};
 use bitvec::prelude::*;
 
 use super::hardware::{DitherBits, DitherPattern, FloorKind, Hardware, Window};
 use crate::num::draw::{Place, Site};
-use kernel::{Backend, Cells, Dither, Half, Write, WriteCounts};
-use layout::{BLOCK_CELLS, HALF_CELLS, HALF_COLUMNS, Layout, PANEL_COLUMNS, in_half};
+use kernel::{Cells, Dither, Drives, Half, Kernel, Write, WriteCounts};
+use layout::{BLOCK_CELLS, BLOCK_ROWS, HALF_CELLS, HALF_COLUMNS, Layout, PANEL_COLUMNS, in_half};
 
 pub mod kernel;
 pub mod layout;
@@ -23,8 +26,9 @@ const HALF_WORDS: usize = HALF_CELLS / 64;
 pub struct Crossbar {
     layout: Layout,
     window: Window,
-    low: Vec<u8>,
-    high: Option<Vec<u8>>,
+    /// Aligned to lines of the processor's cache, as tiles are loaded.
+    low: AVec<u8>,
+    high: Option<AVec<u8>>,
     residual: Option<Vec<u16>>,
     /// One bit a cell in the order of levels, of absorbing floors.
     pruned: Option<Vec<u64>>,
@@ -51,8 +55,8 @@ impl Crossbar {
         Self {
             layout,
             window: hardware.window,
-            low: vec![low; cells],
-            high: wide.then(|| vec![high; cells]),
+            low: avec![low; cells],
+            high: wide.then(|| avec![high; cells]),
             residual: (hardware.residual_bits.get() > 0).then(|| vec![0; cells]),
             pruned: (hardware.floor_kind == FloorKind::Absorbing).then(|| vec![0; cells / 64]),
         }
@@ -96,6 +100,30 @@ impl Crossbar {
     pub fn levels(&self) -> impl Iterator<Item = u16> + '_ {
         let Layout { rows, columns } = self.layout;
         (0..rows).flat_map(move |row| (0..columns).map(move |column| self.level(row, column)))
+    }
+
+    /// Sums of the levels of each row.
+    #[must_use]
+    pub fn row_sums(&self) -> Vec<i64> {
+        let mut sums = vec![0; self.layout.rows_padded()];
+        for (plane, shift) in [(Some(&self.low), 0), (self.high.as_ref(), 8)] {
+            for (at, half) in
+                plane.iter().flat_map(|plane| plane.chunks_exact(HALF_CELLS)).enumerate()
+            {
+                let (panel, block) = (at / 2 / self.layout.blocks(), at / 2 % self.layout.blocks());
+                let column = panel * PANEL_COLUMNS + at % 2 * HALF_COLUMNS;
+                let live = self.layout.columns.saturating_sub(column).min(HALF_COLUMNS);
+                for (group, cells) in half.as_chunks::<64>().0.iter().enumerate() {
+                    let mut rows = [0u16; 4];
+                    for cells in &cells.as_chunks::<4>().0[..live] {
+                        rows.iter_mut().zip(cells).for_each(|(row, &low)| *row += u16::from(low));
+                    }
+                    let to = &mut sums[block * BLOCK_ROWS + group * 4..][..4];
+                    to.iter_mut().zip(rows).for_each(|(sum, row)| *sum += i64::from(row) << shift);
+                }
+            }
+        }
+        sums
     }
 
     /// The remainders behind the cells, row-major; `None` when the array has none.
@@ -144,42 +172,33 @@ impl Crossbar {
         }
     }
 
-    /// Sums of one panel over the rows of `blocks`, from the low plane, then from the high plane if there
-    /// is one: `current = low + 256 high`.
-    pub fn read(
-        &self,
-        backend: Backend,
-        panel: usize,
-        blocks: std::ops::Range<usize>,
-        drives: &[u8],
-        currents: &mut [i64],
-        scratch: &mut Vec<i32>,
-    ) {
-        let stride = self.layout.rows_padded();
-        let cells = self.layout.panel_cells();
-        scratch.resize(currents.len(), 0);
-        backend.read(&self.low[panel * cells..][..cells], blocks.clone(), drives, stride, scratch);
-        for (current, &low) in currents.iter_mut().zip(scratch.iter()) {
-            *current = i64::from(low);
-        }
-        if let Some(high) = &self.high {
-            backend.read(&high[panel * cells..][..cells], blocks, drives, stride, scratch);
-            for (current, &high) in currents.iter_mut().zip(scratch.iter()) {
-                *current += i64::from(high) << 8;
-            }
-        }
+    /// Low bytes of the levels of some blocks of a panel.
+    #[must_use]
+    pub fn low(&self, panel: usize, blocks: Range<usize>) -> &[u8] {
+        self.plane(&self.low, panel, blocks)
     }
 
-    /// The transposed read: sums of every row over all columns, `[sample][rows padded]`. `gates` holds
-    /// `columns_padded` unsigned gates a sample.
+    /// High bytes, of levels above 8 bits.
     #[must_use]
-    pub fn read_columns(&self, backend: Backend, gates: &[u8]) -> Vec<i64> {
+    pub fn high(&self, panel: usize, blocks: Range<usize>) -> Option<&[u8]> {
+        self.high.as_ref().map(|high| self.plane(high, panel, blocks))
+    }
+
+    fn plane<'a>(&self, plane: &'a [u8], panel: usize, blocks: Range<usize>) -> &'a [u8] {
+        let first = panel * self.layout.panel_cells();
+        &plane[first + blocks.start * BLOCK_CELLS..first + blocks.end * BLOCK_CELLS]
+    }
+
+    /// The transposed read: sums of every row over all columns, `[sample][rows padded]`. `gates` are signed bytes
+    /// that lie as drives do, by column.
+    #[must_use]
+    pub fn read_columns(&self, kernel: &Kernel, gates: Drives<'_>) -> Vec<i64> {
         let layout = self.layout;
-        let mut sums = vec![0; gates.len() / layout.columns_padded() * layout.rows_padded()];
-        backend.read_columns(&self.low, layout, gates, &mut sums);
+        let mut sums = vec![0; gates.samples() * layout.rows_padded()];
+        kernel.read_columns(&self.low, layout, gates, &mut sums);
         let mut currents: Vec<i64> = sums.iter().map(|&sum| i64::from(sum)).collect();
         if let Some(high) = &self.high {
-            backend.read_columns(high, layout, gates, &mut sums);
+            kernel.read_columns(high, layout, gates, &mut sums);
             for (current, &sum) in currents.iter_mut().zip(&sums) {
                 *current += i64::from(sum) << 8;
             }
@@ -206,14 +225,12 @@ impl Crossbar {
     }
 }
 
-/// Everything a write needs beside the cells.
+/// Everything a write needs beside the cells and gates.
 #[derive(Debug, Clone, Copy)]
 pub struct WriteRequest<'a> {
-    /// Which loops run.
-    pub backend: Backend,
-    /// Drives of the written samples, `[rows padded][stride]`.
-    pub drives: &'a [u8],
-    /// Samples, padded to a multiple of 4 with zero drives.
+    /// Drives of the written samples, `[block][64 rows][stride]`; `None` where all are 0.
+    pub turned: &'a [Option<&'a [u8]>],
+    /// Samples, padded with zero drives.
     pub stride: usize,
     /// Rounding, bound and window.
     pub write: Write,
@@ -235,83 +252,75 @@ impl PanelMut<'_> {
     /// Accumulates, rounds, bounds and programs this panel. `gates` lies
     /// `[2 halves][stride / 4][16 columns][4 samples]`.
     ///
-    /// Blocks whose drives are all 0 or whose sums are all 0 are skipped: a zero sum rounds to no pulse
-    /// whatever its dither word, and a remainder alone is less than a pulse.
-    pub fn write(&mut self, request: &WriteRequest<'_>, gates: &[i8]) -> WriteCounts {
+    /// Passed over without a draw: blocks that are not driven, columns without a gate, and half blocks whose sums all
+    /// round to 0 whatever their words. A remainder alone is less than a pulse.
+    pub fn write(
+        &mut self,
+        kernel: &Kernel,
+        request: &WriteRequest<'_>,
+        gates: &[i8],
+    ) -> WriteCounts {
         let stride = request.stride;
         let mut counts = WriteCounts::default();
-        let mut sums: Box<Half<i32>> = Box::new([0; HALF_CELLS]);
+        let mut sums = Sums([0; HALF_CELLS]);
         let mut words = Words::new();
-        for block in 0..self.layout.blocks() {
-            let drives = &request.drives[block * 64 * stride..][..64 * stride];
-            if drives.iter().all(|&code| code == 0) {
-                continue;
-            }
-            for half in 0..2 {
+        let live = [0, 1].map(|half| {
+            let column = self.panel * PANEL_COLUMNS + half * HALF_COLUMNS;
+            column < self.layout.columns
+                && gates[half * 16 * stride..][..16 * stride].iter().any(|&gate| gate != 0)
+        });
+        for (block, turned) in request.turned.iter().enumerate() {
+            let Some(turned) = turned else { continue };
+            for half in (0..2).filter(|&half| live[half]) {
                 let column = self.panel * PANEL_COLUMNS + half * HALF_COLUMNS;
-                if column >= self.layout.columns {
-                    continue;
-                }
                 let gates = &gates[half * 16 * stride..][..16 * stride];
-                request.backend.accumulate(drives, stride, gates, &mut sums);
-                if sums.iter().all(|&sum| sum == 0) {
+                kernel.accumulate(turned, stride, gates, &mut sums.0);
+                if kernel.is_quiet(&sums.0, &request.write, request.dither_bits.get()) {
                     continue;
                 }
-                let dither = words.draw(request, self.layout.rows, column, block);
-                counts += self.program(block, half, &sums, request, dither);
+                let dither = words.draw(kernel, request, self.layout.rows, column, block);
+                let cells = self.half(block, half);
+                counts += kernel.program(cells, &sums.0, &request.write, dither);
             }
         }
         counts
     }
 
-    fn program(
-        &mut self,
-        block: usize,
-        half: usize,
-        sums: &Half<i32>,
-        request: &WriteRequest<'_>,
-        dither: Dither<'_>,
-    ) -> WriteCounts {
+    fn half(&mut self, block: usize, half: usize) -> Cells<'_> {
         let at = block * BLOCK_CELLS + half * HALF_CELLS;
-        let mut flags: Option<Half<u8>> = None;
-        if let Some(pruned) = &self.pruned {
-            let bits = pruned[at / 64..][..HALF_WORDS].view_bits::<Lsb0>();
-            flags = Some(std::array::from_fn(|i| u8::from(bits[i])));
-        }
-        let cells = Cells {
+        let pruned = self.pruned.as_deref_mut().map(|bits| &mut bits[at / 64..][..HALF_WORDS]);
+        Cells {
             low: half_mut(self.low, at),
             high: self.high.as_deref_mut().map(|plane| half_mut(plane, at)),
             residual: self.residual.as_deref_mut().map(|plane| half_mut(plane, at)),
-            pruned: flags.as_mut(),
-        };
-        let counts = request.backend.program(cells, sums, &request.write, dither);
-        if let (Some(pruned), Some(flags)) = (&mut self.pruned, flags) {
-            let bits = pruned[at / 64..][..HALF_WORDS].view_bits_mut::<Lsb0>();
-            for (i, flag) in flags.into_iter().enumerate() {
-                bits.set(i, flag != 0);
-            }
+            pruned: pruned.map(|bits| bits.try_into().expect("16 words a half block")),
         }
-        counts
     }
 }
+
+/// Sums of a half block, where tiles are stored fastest.
+#[repr(align(64))]
+struct Sums(Half<i32>);
 
 fn half_mut<T>(plane: &mut [T], at: usize) -> &mut Half<T> {
     (&mut plane[at..at + HALF_CELLS]).try_into().expect("a half block has 1024 cells")
 }
 
 /// Scratch for the dither words of a half block.
+#[repr(align(64))]
 struct Words {
-    bytes: Box<Half<u8>>,
-    halves: Box<Half<u16>>,
+    bytes: Half<u8>,
+    halves: Half<u16>,
 }
 
 impl Words {
-    fn new() -> Self {
-        Self { bytes: Box::new([0; HALF_CELLS]), halves: Box::new([0; HALF_CELLS]) }
+    const fn new() -> Self {
+        Self { bytes: [0; HALF_CELLS], halves: [0; HALF_CELLS] }
     }
 
     fn draw(
         &mut self,
+        kernel: &Kernel,
         request: &WriteRequest<'_>,
         rows: usize,
         column: usize,
@@ -321,25 +330,16 @@ impl Words {
         match (request.dither_bits, request.dither_pattern) {
             (DitherBits::Zero, _) => return Dither::Nearest,
             (DitherBits::Eight, DitherPattern::PerCell) => {
-                request.backend.dither(&place, rows, column, block, &mut self.bytes);
+                kernel.dither(&place, rows, column, block, &mut self.bytes);
             }
             (DitherBits::Sixteen, DitherPattern::PerCell) => {
-                for (c, group) in (0..HALF_COLUMNS).flat_map(|c| [(c, 0), (c, 1)]) {
-                    if (2 * block + group) * 32 >= rows {
-                        continue;
-                    }
-                    let words = place.halves(rows, column + c, 2 * block + group);
-                    for (row, word) in words.into_iter().enumerate() {
-                        self.halves[in_half(32 * group + row, c)] = word;
-                    }
-                }
+                kernel.dither_words(&place, rows, column, block, &mut self.halves);
             }
             (bits, DitherPattern::Separable) => {
                 // numbered as one column each: rows at sub 1, columns at sub 2
-                let word = |sub: u32, at: usize| separable_word(&Place { sub, ..place }, bits, at);
-                let down: [u16; 64] = std::array::from_fn(|row| word(1, block * 64 + row));
-                for c in 0..HALF_COLUMNS {
-                    let across = word(2, column + c);
+                let down = separable_words(&Place { sub: 1, ..place }, bits, block * 64, 64);
+                let across = separable_words(&Place { sub: 2, ..place }, bits, column, 16);
+                for (c, across) in across.iter().enumerate() {
                     for (row, down) in down.iter().enumerate() {
                         let [byte, _] = (down ^ across).to_le_bytes();
                         self.bytes[in_half(row, c)] = byte;
@@ -355,14 +355,17 @@ impl Words {
     }
 }
 
-/// Word `at` of an array of one column, 8 or 16 bits wide.
-fn separable_word(place: &Place, bits: DitherBits, at: usize) -> u16 {
+/// Words `first ..` of an array of one column, 8 or 16 bits wide, as many as a block has rows or a half columns.
+fn separable_words(place: &Place, bits: DitherBits, first: usize, count: usize) -> Vec<u16> {
+    // an array of one column has its blocks one after the other, however many rows it has
+    let mut bytes = [0; 128];
     if bits == DitherBits::Sixteen {
-        place.half(at + 1, at, 0)
+        place.fill((first / 32) as u64, &mut bytes);
+        let words = bytes[first % 32 * 2..].as_chunks::<2>().0;
+        words.iter().take(count).map(|word| u16::from_le_bytes(*word)).collect()
     } else {
-        let mut bytes = [0; 64];
-        place.bytes(at + 1, 0, at / 64, &mut bytes);
-        u16::from(bytes[at % 64])
+        place.fill((first / 64) as u64, &mut bytes);
+        bytes[first % 64..].iter().take(count).map(|&byte| u16::from(byte)).collect()
     }
 }
 

@@ -15,15 +15,22 @@
 
 use std::ops::Range;
 
-use super::crossbar::kernel::Backend;
-use super::crossbar::layout::PANEL_COLUMNS;
+use aligned_vec::{AVec, CACHELINE_ALIGN};
+
+use super::crossbar::kernel::{Backend, LookUp};
+use super::crossbar::layout::BLOCK_ROWS;
 use super::hardware::Hardware;
 use super::layer::Layer;
 use super::ledger::{During, Event, Ledger};
 use super::population::{Stream, Wiring};
 
 mod calibrate;
+mod columns;
+mod currents;
+mod each;
+mod error;
 mod forward;
+mod read;
 mod update;
 
 pub use calibrate::Calibration;
@@ -140,21 +147,47 @@ impl Phase {
 }
 
 /// Registers of a layer for the loaded samples. Streams are indexed by [`Stream`]; what a layer does not
-/// have stays empty.
+/// have stays empty. Units lie in blocks of 64, samples in a block: `[block][sample][64]`.
 #[derive(Debug, Clone, Default)]
 struct Registers {
-    /// Drive codes by source stream, `[sample][rows padded]`. The first layer drives both streams alike and keeps
-    /// one copy, at P.
-    drives: [Vec<u8>; 2],
-    /// By target stream, `[panel][sample][32]`.
-    accumulators: [Vec<i64>; 2],
-    activity: [Vec<u8>; 2],
-    derivative: [Vec<u8>; 2],
-    gates: [Vec<i8>; 2],
+    /// Drive codes by source stream. The first layer drives both streams alike and keeps one copy, at P.
+    drives: [Lines<u8>; 2],
+    /// Derivatives by target stream.
+    derivatives: [Lines<u8>; 2],
+    /// Gates by target stream, packed for an update: `[block][4 halves][stride / 4][16 units][4 samples]`.
+    gates: [Lines<i8>; 2],
+    /// Accumulators of stream p, of the last layer.
+    accumulators: Vec<i64>,
+    /// Activity by target stream, of the last layer.
+    values: [Vec<u8>; 2],
     /// Row sums of the last transposed read, `[sample][rows]`.
     backward: Vec<i64>,
     /// Samples added and not yet programmed, and their shift.
     pending: usize,
+}
+
+/// Numbers that start on a line of the processor's cache.
+#[derive(Debug, Clone)]
+struct Lines<T>(AVec<T>);
+
+impl<T> Default for Lines<T> {
+    fn default() -> Self {
+        Self(AVec::new(CACHELINE_ALIGN))
+    }
+}
+
+impl<T> std::ops::Deref for Lines<T> {
+    type Target = AVec<T>;
+
+    fn deref(&self) -> &AVec<T> {
+        &self.0
+    }
+}
+
+impl<T> std::ops::DerefMut for Lines<T> {
+    fn deref_mut(&mut self) -> &mut AVec<T> {
+        &mut self.0
+    }
 }
 
 /// Sum of bank currents of a layer since they were last taken: `[E, I]` by target stream.
@@ -171,8 +204,12 @@ pub struct Engine {
     /// Rate mantissa.
     mantissa: u32,
     layers: Vec<Layer>,
+    /// What units hand on and how steep they are there, by layer.
+    tables: Vec<LookUp>,
     registers: Vec<Registers>,
     currents: Vec<Currents>,
+    /// Sums of levels of each row, by layer and array; forgotten when a level moves.
+    row_sums: Vec<Option<Vec<Vec<i64>>>>,
     samples: usize,
     phase: Phase,
     ledgers: [Ledger; 3],
@@ -189,6 +226,9 @@ impl Engine {
         let joined = layers.windows(2).all(|pair| pair[0].spec.units == pair[1].spec.inputs);
         assert!(joined && !layers.is_empty(), "layers follow one another");
         let ledger = Ledger::new(layers.len());
+        let last = layers.len() - 1;
+        let codes = |layer: usize| (layer < last).then_some(hardware.drive_bits);
+        let tables = layers.iter().zip(0..).map(|(l, at)| l.look_up(codes(at))).collect();
         Self {
             hardware,
             backend,
@@ -197,6 +237,8 @@ impl Engine {
             mantissa: 1,
             registers: vec![Registers::default(); layers.len()],
             currents: vec![[[0; 2]; 2]; layers.len()],
+            row_sums: vec![None; layers.len()],
+            tables,
             layers,
             samples: 0,
             phase: Phase::Training,
@@ -252,6 +294,7 @@ impl Engine {
     /// The layers, to restore a state. Registers are cleared.
     pub fn layers_mut(&mut self) -> &mut [Layer] {
         self.registers.fill(Registers::default());
+        self.row_sums.fill(None);
         self.samples = 0;
         &mut self.layers
     }
@@ -289,14 +332,14 @@ impl Engine {
     #[must_use]
     pub fn output_accumulator(&self, sample: usize, unit: usize) -> i64 {
         let registers = self.registers.last().expect("a network has layers");
-        registers.accumulators[Stream::P.index()][self.register_at(sample, unit)]
+        registers.accumulators[self.register_at(sample, unit)]
     }
 
     /// Activity code of a unit of the last layer's p stream.
     #[must_use]
     pub fn output_activity(&self, sample: usize, unit: usize) -> u8 {
         let registers = self.registers.last().expect("a network has layers");
-        registers.activity[Stream::P.index()][self.register_at(sample, unit)]
+        registers.values[Stream::P.index()][self.register_at(sample, unit)]
     }
 
     /// Row sums of the last transposed read of `layer`, `[sample][inputs]`.
@@ -305,9 +348,9 @@ impl Engine {
         &self.registers[layer].backward
     }
 
-    /// Place of a unit in registers that lie `[panel][sample][32]`.
+    /// Place of a unit in registers.
     const fn register_at(&self, sample: usize, unit: usize) -> usize {
-        (unit / PANEL_COLUMNS * self.samples + sample) * PANEL_COLUMNS + unit % PANEL_COLUMNS
+        (unit / BLOCK_ROWS * self.samples + sample) * BLOCK_ROWS + unit % BLOCK_ROWS
     }
 
     /// Executes one operation.
@@ -322,6 +365,7 @@ impl Engine {
             Operation::LoadWeights { layer, array, row, levels } => {
                 let pathway = self.layers[layer].spec.wiring.pathways()[array].code;
                 self.layers[layer].arrays[array].load_row(row, levels);
+                self.row_sums[layer] = None;
                 let (during, count) = (During::LoadWeights, levels.len() as u64);
                 self.charge(layer, pathway, during, Event::CellLoads, count);
             }
@@ -352,18 +396,38 @@ impl Engine {
 
     fn load_drives(&mut self, codes: &[u8]) {
         let layer = &self.layers[0];
-        let (inputs, stride) = (layer.spec.inputs, layer.layout.rows_padded());
+        let (inputs, blocks) = (layer.spec.inputs, layer.layout.blocks());
         assert!(codes.len().is_multiple_of(inputs), "codes come in whole samples");
         assert!(self.registers.iter().all(|r| r.pending == 0), "sums wait to be programmed");
         self.samples = codes.len() / inputs;
-        let constant = layer.spec.constant_row.then(|| self.hardware.drive_bits.code_max());
+        let samples = self.samples;
         let drives = &mut self.registers[0].drives[Stream::P.index()];
-        drives.clear();
-        drives.resize(self.samples * stride, 0);
-        for (sample, codes) in drives.chunks_exact_mut(stride).zip(codes.chunks_exact(inputs)) {
-            sample[..inputs].copy_from_slice(codes);
-            if let Some(code) = constant {
-                sample[inputs] = code;
+        drives.resize(blocks * samples * BLOCK_ROWS, 0);
+        for (sample, codes) in codes.chunks_exact(inputs).enumerate() {
+            for (block, codes) in codes.chunks(BLOCK_ROWS).enumerate() {
+                let row = &mut drives[(block * samples + sample) * BLOCK_ROWS..][..BLOCK_ROWS];
+                row[..codes.len()].copy_from_slice(codes);
+                row[codes.len()..].fill(0);
+            }
+        }
+        self.load_constant(0);
+    }
+
+    /// Drives the constant row of a layer, if it has one, in every stream.
+    fn load_constant(&mut self, layer: usize) {
+        let Some(this) = self.layers.get(layer).filter(|this| this.spec.constant_row) else {
+            return;
+        };
+        let (inputs, code) = (this.spec.inputs, self.hardware.drive_bits.code_max());
+        let (block, row) = (inputs / BLOCK_ROWS, inputs % BLOCK_ROWS);
+        let size = self.samples * BLOCK_ROWS;
+        for drives in &mut self.registers[layer].drives {
+            if let Some(drives) = drives.get_mut(block * size..(block + 1) * size) {
+                for sample in drives.chunks_exact_mut(BLOCK_ROWS) {
+                    // a block of its own may hold what another batch left
+                    sample[row..].fill(0);
+                    sample[row] = code;
+                }
             }
         }
     }

@@ -105,6 +105,18 @@ pub enum DitherBits {
     Sixteen,
 }
 
+impl DitherBits {
+    /// The number of bits.
+    #[must_use]
+    pub const fn get(self) -> u32 {
+        match self {
+            Self::Zero => 0,
+            Self::Eight => 8,
+            Self::Sixteen => 16,
+        }
+    }
+}
+
 /// Where a cell's dither word comes from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum DitherPattern {

@@ -8,9 +8,12 @@
 use std::ops::Range;
 
 use super::crossbar::Crossbar;
+use super::crossbar::kernel::LookUp;
 use super::crossbar::layout::Layout;
 use super::hardware::{Adc, AdcRange, Hardware};
+use super::periphery;
 use super::population::Wiring;
+use crate::num::fixed::DriveBits;
 use crate::num::tables::{Activation, Lut, Unit};
 
 /// What a layer is made of.
@@ -149,6 +152,17 @@ impl Layer {
         };
         let writes = vec![0; arrays.len()];
         Self { index, spec, layout, lut, taps, arrays, writes, adc_shifts }
+    }
+
+    /// The table as kernels take it: what a unit hands on is its activity or, with `drive_bits`, the drive code of
+    /// the next layer.
+    #[must_use]
+    pub fn look_up(&self, drive_bits: Option<DriveBits>) -> LookUp {
+        let entries = self.lut.activity.iter().zip(&self.lut.derivative).map(|(&a, &slope)| {
+            let value = drive_bits.map_or(a, |bits| periphery::drive(a, bits));
+            u32::from_le_bytes([value, slope, 0, 0])
+        });
+        LookUp { entries: entries.collect(), shift: self.lut.shift }
     }
 
     /// Rows of each tile of a column, top to bottom.

@@ -14,7 +14,6 @@
 
 use super::hardware::Subtract;
 use crate::num::fixed::{AdcBits, DriveBits, ErrorBits, rsh, sat};
-use crate::num::tables::Lut;
 
 /// Slice `slice` of a drive code.
 #[inline]
@@ -71,13 +70,18 @@ impl Converter {
     }
 }
 
-/// Look-up of an accumulator: the table's place, and whether the index saturated.
+/// Look-up of an accumulator in a table of `2 half` entries: the place, and whether the index saturated.
 #[inline]
 #[must_use]
-pub fn index(accumulator: i64, lut: &Lut) -> (usize, bool) {
-    let half = (lut.activity.len() / 2) as i64;
-    let steps = rsh(accumulator, lut.shift);
-    let i = steps.clamp(-half, half - 1);
+pub const fn index(accumulator: i64, shift: u32, half: i64) -> (usize, bool) {
+    let steps = rsh(accumulator, shift);
+    let i = if steps < -half {
+        -half
+    } else if steps >= half {
+        half - 1
+    } else {
+        steps
+    };
     ((i + half) as usize, i != steps)
 }
 
@@ -139,9 +143,8 @@ mod tests {
 
     #[test]
     fn a_table_is_entered_at_its_middle_and_left_at_its_ends() {
-        let lut = Lut { activity: vec![0; 4], derivative: vec![0; 4], shift: 1 };
         assert_eq!(
-            [-6, -5, -4, -1, 0, 1, 2, 3, 1 << 40].map(|acc| index(acc, &lut)),
+            [-6, -5, -4, -1, 0, 1, 2, 3, 1 << 40].map(|acc| index(acc, 1, 2)),
             [
                 (0, true),
                 (0, false),

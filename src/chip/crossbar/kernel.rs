@@ -1,275 +1,382 @@
 //! The loops that touch every cell. `scalar` is the law; every other back end gives its bits.
 //!
-//! All sums are `i32`: a read adds at most 33,025 products of two bytes (the plan cuts longer columns into
-//! chunks), an update at most 4,096 products of a drive (0..=255) and a gate (-127..=127), times a mantissa
-//! of at most 15. A back end is a token that exists only where the processor has the feature.
+//! A [`Backend`] says which loops run; [`Kernel::start`] makes them ready on this thread. All sums are `i32`: a
+//! read adds at most 33,025 products of two bytes (the plan cuts longer columns into chunks), an update at most
+//! 4,096 products of a drive (0..=255) and a gate (-127..=127), times a mantissa of at most 15. A back end is a
+//! token that exists only where the processor has the feature.
+//!
+//! ```text
+//! drives      [block of 64 rows][sample][64]            u8
+//! levels      [block][half][16 groups][16 columns][4]   u8, one panel of 32 columns
+//! gates       [half][sample / 4][16 columns][4]         i8
+//! turned      [block of 64 rows][64][samples padded]    u8, drives as an update takes them
+//! ```
+//!
+//! Each is a sequence of AMX tiles: 16 rows of 64 bytes.
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
+use std::marker::PhantomData;
 use std::ops::Range;
 
-use super::layout::{BLOCK_CELLS, BLOCK_ROWS, HALF_CELLS, Layout, PANEL_COLUMNS};
+use super::layout::{BLOCK_CELLS, BLOCK_ROWS, HALF_COLUMNS, Layout, PANEL_COLUMNS};
 use crate::num::draw::Place;
+use crate::num::fixed::ErrorBits;
 
+#[cfg(target_arch = "x86_64")]
+mod amx;
 #[cfg(target_arch = "x86_64")]
 mod avx2;
 #[cfg(target_arch = "x86_64")]
 mod avx512;
+mod backend;
 #[cfg(target_arch = "x86_64")]
 mod chacha;
+mod data;
+mod lanes;
 mod scalar;
 #[cfg(test)]
 mod tests;
 
 #[cfg(target_arch = "x86_64")]
-pub use self::{avx2::Avx2, avx512::Avx512};
-
-/// Sums, or levels, of a half block. Sums lie row-major, `[64 rows][16 columns]`; levels, residuals
-/// and dither words lie as [`super::layout::in_half`] says.
-pub type Half<T> = [T; HALF_CELLS];
-
-/// Which loops run. All give the same bits.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Backend {
-    /// Plain loops: the definition.
-    Scalar,
-    /// 256-bit loops.
-    #[cfg(target_arch = "x86_64")]
-    Avx2(Avx2),
-    /// 512-bit loops with 8-bit dot products.
-    #[cfg(target_arch = "x86_64")]
-    Avx512(Avx512),
-}
-
-/// Why a back end cannot be had by its name.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-pub enum UnknownBackend {
-    /// No back end has this name on any machine.
-    #[error("there is no kernel `{name}`; say one of {}", NAMES.join(", "))]
-    Name {
-        /// What was asked for.
-        name: String,
+pub use self::{amx::Amx, avx2::Avx2, avx512::Avx512};
+pub use self::{
+    backend::{Backend, UnknownBackend},
+    data::{
+        Banks, Cells, Conversion, Dither, Drives, Half, LookUp, Scratch, TOGETHER, Write,
+        WriteCounts,
     },
-    /// The name is right, but the processor lacks the feature.
-    #[error("this processor cannot run the kernel `{name}`; it has {}", there.join(", "))]
-    Absent {
-        /// What was asked for.
-        name: String,
-        /// Names of the back ends of this machine.
-        there: Vec<&'static str>,
-    },
-}
+};
 
-/// Names of all back ends of all machines, slowest first.
-const NAMES: [&str; 3] = ["scalar", "avx2", "avx512"];
+/// What a back end does. What it does not say itself is composed of what it says, or is the law.
+trait Loops: Copy {
+    fn read(self, cells: &[u8], drives: Drives<'_>, samples: Range<usize>, out: &mut [i32]);
 
-/// Rounding of a sum to pulses.
-#[derive(Debug, Clone, Copy)]
-pub enum Dither<'a> {
-    /// Half-up.
-    Nearest,
-    /// 8 fractional bits and an 8-bit word a cell, in the order of levels.
-    Byte(&'a Half<u8>),
-    /// 16 fractional bits and a 16-bit word a cell, in the order of levels.
-    Word(&'a Half<u16>),
-}
-
-/// How sums become pulses and pulses become levels; the same for every cell of an array in one write.
-#[derive(Debug, Clone, Copy)]
-pub struct Write {
-    /// `k`: one pulse stands for `2^k` units of sum x mantissa.
-    pub shift: u32,
-    /// Small factor of the rate, 1..=15.
-    pub mantissa: i32,
-    /// Inhibitory pathways take the negated sum (negated before rounding).
-    pub negate: bool,
-    /// Bound of pulses, 1..=127.
-    pub increment_max: i32,
-    /// Least level.
-    pub floor: u16,
-    /// Greatest level.
-    pub ceiling: u16,
-    /// `F`: fractional bits of the remainder behind a cell.
-    pub residual_bits: u32,
-}
-
-/// The state behind the cells of a half block.
-#[derive(Debug)]
-pub struct Cells<'a> {
-    /// Low byte of each level.
-    pub low: &'a mut Half<u8>,
-    /// High byte, of arrays with more than 8 bits.
-    pub high: Option<&'a mut Half<u8>>,
-    /// Remainder, of writes with `residual_bits > 0`.
-    pub residual: Option<&'a mut Half<u16>>,
-    /// Cells gone for good, of absorbing floors: one byte a cell, 0 or 1.
-    pub pruned: Option<&'a mut Half<u8>>,
-}
-
-/// What one write did, summed over cells.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub struct WriteCounts {
-    /// Cells whose increment was not 0 before the bound.
-    pub requested: u64,
-    /// Cells whose increment the bound changed.
-    pub bounded: u64,
-    /// Pulses after the bound.
-    pub attempted: u64,
-    /// Levels actually moved.
-    pub effective: u64,
-}
-
-impl std::ops::AddAssign for WriteCounts {
-    fn add_assign(&mut self, other: Self) {
-        self.requested += other.requested;
-        self.bounded += other.bounded;
-        self.attempted += other.attempted;
-        self.effective += other.effective;
-    }
-}
-
-impl Backend {
-    /// The back ends this machine has, slowest first.
-    #[must_use]
-    pub fn available() -> Vec<Self> {
-        let all = [Self::Scalar].into_iter();
-        #[cfg(target_arch = "x86_64")]
-        let all = all.chain(Avx2::detect().map(Self::Avx2));
-        #[cfg(target_arch = "x86_64")]
-        let all = all.chain(Avx512::detect().map(Self::Avx512));
-        all.collect()
-    }
-
-    /// The fastest back end this machine has.
-    #[must_use]
-    pub fn best() -> Self {
-        *Self::available().last().expect("the scalar law is always there")
-    }
-
-    /// The name `--kernel` takes.
-    #[must_use]
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Scalar => "scalar",
-            #[cfg(target_arch = "x86_64")]
-            Self::Avx2(_) => "avx2",
-            #[cfg(target_arch = "x86_64")]
-            Self::Avx512(_) => "avx512",
-        }
-    }
-
-    /// The back end called `name`.
-    ///
-    /// # Errors
-    /// When no back end has that name, or this processor lacks it.
-    pub fn named(name: &str) -> Result<Self, UnknownBackend> {
-        let available = Self::available();
-        if let Some(backend) = available.iter().find(|backend| backend.name() == name) {
-            return Ok(*backend);
-        }
-        let name = name.to_owned();
-        if NAMES.contains(&name.as_str()) {
-            let there = available.into_iter().map(Self::name).collect();
-            return Err(UnknownBackend::Absent { name, there });
-        }
-        Err(UnknownBackend::Name { name })
-    }
-
-    /// Reads one panel: `out[b][c] = sum of level[r][c] * drives[b][r]` over the rows of `blocks`, for the 32
-    /// columns of the panel. `plane` is one byte plane of the panel (`blocks x 2048` bytes), `drives` holds
-    /// `stride` bytes a sample, `out` 32 sums a sample.
-    pub fn read(
+    fn read_converted(
         self,
-        plane: &[u8],
-        blocks: Range<usize>,
-        drives: &[u8],
+        banks: &Banks<'_>,
+        samples: Range<usize>,
+        scratch: &mut Scratch,
+        codes: &mut [i16],
+    ) -> [u64; 2] {
+        let mut saturated = [0; 2];
+        let blocks = banks.drives[0].blocks();
+        let groups = samples.clone().step_by(TOGETHER);
+        for (start, codes) in groups.zip(codes.chunks_mut(Scratch::SUMS)) {
+            let group = start..(start + TOGETHER).min(samples.end);
+            for first in (0..blocks).step_by(banks.tile_blocks) {
+                let tile = first..(first + banks.tile_blocks).min(blocks);
+                for (bank, out) in scratch.currents.iter_mut().enumerate() {
+                    let cells =
+                        &banks.cells[bank][tile.start * BLOCK_CELLS..tile.end * BLOCK_CELLS];
+                    let drives = banks.drives[bank].of_blocks(tile.clone());
+                    self.read(cells, drives, group.clone(), &mut out[..codes.len()]);
+                }
+                let [e, i] = [0, 1].map(|bank| &scratch.currents[bank][..codes.len()]);
+                let counts = self.convert([e, i], banks.conversion, banks.live, codes);
+                saturated.iter_mut().zip(counts).for_each(|(sum, count)| *sum += count);
+            }
+        }
+        saturated
+    }
+
+    fn convert(
+        self,
+        currents: [&[i32]; 2],
+        conversion: Conversion,
+        live: usize,
+        codes: &mut [i16],
+    ) -> [u64; 2] {
+        scalar::convert(currents, conversion, live, codes)
+    }
+
+    fn look_up(
+        self,
+        accumulators: &[i32],
+        table: &LookUp,
+        live: usize,
+        values: &mut [u8],
+        derivatives: &mut [u8],
+    ) -> u64 {
+        scalar::look_up(accumulators, table, live, values, derivatives)
+    }
+
+    fn gate(
+        self,
+        errors: &[i16],
+        derivatives: &[u8],
+        negate: bool,
+        bits: ErrorBits,
         stride: usize,
-        out: &mut [i32],
-    ) {
-        assert!(plane.len() >= blocks.end * BLOCK_CELLS, "the panel has the blocks");
-        assert!(stride >= blocks.end * BLOCK_ROWS, "every row has a drive");
-        assert_eq!(drives.len() / stride * PANEL_COLUMNS, out.len(), "32 sums a sample");
-        if out.is_empty() {
-            return;
-        }
-        match self {
-            Self::Scalar => scalar::read(plane, blocks, drives, stride, out),
-            #[cfg(target_arch = "x86_64")]
-            Self::Avx2(avx2) => avx2.read(plane, blocks, drives, stride, out),
-            #[cfg(target_arch = "x86_64")]
-            Self::Avx512(avx512) => avx512.read(plane, blocks, drives, stride, out),
-        }
+        gates: &mut [i8],
+    ) -> u64 {
+        scalar::gate(errors, derivatives, negate, bits, stride, gates)
     }
 
-    /// Reads a whole array from its columns: `out[b][r] = sum of level[r][c] * gates[b][c]` over all columns.
-    /// `plane` is one byte plane of the array, `gates` (0..=127) holds the padded columns a sample, `out` the
-    /// padded rows.
-    pub fn read_columns(self, plane: &[u8], layout: Layout, gates: &[u8], out: &mut [i32]) {
-        let (rows, columns) = (layout.rows_padded(), layout.columns_padded());
-        assert_eq!(plane.len(), layout.cells_padded(), "one byte a cell");
-        assert!(rows > 0 && columns > 0, "an array has cells");
-        assert!(gates.len().is_multiple_of(columns), "one gate a column");
-        assert_eq!(gates.len() / columns * rows, out.len(), "one sum a row");
-        debug_assert!(gates.iter().all(|gate| *gate < 128), "gates have 7 bits");
-        if out.is_empty() {
-            return;
-        }
-        match self {
-            Self::Scalar => scalar::read_columns(plane, layout, gates, out),
-            #[cfg(target_arch = "x86_64")]
-            Self::Avx2(avx2) => avx2.read_columns(plane, layout, gates, out),
-            #[cfg(target_arch = "x86_64")]
-            Self::Avx512(avx512) => avx512.read_columns(plane, layout, gates, out),
-        }
+    fn turn(self, codes: &[u8], stride: usize, turned: &mut [u8]) {
+        scalar::turn(codes, stride, turned);
     }
 
-    /// Sums of a half block: `sums[r][c] = sum over b of drives[r][b] * gates[b][c]`. `drives` holds 64 rows of
-    /// `stride` samples (a multiple of 4, padded with 0), `gates` lies `[stride / 4][16 columns][4 samples]`.
-    pub fn accumulate(self, drives: &[u8], stride: usize, gates: &[i8], sums: &mut Half<i32>) {
-        assert!(stride > 0 && stride.is_multiple_of(4), "samples are padded to words of four");
-        assert!(drives.len() == 64 * stride && gates.len() == 16 * stride, "64 rows, 16 columns");
-        match self {
-            Self::Scalar => scalar::accumulate(drives, stride, gates, sums),
-            #[cfg(target_arch = "x86_64")]
-            Self::Avx2(avx2) => avx2.accumulate(drives, stride, gates, sums),
-            #[cfg(target_arch = "x86_64")]
-            Self::Avx512(avx512) => avx512.accumulate(drives, stride, gates, sums),
-        }
+    fn read_columns(self, plane: &[u8], layout: Layout, gates: Drives<'_>, out: &mut [i32]) {
+        scalar::read_columns(plane, layout, gates, out);
     }
 
-    /// The 8-bit dither words of a half block of a logical array with `rows` rows: columns
-    /// `column .. column + 16`, rows `64 * block ..`, in the order of levels.
-    pub fn dither(
+    fn accumulate(self, turned: &[u8], stride: usize, gates: &[i8], sums: &mut Half<i32>);
+
+    fn is_quiet(self, sums: &Half<i32>, write: &Write, bits: u32) -> bool {
+        scalar::is_quiet(sums, write, bits)
+    }
+
+    fn dither(self, place: &Place, rows: usize, column: usize, block: usize, words: &mut Half<u8>) {
+        scalar::dither(place, rows, column, block, words);
+    }
+
+    fn dither_words(
         self,
         place: &Place,
         rows: usize,
         column: usize,
         block: usize,
-        out: &mut Half<u8>,
+        words: &mut Half<u16>,
     ) {
-        match self {
-            Self::Scalar => scalar::dither(place, rows, column, block, out),
-            #[cfg(target_arch = "x86_64")]
-            Self::Avx2(avx2) => avx2.dither(place, rows, column, block, out),
-            #[cfg(target_arch = "x86_64")]
-            Self::Avx512(avx512) => avx512.dither(place, rows, column, block, out),
-        }
+        scalar::dither_words(place, rows, column, block, words);
     }
 
-    /// Rounds, bounds and programs a half block.
-    pub fn program(
+    fn program(
         self,
         cells: Cells<'_>,
         sums: &Half<i32>,
         write: &Write,
         dither: Dither<'_>,
     ) -> WriteCounts {
-        assert!(write.floor <= write.ceiling, "the window is not empty");
-        match self {
-            Self::Scalar => scalar::program(cells, sums, write, dither),
+        scalar::program(cells, sums, write, dither)
+    }
+}
+
+/// A back end at work on this thread.
+#[derive(Debug)]
+pub struct Kernel {
+    loops: Ready,
+    /// What is made ready belongs to this thread.
+    _here: PhantomData<*const ()>,
+}
+
+#[derive(Debug)]
+enum Ready {
+    Scalar,
+    #[cfg(target_arch = "x86_64")]
+    Avx2(Avx2),
+    #[cfg(target_arch = "x86_64")]
+    Avx512(Avx512),
+    #[cfg(target_arch = "x86_64")]
+    Amx(amx::Tiles),
+}
+
+/// Calls a method of whichever back end it is.
+macro_rules! with {
+    ($kernel:expr, $loops:ident => $call:expr) => {
+        match &$kernel.loops {
+            Ready::Scalar => {
+                let $loops = scalar::Scalar;
+                $call
+            }
             #[cfg(target_arch = "x86_64")]
-            Self::Avx2(avx2) => avx2.program(cells, sums, write, dither),
+            &Ready::Avx2($loops) => $call,
             #[cfg(target_arch = "x86_64")]
-            Self::Avx512(avx512) => avx512.program(cells, sums, write, dither),
+            &Ready::Avx512($loops) => $call,
+            #[cfg(target_arch = "x86_64")]
+            Ready::Amx($loops) => $call,
         }
+    };
+}
+
+impl Kernel {
+    /// Makes a back end ready on this thread, until the value is dropped.
+    #[must_use]
+    pub fn start(backend: Backend) -> Self {
+        let loops = match backend {
+            Backend::Scalar => Ready::Scalar,
+            #[cfg(target_arch = "x86_64")]
+            Backend::Avx2(avx2) => Ready::Avx2(avx2),
+            #[cfg(target_arch = "x86_64")]
+            Backend::Avx512(avx512) => Ready::Avx512(avx512),
+            #[cfg(target_arch = "x86_64")]
+            Backend::Amx(amx) => Ready::Amx(amx.configure()),
+        };
+        Self { loops, _here: PhantomData }
+    }
+
+    /// Reads one panel for some samples: `out[b][c] = sum of level[r][c] * drives[b][r]`, for the 32 columns of
+    /// the panel. `cells` are the blocks of one byte plane of the panel that `drives` drives.
+    ///
+    /// # Panics
+    /// When the sizes do not match.
+    pub fn read(&self, cells: &[u8], drives: Drives<'_>, samples: Range<usize>, out: &mut [i32]) {
+        assert_eq!(cells.len(), drives.blocks() * BLOCK_CELLS, "every block has drives");
+        assert!(samples.end <= drives.samples(), "the samples are there");
+        assert_eq!(samples.len() * PANEL_COLUMNS, out.len(), "32 sums a sample");
+        if !out.is_empty() {
+            with!(self, loops => loops.read(cells, drives, samples, out));
+        }
+    }
+
+    /// Reads one panel of two banks tile by tile, converts each and adds `code_E - code_I` to `codes` (32 a
+    /// sample). Returns the conversions that saturated, by bank. The plan proves that codes add up inside 16 bits.
+    ///
+    /// # Panics
+    /// When the sizes do not match.
+    pub fn read_converted(
+        &self,
+        banks: &Banks<'_>,
+        samples: Range<usize>,
+        scratch: &mut Scratch,
+        codes: &mut [i16],
+    ) -> [u64; 2] {
+        let blocks = banks.drives[0].blocks();
+        for (cells, drives) in banks.cells.iter().zip(banks.drives) {
+            assert_eq!(cells.len(), blocks * BLOCK_CELLS, "every block has cells");
+            assert_eq!(drives.blocks(), blocks, "every block has drives");
+            assert!(samples.end <= drives.samples(), "the samples are there");
+        }
+        assert!(banks.tile_blocks > 0 && banks.live <= PANEL_COLUMNS, "a tile has cells");
+        assert!(banks.conversion.shift <= Conversion::SHIFT_MAX, "half a step fits");
+        assert_eq!(samples.len() * PANEL_COLUMNS, codes.len(), "32 codes a sample");
+        if codes.is_empty() {
+            return [0; 2];
+        }
+        with!(self, loops => loops.read_converted(banks, samples, scratch, codes))
+    }
+
+    /// Looks up accumulators (`[sample][32]`, the first `live` of them): `values` and `derivatives` lie
+    /// `[sample][64]` from this panel's first column on; columns beyond `live` are set to 0. Returns the indices
+    /// that saturated.
+    ///
+    /// # Panics
+    /// When the sizes do not match.
+    pub fn look_up(
+        &self,
+        accumulators: &[i32],
+        table: &LookUp,
+        live: usize,
+        values: &mut [u8],
+        derivatives: &mut [u8],
+    ) -> u64 {
+        let samples = accumulators.len() / PANEL_COLUMNS;
+        assert_eq!(samples * PANEL_COLUMNS, accumulators.len(), "32 accumulators a sample");
+        assert!(live <= PANEL_COLUMNS && table.shift <= 30, "a panel has 32 columns");
+        assert!(
+            table.entries.len().is_power_of_two() && table.entries.len() >= 2,
+            "2^bits entries"
+        );
+        if samples == 0 {
+            return 0;
+        }
+        let least = (samples - 1) * BLOCK_ROWS + PANEL_COLUMNS;
+        assert!(values.len() >= least && derivatives.len() >= least, "every unit has its place");
+        with!(self, loops => loops.look_up(accumulators, table, live, values, derivatives))
+    }
+
+    /// Gates of a block of 64 columns from latched error words and derivatives (both `[sample][64]`), packed for an
+    /// update: `[4 halves][stride / 4][16][4]`. `negate` is stream n. Errors lie inside the rail of their width, where
+    /// no gate saturates; the law counts those that would.
+    ///
+    /// # Panics
+    /// When the sizes do not match.
+    pub fn gate(
+        &self,
+        errors: &[i16],
+        derivatives: &[u8],
+        negate: bool,
+        bits: ErrorBits,
+        stride: usize,
+        gates: &mut [i8],
+    ) -> u64 {
+        assert_eq!(errors.len(), derivatives.len(), "every unit has an error");
+        assert!(errors.len().is_multiple_of(BLOCK_ROWS), "64 columns a sample");
+        assert!(stride.is_multiple_of(4) && stride * BLOCK_ROWS >= errors.len(), "padded samples");
+        assert_eq!(gates.len(), stride * BLOCK_ROWS, "every gate has its place");
+        with!(self, loops => loops.gate(errors, derivatives, negate, bits, stride, gates))
+    }
+
+    /// Turns one block of drives (`[sample][64]`) into rows of samples, `[64][stride]`, padded with 0.
+    ///
+    /// # Panics
+    /// When the sizes do not match.
+    pub fn turn(&self, codes: &[u8], stride: usize, turned: &mut [u8]) {
+        assert!(codes.len().is_multiple_of(BLOCK_ROWS), "64 rows a sample");
+        assert!(stride.is_multiple_of(4) && stride * BLOCK_ROWS >= codes.len(), "padded samples");
+        assert_eq!(turned.len(), stride * BLOCK_ROWS, "every code has its place");
+        with!(self, loops => loops.turn(codes, stride, turned));
+    }
+
+    /// Reads a whole array from its columns: `out[b][r] = sum of level[r][c] * gates[b][c]` over all columns.
+    /// `plane` is one byte plane of the array; `gates` are signed bytes (-127..=127) that lie as drives do, by
+    /// column; `out` holds the padded rows of each sample. 65,535 products of a level and a gate fit 32 bits.
+    ///
+    /// # Panics
+    /// When the sizes do not match.
+    pub fn read_columns(&self, plane: &[u8], layout: Layout, gates: Drives<'_>, out: &mut [i32]) {
+        assert_eq!(plane.len(), layout.cells_padded(), "one byte a cell");
+        assert_eq!(gates.blocks(), layout.columns.div_ceil(BLOCK_ROWS), "one gate a column");
+        assert_eq!(out.len(), gates.samples() * layout.rows_padded(), "one sum a row");
+        with!(self, loops => loops.read_columns(plane, layout, gates, out));
+    }
+
+    /// Sums of a half block: `sums[r][c] = sum over b of turned[r][b] * gates[b][c]`. `turned` holds 64 rows of
+    /// `stride` samples (a multiple of 4, padded with 0), `gates` lies `[stride / 4][16 columns][4 samples]`.
+    ///
+    /// # Panics
+    /// When the sizes do not match.
+    pub fn accumulate(&self, turned: &[u8], stride: usize, gates: &[i8], sums: &mut Half<i32>) {
+        assert!(stride > 0 && stride.is_multiple_of(4), "samples are padded to words of four");
+        assert_eq!(turned.len(), BLOCK_ROWS * stride, "64 rows");
+        assert_eq!(gates.len(), HALF_COLUMNS * stride, "16 columns");
+        with!(self, loops => loops.accumulate(turned, stride, gates, sums));
+    }
+
+    /// Whether every sum rounds to 0 whatever its dither word of `bits` bits: then nothing is drawn, nothing
+    /// moves and nothing is counted.
+    #[must_use]
+    pub fn is_quiet(&self, sums: &Half<i32>, write: &Write, bits: u32) -> bool {
+        with!(self, loops => loops.is_quiet(sums, write, bits))
+    }
+
+    /// The 8-bit dither words of a half block of a logical array with `rows` rows: columns
+    /// `column .. column + 16`, rows `64 * block ..`, in the order of levels.
+    pub fn dither(
+        &self,
+        place: &Place,
+        rows: usize,
+        column: usize,
+        block: usize,
+        words: &mut Half<u8>,
+    ) {
+        with!(self, loops => loops.dither(place, rows, column, block, words));
+    }
+
+    /// The 16-bit dither words of a half block, as [`Kernel::dither`] gives 8-bit words.
+    pub fn dither_words(
+        &self,
+        place: &Place,
+        rows: usize,
+        column: usize,
+        block: usize,
+        words: &mut Half<u16>,
+    ) {
+        with!(self, loops => loops.dither_words(place, rows, column, block, words));
+    }
+
+    /// Rounds, bounds and programs a half block.
+    ///
+    /// # Panics
+    /// When the window is empty.
+    pub fn program(
+        &self,
+        cells: Cells<'_>,
+        sums: &Half<i32>,
+        write: &Write,
+        dither: Dither<'_>,
+    ) -> WriteCounts {
+        assert!(write.floor <= write.ceiling, "the window is not empty");
+        with!(self, loops => loops.program(cells, sums, write, dither))
     }
 }

@@ -9,7 +9,7 @@
 //! (or, of a difference, the least). See docs/MODEL.md, 2.
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
-use super::forward::Mode;
+use super::read::Mode;
 use super::{Engine, Operation, Phase};
 use crate::chip::hardware::{Adc, AdcRange};
 use crate::num::fixed::rsh;

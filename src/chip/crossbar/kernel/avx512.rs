@@ -4,7 +4,7 @@
 //! lane += u0 * s0 + u1 * s1 + u2 * s2 + u3 * s3          u unsigned bytes, s signed bytes, i32 lane
 //! read         u = drives,  s = level - 128;   v = sum + 128 * sum of drives
 //! accumulate   u = drives,  s = gates
-//! transposed   u = levels,  s = gates (0..=127)
+//! transposed   u = levels,  s = gates
 //! ```
 //!
 //! All three are one loop, [`dots`]: a few streams of 4-byte words against vectors of 16 lanes x 4 bytes,
@@ -15,21 +15,23 @@
 use std::arch::x86_64::*;
 use std::ops::Range;
 
-use super::{Cells, Dither, Half, Write, WriteCounts};
+use super::{Cells, Conversion, Dither, Drives, Half, LookUp, Loops, Write, WriteCounts};
 use crate::chip::crossbar::layout::{BLOCK_CELLS, BLOCK_ROWS, HALF_CELLS, HALF_COLUMNS, Layout};
 use crate::num::draw::Place;
+use crate::num::fixed::ErrorBits;
 
+mod columns;
 mod dither;
+mod few;
 mod program;
+mod turn;
+mod units;
+
+pub(super) use columns::Turned;
 
 /// Proof that the processor has AVX-512 F, BW, VL, VNNI and VBMI, and counts bits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Avx512(());
-
-/// Panels whose levels are turned at a time by the transposed read.
-const TURNED_PANELS: usize = 8;
-/// Words of 4 columns in as many panels.
-const TURNED_QUADS: usize = TURNED_PANELS * 8;
 
 impl Avx512 {
     /// The token, where the processor and the system have the features.
@@ -43,62 +45,126 @@ impl Avx512 {
             && is_x86_feature_detected!("popcnt");
         there.then_some(Self(()))
     }
+}
 
-    pub(super) fn read(
+/// Calls functions compiled for the token's features.
+macro_rules! compiled {
+    ($call:expr) => {
+        // SAFETY: `self` exists only where `detect` found every feature the function is compiled for.
+        unsafe { $call }
+    };
+}
+
+/// What the matrix unit shares.
+impl Avx512 {
+    /// Turns one block of rows.
+    pub(super) fn turn_columns(
         self,
         plane: &[u8],
-        blocks: Range<usize>,
-        drives: &[u8],
-        stride: usize,
+        layout: Layout,
+        block: usize,
+        turned: &mut Turned,
+    ) {
+        compiled!(columns::turn_columns(plane, layout, block, turned));
+    }
+
+    /// Sums of 32 turned rows for some samples.
+    pub(super) fn columns_pair(
+        self,
+        gates: Drives<'_>,
+        samples: Range<usize>,
+        rows: usize,
+        turned: &Turned,
+        pair: usize,
         out: &mut [i32],
     ) {
-        // SAFETY: `self` exists only where `detect` found every feature the function is compiled for.
-        unsafe { read(plane, blocks, drives, stride, out) }
+        compiled!(columns::pair(gates, samples, rows, turned, pair, out));
+    }
+}
+
+impl Loops for Avx512 {
+    fn read(self, cells: &[u8], drives: Drives<'_>, samples: Range<usize>, out: &mut [i32]) {
+        compiled!(read(cells, drives, samples, out));
     }
 
-    pub(super) fn read_columns(self, plane: &[u8], layout: Layout, gates: &[u8], out: &mut [i32]) {
-        // SAFETY: `self` exists only where `detect` found every feature the function is compiled for.
-        unsafe { read_columns(plane, layout, gates, out) }
-    }
-
-    pub(super) fn accumulate(
+    fn convert(
         self,
-        drives: &[u8],
-        stride: usize,
-        gates: &[i8],
-        sums: &mut Half<i32>,
-    ) {
-        // SAFETY: `self` exists only where `detect` found every feature the function is compiled for.
-        unsafe { accumulate(drives, stride, gates, sums) }
+        currents: [&[i32]; 2],
+        conversion: Conversion,
+        live: usize,
+        codes: &mut [i16],
+    ) -> [u64; 2] {
+        compiled!(units::convert(currents, conversion, live, codes))
     }
 
-    pub(super) fn dither(
+    fn look_up(
+        self,
+        accumulators: &[i32],
+        table: &LookUp,
+        live: usize,
+        values: &mut [u8],
+        derivatives: &mut [u8],
+    ) -> u64 {
+        compiled!(units::look_up(accumulators, table, live, values, derivatives))
+    }
+
+    fn gate(
+        self,
+        errors: &[i16],
+        derivatives: &[u8],
+        negate: bool,
+        bits: ErrorBits,
+        stride: usize,
+        gates: &mut [i8],
+    ) -> u64 {
+        compiled!(units::gate(errors, derivatives, negate, bits, stride, gates))
+    }
+
+    fn turn(self, codes: &[u8], stride: usize, turned: &mut [u8]) {
+        compiled!(turn::turn(codes, stride, turned));
+    }
+
+    fn read_columns(self, plane: &[u8], layout: Layout, gates: Drives<'_>, out: &mut [i32]) {
+        compiled!(columns::read_columns(plane, layout, gates, out));
+    }
+
+    fn accumulate(self, turned: &[u8], stride: usize, gates: &[i8], sums: &mut Half<i32>) {
+        compiled!(accumulate(turned, stride, gates, sums));
+    }
+
+    fn is_quiet(self, sums: &Half<i32>, write: &Write, bits: u32) -> bool {
+        compiled!(program::is_quiet(sums, write, bits))
+    }
+
+    fn dither(self, place: &Place, rows: usize, column: usize, block: usize, words: &mut Half<u8>) {
+        compiled!(dither::dither(place, rows, column, block, words));
+    }
+
+    fn dither_words(
         self,
         place: &Place,
         rows: usize,
         column: usize,
         block: usize,
-        out: &mut Half<u8>,
+        words: &mut Half<u16>,
     ) {
-        // SAFETY: `self` exists only where `detect` found every feature the function is compiled for.
-        unsafe { dither::dither(place, rows, column, block, out) }
+        compiled!(dither::dither_words(place, rows, column, block, words));
     }
 
-    pub(super) fn program(
+    fn program(
         self,
         cells: Cells<'_>,
         sums: &Half<i32>,
         write: &Write,
         dither: Dither<'_>,
     ) -> WriteCounts {
-        // SAFETY: `self` exists only where `detect` found every feature the function is compiled for.
-        unsafe { program::program(cells, sums, write, dither) }
+        compiled!(program::program(cells, sums, write, dither))
     }
 }
 
 /// Levels against drives.
 const READ: u8 = 0;
-/// Gates against drives; overwrites the sums.
+/// Gates against drives.
 const GATES: u8 = 1;
 /// Turned levels against gates.
 const TURNED: u8 = 2;
@@ -110,10 +176,12 @@ struct Walk {
     runs: usize,
     /// Vectors of a run, and words of a stream it meets.
     quads: usize,
-    /// Bytes from a run to the next.
+    /// Bytes from a run of vectors to the next.
     run: usize,
     /// Bytes from a vector to the one beside it.
     half: usize,
+    /// Bytes from a stream's words of a run to those of the next run.
+    words: usize,
     /// Bytes from a stream to the next.
     stride: usize,
     /// Sums from a stream to the next.
@@ -141,7 +209,14 @@ fn load_sums(sums: &[i32; 16]) -> __m512i {
     unsafe { _mm512_loadu_si512(sums.as_ptr().cast()) }
 }
 
-/// `out[i][h] = sum over runs and quads of dot4(stream i, vector h)`, added to what is there unless `GATES`.
+#[inline]
+#[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi,popcnt")]
+fn store_sums(sums: &mut [i32; 16], v: __m512i) {
+    // SAFETY: the reference covers the 16 sums, 64 bytes, that an unaligned store writes.
+    unsafe { _mm512_storeu_si512(sums.as_mut_ptr().cast(), v) }
+}
+
+/// `out[i][h] = sum over runs and quads of dot4(stream i, vector h)`, added to what is there by `READ`.
 ///
 /// `CHAINS` sums a lane hide the latency of the instruction where there are few streams; the quads
 /// must divide by it.
@@ -153,15 +228,18 @@ fn dots<const KIND: u8, const N: usize, const H: usize, const CHAINS: usize>(
     vectors: &[u8],
     out: &mut [i32],
 ) {
-    let Walk { runs, quads, run, half, stride, out: out_stride } = walk;
+    let Walk { runs, quads, run, half, words, stride, out: out_stride } = walk;
     if runs * quads == 0 {
-        if KIND == GATES {
+        if KIND != READ {
             out.fill(0);
         }
         return;
     }
     assert!(quads.is_multiple_of(CHAINS), "no vector is left over");
-    assert!(streams.len() >= (N - 1) * stride + runs * quads * 4, "every stream has its words");
+    assert!(
+        streams.len() >= (runs - 1) * words + (N - 1) * stride + quads * 4,
+        "every stream has its words"
+    );
     assert!(vectors.len() >= (runs - 1) * run + (H - 1) * half + quads * 64, "vectors lie inside");
     assert!(out.len() >= (N - 1) * out_stride + H * 16, "every sum has its place");
     let flip = _mm512_set1_epi8(i8::MIN);
@@ -184,9 +262,9 @@ fn dots<const KIND: u8, const N: usize, const H: usize, const CHAINS: usize>(
                     }
                 }
                 for (i, acc) in acc.iter_mut().enumerate() {
-                    let at = i * stride + (r * quads + quad) * 4;
-                    // SAFETY: i < N and r * quads + quad < runs * quads, so the first assertion above bounds
-                    // the last of these 4 bytes; the read asks for no alignment.
+                    let at = r * words + i * stride + quad * 4;
+                    // SAFETY: r < runs, i < N and quad < quads, so the first assertion above bounds the last of
+                    // these 4 bytes; the read asks for no alignment.
                     let word = unsafe { streams.as_ptr().add(at).cast::<i32>().read_unaligned() };
                     let x = _mm512_set1_epi32(word);
                     for (acc, w) in acc.iter_mut().zip(w) {
@@ -208,7 +286,7 @@ fn dots<const KIND: u8, const N: usize, const H: usize, const CHAINS: usize>(
             }
             // SAFETY: i < N and h < H, so the third assertion above bounds these 16 sums.
             let at = unsafe { out.as_mut_ptr().add(i * out_stride + h * 16) };
-            if KIND != GATES {
+            if KIND == READ {
                 // SAFETY: the 16 sums at `at` lie inside `out`, as above.
                 sum = _mm512_add_epi32(sum, unsafe { _mm512_loadu_si512(at.cast()) });
             }
@@ -250,102 +328,52 @@ fn dots_batch<const KIND: u8>(
     }
 }
 
-/// Sum of bytes, a multiple of 64 of them.
+/// Sum of the drives of a sample.
+#[inline]
 #[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi,popcnt")]
-fn byte_sum(bytes: &[u8]) -> i32 {
+fn drive_sum(drives: Drives<'_>, sample: usize) -> i32 {
     let mut sum = _mm512_setzero_si512();
-    for bytes in bytes.as_chunks().0 {
-        sum = _mm512_add_epi64(sum, _mm512_sad_epu8(load(bytes), _mm512_setzero_si512()));
+    for block in 0..drives.blocks() {
+        let codes = load(drives.row(block, sample));
+        sum = _mm512_add_epi64(sum, _mm512_sad_epu8(codes, _mm512_setzero_si512()));
     }
     i32::try_from(_mm512_reduce_add_epi64(sum)).expect("at most 33,025 drives of a byte")
 }
 
 #[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi,popcnt")]
-fn read(plane: &[u8], blocks: Range<usize>, drives: &[u8], stride: usize, out: &mut [i32]) {
-    let (from, to) = (blocks.start.min(blocks.end), blocks.end);
-    let samples = out.len() / 32;
-    for (x, out) in drives.chunks_exact(stride).zip(out.chunks_exact_mut(32)) {
-        out.fill(128 * byte_sum(&x[from * BLOCK_ROWS..to * BLOCK_ROWS]));
+fn read(cells: &[u8], drives: Drives<'_>, samples: Range<usize>, out: &mut [i32]) {
+    if samples.len() <= 4 {
+        return few::read(cells, drives, samples, out);
     }
-    let walk =
-        Walk { runs: to - from, quads: 16, run: BLOCK_CELLS, half: HALF_CELLS, stride, out: 32 };
-    dots_batch::<READ>(
-        walk,
-        samples,
-        &drives[from * BLOCK_ROWS..],
-        &plane[from * BLOCK_CELLS..],
-        out,
-    );
+    for (sample, out) in samples.clone().zip(out.as_chunks_mut::<32>().0) {
+        out.fill(128 * drive_sum(drives, sample));
+    }
+    let walk = Walk {
+        runs: drives.blocks(),
+        quads: 16,
+        run: BLOCK_CELLS,
+        half: HALF_CELLS,
+        words: drives.samples() * BLOCK_ROWS,
+        stride: BLOCK_ROWS,
+        out: 32,
+    };
+    let streams = &drives.codes()[samples.start * BLOCK_ROWS..];
+    dots_batch::<READ>(walk, samples.len(), streams, cells, out);
 }
 
 #[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi,popcnt")]
-fn accumulate(drives: &[u8], stride: usize, gates: &[i8], sums: &mut Half<i32>) {
-    let walk = Walk { runs: 1, quads: stride / 4, run: 0, half: 0, stride, out: HALF_COLUMNS };
-    // SAFETY: i8 and u8 have the same size and every bit pattern is valid for both.
-    let gates = unsafe { std::slice::from_raw_parts(gates.as_ptr().cast::<u8>(), gates.len()) };
+fn accumulate(turned: &[u8], stride: usize, gates: &[i8], sums: &mut Half<i32>) {
+    let walk =
+        Walk { runs: 1, quads: stride / 4, run: 0, half: 0, words: 0, stride, out: HALF_COLUMNS };
+    let gates = as_bytes(gates);
     for row in (0..BLOCK_ROWS).step_by(16) {
         let sums = &mut sums[row * HALF_COLUMNS..][..16 * HALF_COLUMNS];
-        dots::<GATES, 16, 1, 1>(walk, &drives[row * stride..], gates, sums);
+        dots::<GATES, 16, 1, 1>(walk, &turned[row * stride..], gates, sums);
     }
 }
 
-/// The transposed read: levels are turned, 4 columns of a row to a word, once for all samples.
-#[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi,popcnt")]
-fn read_columns(plane: &[u8], layout: Layout, gates: &[u8], out: &mut [i32]) {
-    out.fill(0);
-    let samples = gates.len() / layout.columns_padded();
-    // [4 groups of 16 rows][words of 4 columns][16 rows][4 columns]
-    let mut turned = [[[0; 64]; TURNED_QUADS]; 4];
-    for first in (0..layout.panels()).step_by(TURNED_PANELS) {
-        let panels = first..layout.panels().min(first + TURNED_PANELS);
-        let walk = Walk {
-            runs: 1,
-            quads: panels.len() * 8,
-            run: 0,
-            half: TURNED_QUADS * 64,
-            stride: layout.columns_padded(),
-            out: layout.rows_padded(),
-        };
-        for block in 0..layout.blocks() {
-            for (p, panel) in panels.clone().enumerate() {
-                let cells =
-                    &plane[(panel * layout.blocks() + block) * BLOCK_CELLS..][..BLOCK_CELLS];
-                for (h, cells) in cells.as_chunks::<HALF_CELLS>().0.iter().enumerate() {
-                    turn(cells, p * 8 + h * 4, &mut turned);
-                }
-            }
-            let gates = &gates[first * 32..];
-            for pair in 0..2 {
-                let vectors = turned[2 * pair..].as_flattened().as_flattened();
-                let out = &mut out[block * BLOCK_ROWS + 32 * pair..];
-                dots_batch::<TURNED>(walk, samples, gates, vectors, out);
-            }
-        }
-    }
-}
-
-/// Turns a half block: `[4 rows, 4 columns each]` of four vectors become 16 rows of 4 columns.
-#[inline]
-#[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi,popcnt")]
-fn turn(cells: &Half<u8>, quad: usize, turned: &mut [[[u8; 64]; TURNED_QUADS]; 4]) {
-    // Byte [quarter of 4 columns][row][column] of a vector comes from its byte [column][row].
-    let mut order = [0u8; 64];
-    for (to, from) in (0u8..).zip(order.iter_mut()) {
-        *from = (to / 16 * 4 + to % 4) * 4 + to / 4 % 4;
-    }
-    let order = load(&order);
-    let (cells, _) = cells.as_chunks::<64>();
-    for (cells, turned) in cells.chunks_exact(4).zip(turned) {
-        let a = _mm512_permutexvar_epi8(order, load(&cells[0]));
-        let b = _mm512_permutexvar_epi8(order, load(&cells[1]));
-        let c = _mm512_permutexvar_epi8(order, load(&cells[2]));
-        let d = _mm512_permutexvar_epi8(order, load(&cells[3]));
-        // A 4 x 4 transposition of 128-bit quarters.
-        let (ab, cd) = (_mm512_shuffle_i32x4::<0x44>(a, b), _mm512_shuffle_i32x4::<0x44>(c, d));
-        store(&mut turned[quad], _mm512_shuffle_i32x4::<0x88>(ab, cd));
-        store(&mut turned[quad + 1], _mm512_shuffle_i32x4::<0xdd>(ab, cd));
-        let (ab, cd) = (_mm512_shuffle_i32x4::<0xee>(a, b), _mm512_shuffle_i32x4::<0xee>(c, d));
-        store(&mut turned[quad + 2], _mm512_shuffle_i32x4::<0x88>(ab, cd));
-        store(&mut turned[quad + 3], _mm512_shuffle_i32x4::<0xdd>(ab, cd));
-    }
+/// The same bytes without their sign.
+pub(super) fn as_bytes(bytes: &[i8]) -> &[u8] {
+    // SAFETY: i8 and u8 have the same size and every bit pattern is valid for both.
+    unsafe { std::slice::from_raw_parts(bytes.as_ptr().cast::<u8>(), bytes.len()) }
 }

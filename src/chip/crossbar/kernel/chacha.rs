@@ -2,18 +2,18 @@
 //!
 //! ```text
 //! word   0..4 constants | 4..12 key | 12, 13 counter | 14, 15 stream          little endian
-//! counter of column c = count << 28 | (c * ceil(rows / 64) + block)
+//! counter of column c = count << 28 | (c * blocks a column + block)
 //! ```
 //!
 //! Only word 12 differs between the columns: it holds the 28 bits of the block number.
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
 use crate::chip::crossbar::layout::HALF_COLUMNS;
-use crate::num::draw::{BLOCK_BYTES, Place};
+use crate::num::draw::Place;
 
-/// The start of the first column, and what word 12 grows by from a column to the next.
-pub(super) fn start(place: &Place, rows: usize, column: usize, block: usize) -> ([i32; 16], i32) {
-    let step = rows.div_ceil(BLOCK_BYTES) as u64;
+/// The start of the first column, and what word 12 grows by from a column to the next: `step` blocks.
+pub(super) fn start(place: &Place, step: usize, column: usize, block: usize) -> ([i32; 16], i32) {
+    let step = step as u64;
     let first = column as u64 * step + block as u64;
     let counter = place.counter(first);
     // Refuses a block beyond its 28 bits, so that word 12 of no column carries into word 13.

@@ -3,6 +3,9 @@
 //! ```text
 //! read        v[c]   = sum_r level[r][c] * x[r]
 //! transposed  v[r]   = sum_c level[r][c] * g[c]
+//! converted   code[c] += min( rsh(v_E, ash), max ) - min( rsh(v_I, ash), max )      tile by tile
+//! look-up     i = clamp( rsh(acc, lsh), -half, half - 1 );  value, derivative = table[i]
+//! gate        u = sat_8( rsh( err * a', error_bits ) )
 //! sums        s[r,c] = sum_b x[b][r] * u[b][c],  negated for inhibitory pathways
 //! pulses      p = clamp( SR(s * mantissa, k), -d_max, +d_max )
 //! SR(s, k)    = (q + r) >> D,  q = rsh(s, k - D) or s << (D - k),  r uniform in 0..2^D-1;  D = 0: rsh(s, k)
@@ -11,33 +14,47 @@
 //! ```
 //!
 //! Level and residual are one number: without that, a cell pushed below its floor would keep a full residual and the
-//! next small push upward would lift it. //! See docs/MODEL.md, 3.
+//! next small push upward would lift it. See docs/MODEL.md, 2 and 3.
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
 use std::ops::Range;
 
-use super::{Cells, Dither, Half, Write, WriteCounts};
-use crate::chip::crossbar::layout::{BLOCK_CELLS, HALF_CELLS, HALF_COLUMNS, Layout, in_half};
+use super::{Cells, Conversion, Dither, Drives, Half, LookUp, Loops, Write, WriteCounts};
+use crate::chip::crossbar::layout::{
+    BLOCK_CELLS, BLOCK_ROWS, HALF_CELLS, HALF_COLUMNS, Layout, PANEL_COLUMNS, in_half,
+};
 use crate::num::draw::Place;
-use crate::num::fixed::rsh;
+use crate::num::fixed::{ErrorBits, rsh, sat};
 
-pub(super) fn read(
-    plane: &[u8],
-    blocks: Range<usize>,
-    drives: &[u8],
-    stride: usize,
-    out: &mut [i32],
-) {
-    for (x, out) in drives.chunks_exact(stride).zip(out.chunks_exact_mut(32)) {
-        out.fill(0);
-        for block in blocks.clone() {
-            let cells = &plane[block * BLOCK_CELLS..][..BLOCK_CELLS];
-            for (half, cells) in cells.chunks_exact(HALF_CELLS).enumerate() {
-                for row in 0..64 {
-                    let drive = i32::from(x[block * 64 + row]);
-                    for column in 0..HALF_COLUMNS {
-                        out[half * HALF_COLUMNS + column] +=
-                            i32::from(cells[in_half(row, column)]) * drive;
+/// The law as a back end.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Scalar;
+
+impl Loops for Scalar {
+    fn read(self, cells: &[u8], drives: Drives<'_>, samples: Range<usize>, out: &mut [i32]) {
+        for (sample, out) in samples.zip(out.chunks_exact_mut(PANEL_COLUMNS)) {
+            out.fill(0);
+            for (block, cells) in cells.chunks_exact(BLOCK_CELLS).enumerate() {
+                let x = drives.row(block, sample);
+                for (half, cells) in cells.chunks_exact(HALF_CELLS).enumerate() {
+                    for (row, &drive) in x.iter().enumerate() {
+                        for column in 0..HALF_COLUMNS {
+                            out[half * HALF_COLUMNS + column] +=
+                                i32::from(cells[in_half(row, column)]) * i32::from(drive);
+                        }
+                    }
+                }
+            }
+        }
+    }
+
+    fn accumulate(self, turned: &[u8], stride: usize, gates: &[i8], sums: &mut Half<i32>) {
+        sums.fill(0);
+        for (x, sums) in turned.chunks_exact(stride).zip(sums.chunks_exact_mut(HALF_COLUMNS)) {
+            for (x, u) in x.chunks_exact(4).zip(gates.chunks_exact(64)) {
+                for (sum, u) in sums.iter_mut().zip(u.chunks_exact(4)) {
+                    for (x, u) in x.iter().zip(u) {
+                        *sum += i32::from(*x) * i32::from(*u);
                     }
                 }
             }
@@ -45,49 +62,150 @@ pub(super) fn read(
     }
 }
 
-pub(super) fn read_columns(plane: &[u8], layout: Layout, gates: &[u8], out: &mut [i32]) {
-    let gates = gates.chunks_exact(layout.columns_padded());
-    for (gates, out) in gates.zip(out.chunks_exact_mut(layout.rows_padded())) {
+pub(super) fn convert(
+    currents: [&[i32]; 2],
+    conversion: Conversion,
+    live: usize,
+    codes: &mut [i16],
+) -> [u64; 2] {
+    let mut saturated = [0; 2];
+    for (at, code) in codes.iter_mut().enumerate() {
+        if at % PANEL_COLUMNS >= live {
+            continue;
+        }
+        let bank = |bank: usize| rsh(i64::from(currents[bank][at]), conversion.shift);
+        let max = i64::from(conversion.max);
+        let steps = [bank(0), bank(1)];
+        *code += (steps[0].min(max) - steps[1].min(max)) as i16;
+        saturated.iter_mut().zip(steps).for_each(|(count, steps)| *count += u64::from(steps > max));
+    }
+    saturated
+}
+
+pub(super) fn look_up(
+    accumulators: &[i32],
+    table: &LookUp,
+    live: usize,
+    values: &mut [u8],
+    derivatives: &mut [u8],
+) -> u64 {
+    let half = (table.entries.len() / 2) as i64;
+    let mut saturated = 0;
+    for (sample, accumulators) in accumulators.chunks_exact(PANEL_COLUMNS).enumerate() {
+        for (column, &accumulator) in accumulators.iter().enumerate() {
+            let at = sample * BLOCK_ROWS + column;
+            let steps = rsh(i64::from(accumulator), table.shift);
+            let i = steps.clamp(-half, half - 1);
+            let entry = if column < live { table.entries[(i + half) as usize] } else { 0 };
+            [values[at], derivatives[at], ..] = entry.to_le_bytes();
+            saturated += u64::from(column < live && i != steps);
+        }
+    }
+    saturated
+}
+
+pub(super) fn gate(
+    errors: &[i16],
+    derivatives: &[u8],
+    negate: bool,
+    bits: ErrorBits,
+    stride: usize,
+    gates: &mut [i8],
+) -> u64 {
+    gates.fill(0);
+    let mut saturated = 0;
+    for (at, (&error, &slope)) in errors.iter().zip(derivatives).enumerate() {
+        let (sample, column) = (at / BLOCK_ROWS, at % BLOCK_ROWS);
+        let error = if negate { -i64::from(error) } else { i64::from(error) };
+        let (u, changed) = sat(rsh(error * i64::from(slope), bits.get()), 8);
+        let half = column / HALF_COLUMNS * HALF_COLUMNS * stride;
+        gates[half + sample / 4 * 64 + column % HALF_COLUMNS * 4 + sample % 4] = u as i8;
+        saturated += u64::from(changed);
+    }
+    saturated
+}
+
+pub(super) fn turn(codes: &[u8], stride: usize, turned: &mut [u8]) {
+    turned.fill(0);
+    for (sample, codes) in codes.chunks_exact(BLOCK_ROWS).enumerate() {
+        for (row, &code) in codes.iter().enumerate() {
+            turned[row * stride + sample] = code;
+        }
+    }
+}
+
+pub(super) fn read_columns(plane: &[u8], layout: Layout, gates: Drives<'_>, out: &mut [i32]) {
+    for (sample, out) in out.chunks_exact_mut(layout.rows_padded()).enumerate() {
         for (row, out) in out.iter_mut().enumerate() {
             *out = 0;
-            for (column, gate) in gates.iter().enumerate() {
-                *out += i32::from(plane[layout.index(row, column)]) * i32::from(*gate);
+            for column in 0..layout.columns {
+                let gate = gates.row(column / BLOCK_ROWS, sample)[column % BLOCK_ROWS];
+                *out += i32::from(plane[layout.index(row, column)]) * i32::from(gate.cast_signed());
             }
         }
     }
 }
 
-pub(super) fn accumulate(drives: &[u8], stride: usize, gates: &[i8], sums: &mut Half<i32>) {
-    sums.fill(0);
-    for (x, sums) in drives.chunks_exact(stride).zip(sums.chunks_exact_mut(HALF_COLUMNS)) {
-        for (x, u) in x.chunks_exact(4).zip(gates.chunks_exact(64)) {
-            for (sum, u) in sums.iter_mut().zip(u.chunks_exact(4)) {
-                for (x, u) in x.iter().zip(u) {
-                    *sum += i32::from(*x) * i32::from(*u);
-                }
-            }
-        }
-    }
-}
-
-pub(super) fn dither(place: &Place, rows: usize, column: usize, block: usize, out: &mut Half<u8>) {
+pub(super) fn dither(
+    place: &Place,
+    rows: usize,
+    column: usize,
+    block: usize,
+    words: &mut Half<u8>,
+) {
     for c in 0..HALF_COLUMNS {
-        let mut words = [0; 64];
-        place.bytes(rows, column + c, block, &mut words);
-        for (row, word) in words.iter().enumerate() {
-            out[in_half(row, c)] = *word;
+        let mut bytes = [0; 64];
+        place.bytes(rows, column + c, block, &mut bytes);
+        for (row, byte) in bytes.iter().enumerate() {
+            words[in_half(row, c)] = *byte;
         }
+    }
+}
+
+/// Rows of a group beyond the last one have words that nobody reads.
+pub(super) fn dither_words(
+    place: &Place,
+    rows: usize,
+    column: usize,
+    block: usize,
+    words: &mut Half<u16>,
+) {
+    for (c, group) in (0..HALF_COLUMNS).flat_map(|c| [(c, 0), (c, 1)]) {
+        if (2 * block + group) * 32 < rows {
+            let drawn = place.halves(rows, column + c, 2 * block + group);
+            for (row, word) in drawn.into_iter().enumerate() {
+                words[in_half(32 * group + row, c)] = word;
+            }
+        }
+    }
+}
+
+/// The sum in units of `2^-bits` pulses, before a word is added.
+fn quotient(sum: i64, shift: i64, bits: u32) -> i64 {
+    let by = shift - i64::from(bits);
+    match u32::try_from(by) {
+        Ok(right) => rsh(sum, right),
+        Err(_) => sum << by.unsigned_abs(),
     }
 }
 
 /// `SR(sum, k)`: rounds to units of `2^shift`, with a word of `bits` random bits.
 fn round(sum: i64, shift: i64, bits: u32, word: i64) -> i64 {
-    let by = shift - i64::from(bits);
-    let q = match u32::try_from(by) {
-        Ok(right) => rsh(sum, right),
-        Err(_) => sum << by.unsigned_abs(),
-    };
-    (q + word) >> bits
+    (quotient(sum, shift, bits) + word) >> bits
+}
+
+/// The sum that is rounded, and by how much.
+fn scaled(sum: i32, write: &Write) -> (i64, i64) {
+    let sum = i64::from(sum) * i64::from(write.mantissa);
+    let sum = if write.negate { -sum } else { sum };
+    (sum, i64::from(write.shift) - i64::from(write.residual_bits))
+}
+
+pub(super) fn is_quiet(sums: &Half<i32>, write: &Write, bits: u32) -> bool {
+    sums.iter().all(|&sum| {
+        let (sum, shift) = scaled(sum, write);
+        quotient(sum, shift, bits) == 0
+    })
 }
 
 pub(super) fn program(
@@ -100,14 +218,13 @@ pub(super) fn program(
     let (floor, ceiling) = (i64::from(write.floor), i64::from(write.ceiling));
     let bound = i64::from(write.increment_max);
     let fraction = write.residual_bits;
-    for row in 0..64 {
+    for row in 0..BLOCK_ROWS {
         for column in 0..HALF_COLUMNS {
             let at = in_half(row, column);
             // a pruned cell takes pulses and does not move: attempted, not effective
-            let gone = cells.pruned.as_ref().is_some_and(|pruned| pruned[at] != 0);
-            let sum = i64::from(sums[row * HALF_COLUMNS + column]) * i64::from(write.mantissa);
-            let sum = if write.negate { -sum } else { sum };
-            let shift = i64::from(write.shift) - i64::from(fraction);
+            let gone =
+                cells.pruned.as_ref().is_some_and(|bits| bits[at / 64] >> (at % 64) & 1 == 1);
+            let (sum, shift) = scaled(sums[row * HALF_COLUMNS + column], write);
             let rounded = match dither {
                 Dither::Nearest => round(sum, shift, 0, 0),
                 Dither::Byte(words) => round(sum, shift, 8, i64::from(words[at])),
@@ -135,7 +252,8 @@ pub(super) fn program(
                 residual[at] = u16::try_from(left).expect("at most 15 fractional bits");
             }
             if let Some(pruned) = cells.pruned.as_mut() {
-                pruned[at] = u8::from(gone || (pulses != 0 && level == floor));
+                let now = gone || (pulses != 0 && level == floor);
+                pruned[at / 64] |= u64::from(now) << (at % 64);
             }
             counts.requested += u64::from(wanted != 0);
             counts.bounded += u64::from(wanted != pulses);

@@ -3,8 +3,9 @@
 
 use proptest::prelude::*;
 
+use super::backend::NAMES;
 use super::*;
-use crate::chip::crossbar::layout::{HALF_COLUMNS, in_half};
+use crate::chip::crossbar::layout::{HALF_CELLS, HALF_COLUMNS, in_half};
 use crate::num::draw::{BLOCK_BYTES, Site};
 
 /// Bytes from a seed, or only the greatest when the seed says so.
@@ -20,8 +21,17 @@ fn half<T: Copy>(words: &[T]) -> Half<T> {
     words.try_into().expect("1024 words")
 }
 
-fn others() -> impl Iterator<Item = Backend> {
-    Backend::available().into_iter().skip(1)
+fn law() -> Kernel {
+    Kernel::start(Backend::Scalar)
+}
+
+/// Every back end but the law, started one after the other.
+fn others() -> impl Iterator<Item = (&'static str, Kernel)> {
+    all().skip(1)
+}
+
+fn all() -> impl Iterator<Item = (&'static str, Kernel)> {
+    Backend::available().into_iter().map(|backend| (backend.name(), Kernel::start(backend)))
 }
 
 fn gates(seed: u64, len: usize) -> Vec<i8> {
@@ -29,56 +39,170 @@ fn gates(seed: u64, len: usize) -> Vec<i8> {
     if seed.is_multiple_of(8) { gates.map(|_| -127).collect() } else { gates.collect() }
 }
 
-fn check_read(blocks: usize, range: Range<usize>, batch: usize, seed: u64) {
-    let (stride, plane) = (blocks * 64, bytes(seed, blocks * BLOCK_CELLS));
-    let drives = bytes(seed / 4, batch * stride);
-    let mut law = vec![7; batch * 32];
-    Backend::Scalar.read(&plane, range.clone(), &drives, stride, &mut law);
-    for backend in others() {
-        let mut out = vec![9; batch * 32];
-        backend.read(&plane, range.clone(), &drives, stride, &mut out);
-        assert_eq!(out, law, "{} {blocks} {range:?} {batch}", backend.name());
+fn check_read(blocks: usize, batch: usize, samples: Range<usize>, seed: u64) {
+    let cells = bytes(seed, blocks * BLOCK_CELLS);
+    let codes = sparse(seed / 4, blocks * batch * BLOCK_ROWS);
+    let drives = Drives::new(&codes, batch);
+    let mut want = vec![7; samples.len() * 32];
+    law().read(&cells, drives, samples.clone(), &mut want);
+    for (name, kernel) in others() {
+        let mut out = vec![9; want.len()];
+        kernel.read(&cells, drives, samples.clone(), &mut out);
+        assert_eq!(out, want, "{name} {blocks} {batch} {samples:?}");
+    }
+}
+
+/// Bytes of which, for some seeds, most are 0.
+fn sparse(seed: u64, len: usize) -> Vec<u8> {
+    let mut codes = bytes(seed, len);
+    if seed % 4 == 1 {
+        codes.iter_mut().for_each(|code| *code = code.saturating_sub(240));
+    }
+    codes
+}
+
+fn check_converted(
+    blocks: usize,
+    tile_blocks: usize,
+    batch: usize,
+    (live, shift, bits): (usize, u32, u32),
+    seed: u64,
+) {
+    let cells = [0, 1].map(|bank| bytes(seed / 2 + bank, blocks * BLOCK_CELLS));
+    let codes = [0, 1].map(|bank| sparse(seed / 4 + bank, blocks * batch * BLOCK_ROWS));
+    let banks = Banks {
+        cells: cells.each_ref().map(|cells| &cells[..]),
+        drives: codes.each_ref().map(|codes| Drives::new(codes, batch)),
+        tile_blocks,
+        conversion: Conversion { shift, max: (1 << bits) - 1 },
+        live,
+    };
+    let mut scratch = Scratch::new();
+    let mut want = vec![3; batch * 32];
+    let counted = law().read_converted(&banks, 0..batch, &mut scratch, &mut want);
+    for (name, kernel) in others() {
+        let mut out = vec![3; batch * 32];
+        let counts = kernel.read_converted(&banks, 0..batch, &mut scratch, &mut out);
+        assert_eq!(counts, counted, "{name} {blocks} {tile_blocks} {batch} {live} {shift} {bits}");
+        assert_eq!(out, want, "{name} {blocks} {tile_blocks} {batch} {live} {shift} {bits}");
+    }
+}
+
+fn check_look_up(samples: usize, live: usize, bits: u32, shift: u32, seed: u64) {
+    let raw = bytes(seed | 1, samples * 32 * 4);
+    let sums: Vec<_> = raw.as_chunks().0.iter().map(|word| i32::from_le_bytes(*word)).collect();
+    let sums: Vec<_> = sums.iter().map(|sum| sum >> 2 >> (seed % 20)).collect();
+    let entries = (0..1u32 << bits).map(|i| i.wrapping_mul(40_503) & 0xffff).collect();
+    let table = LookUp { entries, shift };
+    let run = |kernel: &Kernel| {
+        let (mut values, mut slopes) = (vec![1; samples * 64], vec![2; samples * 64]);
+        let at = if live % 2 == 0 { 0 } else { 32 };
+        let saturated = kernel.look_up(&sums, &table, live, &mut values[at..], &mut slopes[at..]);
+        (values, slopes, saturated)
+    };
+    let want = run(&law());
+    for (name, kernel) in others() {
+        assert_eq!(run(&kernel), want, "{name} {samples} {live} {bits} {shift}");
+    }
+}
+
+fn check_gate(samples: usize, stride: usize, bits: i64, seed: u64) {
+    let bits = ErrorBits::new(bits).unwrap();
+    let rail = (1i16 << (bits.get() - 1)) - 1;
+    let errors: Vec<i16> = bytes(seed, samples * 128)
+        .as_chunks()
+        .0
+        .iter()
+        .map(|word| i16::from_le_bytes(*word))
+        .map(|error| if seed % 8 == 1 { rail * error.signum() } else { error % (rail + 1) })
+        .collect();
+    let slopes = bytes(seed / 4, samples * 64);
+    for negate in [false, true] {
+        let run = |kernel: &Kernel| {
+            let mut gates = vec![5; stride * 64];
+            let saturated = kernel.gate(&errors, &slopes, negate, bits, stride, &mut gates);
+            (gates, saturated)
+        };
+        let want = run(&law());
+        assert_eq!(want.1, 0, "no gate of {bits:?} saturates");
+        for (name, kernel) in others() {
+            assert_eq!(run(&kernel), want, "{name} {samples} {stride} {bits:?}");
+        }
+    }
+}
+
+fn check_turn(samples: usize, stride: usize, seed: u64) {
+    let codes = bytes(seed, samples * 64);
+    let mut want = vec![1; stride * 64];
+    law().turn(&codes, stride, &mut want);
+    for (name, kernel) in others() {
+        let mut out = vec![2; stride * 64];
+        kernel.turn(&codes, stride, &mut out);
+        assert_eq!(out, want, "{name} {samples} {stride}");
     }
 }
 
 fn check_read_columns(layout: Layout, batch: usize, seed: u64) {
     let plane = bytes(seed, layout.cells_padded());
-    let mut gates = bytes(seed / 4, batch * layout.columns_padded());
-    gates.iter_mut().for_each(|gate| *gate &= 127);
-    let mut law = vec![7; batch * layout.rows_padded()];
-    Backend::Scalar.read_columns(&plane, layout, &gates, &mut law);
-    for backend in others() {
-        let mut out = vec![9; law.len()];
-        backend.read_columns(&plane, layout, &gates, &mut out);
-        assert_eq!(out, law, "{} {layout:?} {batch}", backend.name());
+    let blocks = layout.columns.div_ceil(BLOCK_ROWS);
+    let mut codes = bytes(seed / 4, batch * blocks * BLOCK_ROWS);
+    for (at, gate) in codes.iter_mut().enumerate() {
+        let column = at / (batch * BLOCK_ROWS) * BLOCK_ROWS + at % BLOCK_ROWS;
+        *gate = match *gate {
+            _ if column >= layout.columns => 0,
+            255 => 127,
+            128 => 129,
+            gate => gate,
+        };
+    }
+    let gates = Drives::new(&codes, batch);
+    let mut want = vec![7; batch * layout.rows_padded()];
+    law().read_columns(&plane, layout, gates, &mut want);
+    for (name, kernel) in others() {
+        let mut out = vec![9; want.len()];
+        kernel.read_columns(&plane, layout, gates, &mut out);
+        assert_eq!(out, want, "{name} {layout:?} {batch}");
     }
 }
 
 fn check_accumulate(stride: usize, seed: u64) {
-    let (drives, gates) = (bytes(seed, 64 * stride), gates(seed / 4, 16 * stride));
-    let mut law = [7; HALF_CELLS];
-    Backend::Scalar.accumulate(&drives, stride, &gates, &mut law);
-    for backend in others() {
+    let (turned, gates) = (bytes(seed, 64 * stride), gates(seed / 4, 16 * stride));
+    let mut want = [7; HALF_CELLS];
+    law().accumulate(&turned, stride, &gates, &mut want);
+    for (name, kernel) in others() {
         let mut sums = [9; HALF_CELLS];
-        backend.accumulate(&drives, stride, &gates, &mut sums);
-        assert!(sums == law, "{} {stride}", backend.name());
+        kernel.accumulate(&turned, stride, &gates, &mut sums);
+        assert!(sums == want, "{name} {stride}");
     }
 }
 
-/// Levels and remainders after a write, under one back end.
+/// Everything a write may change, and what it counted.
+#[derive(Debug, Clone, PartialEq)]
+struct State {
+    low: Half<u8>,
+    high: Half<u8>,
+    residual: Half<u16>,
+    pruned: [u64; 16],
+    counts: WriteCounts,
+}
+
+/// The state after a write. `wide` levels have a high byte; with `absorbs` the floor keeps cells.
 fn programmed(
-    backend: Backend,
-    levels: &Half<u8>,
-    residual: &Half<u16>,
+    kernel: &Kernel,
+    mut state: State,
     sums: &Half<i32>,
     write: &Write,
     dither: Dither<'_>,
-) -> (Half<u8>, Half<u16>, WriteCounts) {
-    let (mut low, mut left) = (*levels, *residual);
-    let residual = (write.residual_bits > 0).then_some(&mut left);
-    let cells = Cells { low: &mut low, high: None, residual, pruned: None };
-    let counts = backend.program(cells, sums, write, dither);
-    (low, left, counts)
+    [wide, absorbs]: [bool; 2],
+) -> State {
+    let cells = Cells {
+        low: &mut state.low,
+        high: wide.then_some(&mut state.high),
+        residual: (write.residual_bits > 0).then_some(&mut state.residual),
+        pruned: absorbs.then_some(&mut state.pruned),
+    };
+    state.counts = kernel.program(cells, sums, write, dither);
+    state
 }
 
 fn check_program(levels: &Half<u8>, sums: &Half<i32>, write: &Write, seed: u64) {
@@ -89,12 +213,34 @@ fn check_program(levels: &Half<u8>, sums: &Half<i32>, write: &Write, seed: u64) 
     let mut residual = words;
     residual.reverse();
     residual.iter_mut().for_each(|left| *left &= (1 << write.residual_bits) - 1);
+    let high = levels.map(|level| level.rotate_left(3) & 15);
+    let pruned = std::array::from_fn(|i| u64::from(words[i]) * 0x8000_4000_2001);
+    let fresh = State { low: *levels, high, residual, pruned, counts: WriteCounts::default() };
     for dither in [Dither::Nearest, Dither::Byte(&byte_words), Dither::Word(&words)] {
-        let law = programmed(Backend::Scalar, levels, &residual, sums, write, dither);
-        for backend in others() {
-            let got = programmed(backend, levels, &residual, sums, write, dither);
-            assert_eq!(got.2, law.2, "{} {write:?}", backend.name());
-            assert!(got == law, "{} {write:?}", backend.name());
+        for modes in [[false, false], [false, true], [true, false], [true, true]] {
+            if modes[0] && write.ceiling == 0 {
+                continue;
+            }
+            let write = if modes[0] { &Write { ceiling: 4095, ..*write } } else { write };
+            let want = programmed(&law(), fresh.clone(), sums, write, dither, modes);
+            for (name, kernel) in others() {
+                let got = programmed(&kernel, fresh.clone(), sums, write, dither, modes);
+                assert_eq!(got.counts, want.counts, "{name} {write:?} {modes:?}");
+                assert!(got == want, "{name} {write:?} {modes:?}");
+            }
+        }
+        let bits = match dither {
+            Dither::Nearest => 0,
+            Dither::Byte(_) => 8,
+            Dither::Word(_) => 16,
+        };
+        let quiet = law().is_quiet(sums, write, bits);
+        for (name, kernel) in others() {
+            assert_eq!(kernel.is_quiet(sums, write, bits), quiet, "{name} {write:?}");
+        }
+        if quiet && (write.floor, write.ceiling) == (0, 255) {
+            let after = programmed(&law(), fresh.clone(), sums, write, dither, [false, true]);
+            assert!(after == fresh, "a quiet write moves and counts nothing");
         }
     }
 }
@@ -114,21 +260,50 @@ const PLAIN: Write = Write {
 
 #[test]
 fn every_tail_of_a_batch_reads_the_same() {
-    for batch in (0..=40).chain([128]) {
-        check_read(3, 0..3, batch, 4 + batch as u64);
-        check_read(2, 1..2, batch, 17);
+    for batch in (1..=66).chain([128]) {
+        check_read(3, batch, 0..batch, 4 + batch as u64);
+        check_read(1, batch, batch / 3..batch, 5);
         check_read_columns(Layout { rows: 65, columns: 33 }, batch, 5);
+        check_converted(3, 2, batch, (32, 9, 6), 21);
+        check_look_up(batch, 31, 10, 7, 3);
+        check_gate(batch, batch.next_multiple_of(4), 8, 9);
+        check_turn(batch, batch.next_multiple_of(64), 3);
     }
-    check_read(2, 1..1, 3, 1);
-    check_read(2, 2..2, 3, 1);
+    check_read(2, 3, 1..1, 1);
 }
 
 #[test]
 fn the_longest_column_of_full_bytes_does_not_wrap() {
-    for batch in [1, 5] {
-        check_read(516, 0..516, batch, 0);
+    for batch in [1, 5, 16, 32] {
+        check_read(512, batch, 0..batch, 0);
     }
-    check_read_columns(Layout { rows: 3, columns: 33_000 }, 1, 0);
+    check_read_columns(Layout { rows: 3, columns: 65_535 }, 1, 0);
+    check_read_columns(Layout { rows: 3, columns: 65_535 }, 32, 0);
+}
+
+#[test]
+fn every_shift_of_a_converter_and_every_width_converts_the_same() {
+    for shift in 0..=30 {
+        for bits in [1, 2, 7, 8, 12, 14] {
+            check_converted(4, 2, 33, (17, shift, bits), 0);
+            check_converted(4, 2, 33, (32, shift, bits), 5);
+        }
+    }
+}
+
+#[test]
+fn accumulators_at_the_ends_of_32_bits_are_looked_up_alike() {
+    for shift in 0..=30 {
+        let ends = [i32::MIN, i32::MIN + 1, -1, 0, 1, i32::MAX - 1, i32::MAX, 1 << shift];
+        let sums: Vec<_> = ends.iter().copied().cycle().take(64).collect();
+        let table = LookUp { entries: (0..1024).collect(), shift };
+        let run = |kernel: &Kernel| {
+            let (mut values, mut slopes) = (vec![0; 128], vec![0; 128]);
+            (kernel.look_up(&sums, &table, 32, &mut values, &mut slopes), values, slopes)
+        };
+        let want = run(&law());
+        others().for_each(|(name, kernel)| assert_eq!(run(&kernel), want, "{name} {shift}"));
+    }
 }
 
 #[test]
@@ -142,14 +317,16 @@ fn every_stride_accumulates_the_same() {
 #[test]
 fn the_order_of_levels_is_the_order_of_dither() {
     let place = Place::global(7, Site::WriteDither, 3);
-    for backend in Backend::available() {
-        let mut out = [0; HALF_CELLS];
-        backend.dither(&place, 70, 16, 1, &mut out);
+    for (_, kernel) in all() {
+        let (mut out, mut wide) = ([0; HALF_CELLS], [0; HALF_CELLS]);
+        kernel.dither(&place, 70, 16, 1, &mut out);
+        kernel.dither_words(&place, 170, 16, 1, &mut wide);
         for column in 0..16 {
             let mut words = [0; BLOCK_BYTES];
             place.bytes(70, 16 + column, 1, &mut words);
             for (row, word) in words.iter().enumerate() {
                 assert_eq!(out[in_half(row, column)], *word);
+                assert_eq!(wide[in_half(row, column)], place.half(170, 64 + row, 16 + column));
             }
         }
     }
@@ -159,12 +336,15 @@ fn the_order_of_levels_is_the_order_of_dither() {
 fn the_last_block_of_random_words_is_drawn_and_the_next_refused() {
     let place = Place::global(7, Site::WriteDither, (1 << 36) - 1);
     for backend in Backend::available() {
-        let (mut law, mut out) = ([0; HALF_CELLS], [0; HALF_CELLS]);
+        let (mut want, mut out) = ([0; HALF_CELLS], [0; HALF_CELLS]);
         let (column, block) = ((1 << 28) - 16, 0);
-        Backend::Scalar.dither(&place, 64, column, block, &mut law);
-        backend.dither(&place, 64, column, block, &mut out);
-        assert!(out == law);
-        let beyond = || backend.dither(&place, 64, column + 1, block, &mut [0; HALF_CELLS]);
+        law().dither(&place, 64, column, block, &mut want);
+        Kernel::start(backend).dither(&place, 64, column, block, &mut out);
+        assert!(out == want);
+        let beyond = || {
+            let kernel = Kernel::start(backend);
+            kernel.dither(&place, 64, column + 1, block, &mut [0; HALF_CELLS]);
+        };
         assert!(std::panic::catch_unwind(beyond).is_err());
     }
 }
@@ -173,15 +353,23 @@ fn the_last_block_of_random_words_is_drawn_and_the_next_refused() {
 fn a_zero_sum_moves_nothing_whatever_the_word() {
     let levels = half(&bytes(1, HALF_CELLS));
     let (greatest, words) = ([255; HALF_CELLS], [u16::MAX; HALF_CELLS]);
-    for backend in Backend::available() {
+    for (name, kernel) in all() {
         for shift in 0..=31 {
             for negate in [false, true] {
                 let write = Write { shift, negate, ..PLAIN };
                 for dither in [Dither::Nearest, Dither::Byte(&greatest), Dither::Word(&words)] {
-                    let (none, sums) = ([0; HALF_CELLS], [0; HALF_CELLS]);
-                    let got = programmed(backend, &levels, &none, &sums, &write, dither);
-                    let still = (levels, none, WriteCounts::default());
-                    assert!(got == still, "{} {shift}", backend.name());
+                    let still = State {
+                        low: levels,
+                        high: [0; HALF_CELLS],
+                        residual: [0; HALF_CELLS],
+                        pruned: [0; 16],
+                        counts: WriteCounts::default(),
+                    };
+                    let sums = [0; HALF_CELLS];
+                    let modes = [false, true];
+                    let got = programmed(&kernel, still.clone(), &sums, &write, dither, modes);
+                    assert!(got == still, "{name} {shift}");
+                    assert!(kernel.is_quiet(&sums, &write, 8));
                 }
             }
         }
@@ -238,7 +426,7 @@ fn a_name_says_whether_it_is_unknown_or_absent() {
         assert!(NAMES.contains(&backend.name()));
     }
     let unknown = Backend::named("neon").unwrap_err().to_string();
-    assert_eq!(unknown, "there is no kernel `neon`; say one of scalar, avx2, avx512");
+    assert_eq!(unknown, "there is no kernel `neon`; say one of scalar, avx2, avx512, amx");
     let absent = UnknownBackend::Absent { name: "avx512".into(), there: vec!["scalar", "avx2"] };
     assert_eq!(
         absent.to_string(),
@@ -265,14 +453,34 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
 
     #[test]
-    fn reads_are_the_law(blocks in 1usize..6, a in 0usize..6, b in 0usize..6, batch in 0usize..40, seed: u64) {
-        let (a, b) = (a.min(blocks), b.min(blocks));
-        check_read(blocks, a.min(b)..a.max(b), batch, seed);
+    fn reads_are_the_law(blocks in 1usize..6, batch in 1usize..70, a in 0usize..70, b in 0usize..70, seed: u64) {
+        let (a, b) = (a.min(batch), b.min(batch));
+        check_read(blocks, batch, a.min(b)..a.max(b), seed);
     }
 
     #[test]
-    fn transposed_reads_are_the_law(rows in 1usize..200, columns in 1usize..600, batch in 0usize..16, seed: u64) {
+    fn transposed_reads_are_the_law(rows in 1usize..200, columns in 1usize..600, batch in 1usize..70, seed: u64) {
         check_read_columns(Layout { rows, columns }, batch, seed);
+    }
+
+    #[test]
+    fn conversions_are_the_law(
+        blocks in 1usize..6, tile_blocks in 1usize..6, batch in 1usize..70,
+        live in 1usize..=32, shift in 0u32..=30, bits in 1u32..=12, seed: u64,
+    ) {
+        check_converted(blocks, tile_blocks, batch, (live, shift, bits), seed);
+    }
+
+    #[test]
+    fn look_ups_are_the_law(samples in 1usize..70, live in 1usize..=32, bits in 1u32..=14, shift in 0u32..=30, seed: u64) {
+        check_look_up(samples, live, bits, shift, seed);
+    }
+
+    #[test]
+    fn gates_and_turned_drives_are_the_law(samples in 1usize..140, beyond in 0usize..20, bits in 2i64..=9, seed: u64) {
+        let stride = samples.next_multiple_of(4) + 4 * beyond;
+        check_gate(samples, stride, bits, seed);
+        check_turn(samples, stride, seed);
     }
 
     #[test]
@@ -286,12 +494,14 @@ proptest! {
         rows in 1usize..5000, column in 0usize..5000, block in 0usize..80,
     ) {
         let place = Place { seed, site: Site::WriteDither, layer, pathway, sub, count };
-        let mut law = [0; HALF_CELLS];
-        Backend::Scalar.dither(&place, rows, column, block, &mut law);
-        for backend in others() {
-            let mut out = [1; HALF_CELLS];
-            backend.dither(&place, rows, column, block, &mut out);
-            prop_assert!(out == law, "{}", backend.name());
+        let (mut want, mut wide) = ([0; HALF_CELLS], [0; HALF_CELLS]);
+        law().dither(&place, rows, column, block, &mut want);
+        law().dither_words(&place, rows, column, block, &mut wide);
+        for (name, kernel) in others() {
+            let (mut out, mut words) = ([1; HALF_CELLS], [0; HALF_CELLS]);
+            kernel.dither(&place, rows, column, block, &mut out);
+            kernel.dither_words(&place, rows, column, block, &mut words);
+            prop_assert!(out == want && words == wide, "{}", name);
         }
     }
 

@@ -43,7 +43,7 @@ fn quarter(s: &mut [__m256i; 16], a: usize, b: usize, c: usize, d: usize) {
 
 #[target_feature(enable = "avx2,popcnt")]
 pub(super) fn dither(place: &Place, rows: usize, column: usize, block: usize, out: &mut Half<u8>) {
-    let (start, step) = chacha::start(place, rows, column, block);
+    let (start, step) = chacha::start(place, rows.div_ceil(64), column, block);
     let mut lane = _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7);
     for group in 0..2 {
         let mut first = [_mm256_setzero_si256(); 16];

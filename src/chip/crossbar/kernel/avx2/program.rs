@@ -27,7 +27,7 @@
 use std::arch::x86_64::*;
 
 use super::{load, load_sums, store};
-use crate::chip::crossbar::kernel::{Cells, Dither, Half, Write, WriteCounts, scalar};
+use crate::chip::crossbar::kernel::{Cells, Dither, Half, Write, WriteCounts, lanes};
 
 /// Half-up.
 const NEAREST: u8 = 0;
@@ -53,7 +53,7 @@ pub(super) fn program(
     let (true, Ok(floor), Ok(ceiling)) =
         (plain, u8::try_from(write.floor), u8::try_from(write.ceiling))
     else {
-        return scalar::program(cells, sums, write, dither);
+        return lanes::program(cells, sums, write, dither);
     };
     let window = (floor, ceiling);
     // Without a remainder nothing reads or keeps these words.

@@ -26,7 +26,7 @@ use std::arch::x86_64::*;
 
 use self::residual::residual;
 use super::{load, load_sums, store};
-use crate::chip::crossbar::kernel::{Cells, Dither, Half, Write, WriteCounts, scalar};
+use crate::chip::crossbar::kernel::{Cells, Dither, Half, Write, WriteCounts, lanes};
 
 mod residual;
 
@@ -63,7 +63,7 @@ pub(super) fn program(
     let (true, Ok(floor), Ok(ceiling)) =
         (plain, u8::try_from(write.floor), u8::try_from(write.ceiling))
     else {
-        return scalar::program(cells, sums, write, dither);
+        return lanes::program(cells, sums, write, dither);
     };
     let window = (floor, ceiling);
     let low = cells.low;
@@ -330,4 +330,26 @@ fn cells<const DITHER: u8, const SCALE: u8>(
         }
     }
     counts(&tally)
+}
+
+/// See [`super::super::Kernel::is_quiet`]: `q` is 0 exactly where `-2^(s-1) <= v < 2^(s-1)`, `s = shift - bits`.
+#[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi,popcnt")]
+pub(super) fn is_quiet(sums: &Half<i32>, write: &Write, bits: u32) -> bool {
+    let by = write.shift.saturating_sub(write.residual_bits).saturating_sub(bits).min(30);
+    let half = _mm512_set1_epi32(1 << by >> 1);
+    // all bits of a loud quotient that a quiet one does not have
+    let loud = _mm512_set1_epi32(-(1 << by));
+    let mantissa = if write.negate { -write.mantissa } else { write.mantissa };
+    let mantissa = _mm512_set1_epi32(mantissa);
+    for sums in sums.as_chunks::<64>().0 {
+        let mut any = _mm512_setzero_si512();
+        for sums in sums.as_chunks::<16>().0 {
+            let v = _mm512_mullo_epi32(load_sums(sums), mantissa);
+            any = _mm512_or_si512(any, _mm512_add_epi32(v, half));
+        }
+        if _mm512_test_epi32_mask(any, loud) != 0 {
+            return false;
+        }
+    }
+    true
 }

@@ -1,0 +1,186 @@
+//! Converters, tables and gates, a row of units at a time.
+//!
+//! ```text
+//! convert   two rows of 16 currents are shifted, packed to 32 16-bit steps, and bounded
+//! look-up   16 entries a gather
+//! gate      rsh(err * a', eb) = mulhrs(err << (15 - eb), a'),  mulhrs(a, b) = (a * b + 2^14) >> 15
+//! ```
+//!
+//! Packing saturates at 65,535, which is at least the greatest code. `|err| < 2^(eb-1)`, so `err << (15 - eb)` fits
+//! 16 bits, and the gate is at most 127 in size, for every width from 2 to 9: none saturates.
+#![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
+
+use std::arch::x86_64::*;
+
+use super::load_sums;
+use super::turn::interleave;
+use crate::chip::crossbar::kernel::{Conversion, LookUp};
+use crate::chip::crossbar::layout::{BLOCK_ROWS, PANEL_COLUMNS};
+use crate::num::fixed::ErrorBits;
+
+/// Steps of a row of 32 currents, 16 bits each, in order.
+#[inline]
+#[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi,popcnt")]
+fn steps(currents: &[i32; 32], half: __m512i, shift: __m512i) -> __m512i {
+    let [a, b] = *currents.as_chunks::<16>().0 else { unreachable!("two vectors") };
+    let [a, b] = [a, b].map(|v| _mm512_srlv_epi32(_mm512_add_epi32(load_sums(&v), half), shift));
+    _mm512_packus_epi32(a, b)
+}
+
+#[inline]
+#[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi,popcnt")]
+pub(in crate::chip::crossbar::kernel) fn convert(
+    [e, i]: [&[i32]; 2],
+    conversion: Conversion,
+    live: usize,
+    codes: &mut [i16],
+) -> [u64; 2] {
+    let half = _mm512_set1_epi32(1 << conversion.shift >> 1);
+    let shift = _mm512_set1_epi32(conversion.shift.cast_signed());
+    let max = _mm512_set1_epi16(conversion.max.cast_signed());
+    let alive = u32::try_from((1u64 << live) - 1).expect("at most 32 columns");
+    // packing leaves quarters of 8 bytes in the order 0 4 1 5 2 6 3 7
+    let order = _mm512_setr_epi64(0, 2, 4, 6, 1, 3, 5, 7);
+    let packed_alive = packed_mask(alive);
+    let mut saturated = [0u32; 2];
+    let rows = e.as_chunks::<PANEL_COLUMNS>().0.iter().zip(i.as_chunks::<PANEL_COLUMNS>().0);
+    for (codes, (e, i)) in codes.as_chunks_mut::<PANEL_COLUMNS>().0.iter_mut().zip(rows) {
+        let [e, i] = [steps(e, half, shift), steps(i, half, shift)];
+        saturated[0] += _mm512_mask_cmpgt_epu16_mask(packed_alive, e, max).count_ones();
+        saturated[1] += _mm512_mask_cmpgt_epu16_mask(packed_alive, i, max).count_ones();
+        let d = _mm512_maskz_sub_epi16(
+            packed_alive,
+            _mm512_min_epu16(e, max),
+            _mm512_min_epu16(i, max),
+        );
+        let d = _mm512_permutexvar_epi64(order, d);
+        add_codes(codes, d);
+    }
+    saturated.map(u64::from)
+}
+
+/// Bits of columns, in the order in which [`steps`] packs them.
+fn packed_mask(alive: u32) -> u32 {
+    (0..32).fold(0, |mask, lane| {
+        let (quarter, at) = (lane / 8, lane % 8);
+        let column = if at < 4 { quarter * 4 + at } else { 16 + quarter * 4 + at - 4 };
+        mask | (alive >> column & 1) << lane
+    })
+}
+
+#[inline]
+#[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi,popcnt")]
+fn add_codes(codes: &mut [i16; 32], d: __m512i) {
+    // SAFETY: the reference covers the 32 codes, 64 bytes, that an unaligned load reads.
+    let before = unsafe { _mm512_loadu_si512(codes.as_ptr().cast()) };
+    // SAFETY: the reference covers the 32 codes, 64 bytes, that an unaligned store writes.
+    unsafe { _mm512_storeu_si512(codes.as_mut_ptr().cast(), _mm512_add_epi16(before, d)) }
+}
+
+#[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi,popcnt")]
+pub(super) fn look_up(
+    accumulators: &[i32],
+    table: &LookUp,
+    live: usize,
+    values: &mut [u8],
+    derivatives: &mut [u8],
+) -> u64 {
+    let half = i32::try_from(table.entries.len() / 2).expect("at most 2^13");
+    let rounding = _mm512_set1_epi32(1 << table.shift >> 1);
+    let shift = _mm512_set1_epi32(table.shift.cast_signed());
+    let (most, least) = (_mm512_set1_epi32(half - 1), _mm512_set1_epi32(-half));
+    let alive = u32::try_from((1u64 << live) - 1).expect("at most 32 columns");
+    let alive = [alive as u16, (alive >> 16) as u16];
+    let middle = _mm512_set1_epi32(half);
+    let mut saturated = 0;
+    let rows = accumulators.as_chunks::<PANEL_COLUMNS>().0.iter();
+    let values = values.chunks_mut(BLOCK_ROWS).zip(derivatives.chunks_mut(BLOCK_ROWS));
+    for (accumulators, (values, derivatives)) in rows.zip(values) {
+        let values = values.as_chunks_mut::<16>().0.iter_mut();
+        let derivatives = derivatives.as_chunks_mut::<16>().0.iter_mut();
+        let halves = accumulators.as_chunks::<16>().0.iter().zip(alive);
+        for ((accumulators, alive), (values, derivatives)) in halves.zip(values.zip(derivatives)) {
+            let v = load_sums(accumulators);
+            // rsh(v, s) = (v >> s) + bit s-1 of v: nothing is added to v itself
+            let odd = _mm512_test_epi32_mask(v, rounding);
+            let steps = _mm512_srav_epi32(v, shift);
+            let steps = _mm512_mask_add_epi32(steps, odd, steps, _mm512_set1_epi32(1));
+            let i = _mm512_max_epi32(_mm512_min_epi32(steps, most), least);
+            saturated += _mm512_mask_cmpneq_epi32_mask(alive, i, steps).count_ones();
+            // SAFETY: i lies in -half..half, so i + half indexes one of the 2 * half entries of the table.
+            let entries = unsafe {
+                _mm512_i32gather_epi32::<4>(
+                    _mm512_add_epi32(i, middle),
+                    table.entries.as_ptr().cast(),
+                )
+            };
+            store_bytes(values, _mm512_maskz_cvtepi32_epi8(alive, entries));
+            let slopes = _mm512_srli_epi32::<8>(entries);
+            store_bytes(derivatives, _mm512_maskz_cvtepi32_epi8(alive, slopes));
+        }
+    }
+    saturated.into()
+}
+
+#[inline]
+#[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi,popcnt")]
+fn store_bytes(bytes: &mut [u8; 16], v: __m128i) {
+    // SAFETY: the reference covers the 16 bytes that an unaligned store writes.
+    unsafe { _mm_storeu_si128(bytes.as_mut_ptr().cast(), v) }
+}
+
+/// Gates of 64 columns of one sample.
+#[inline]
+#[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi,popcnt")]
+fn gates_of(errors: &[i16; 64], slopes: &[u8; 64], up: __m128i, sign: __m512i) -> __m512i {
+    let mut rows = [_mm256_setzero_si256(); 2];
+    let halves = errors.as_chunks::<32>().0.iter().zip(slopes.as_chunks::<32>().0);
+    for (row, (errors, slopes)) in rows.iter_mut().zip(halves) {
+        // SAFETY: the reference covers the 32 words, 64 bytes, that an unaligned load reads.
+        let errors = unsafe { _mm512_loadu_si512(errors.as_ptr().cast()) };
+        // SAFETY: the reference covers the 32 bytes that an unaligned load reads.
+        let slopes = unsafe { _mm256_loadu_si256(slopes.as_ptr().cast()) };
+        let errors = _mm512_sub_epi16(_mm512_xor_si512(errors, sign), sign);
+        let errors = _mm512_sll_epi16(errors, up);
+        let gates = _mm512_mulhrs_epi16(errors, _mm512_cvtepu8_epi16(slopes));
+        *row = _mm512_cvtepi16_epi8(gates);
+    }
+    _mm512_inserti64x4::<1>(_mm512_castsi256_si512(rows[0]), rows[1])
+}
+
+#[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi,popcnt")]
+pub(super) fn gate(
+    errors: &[i16],
+    derivatives: &[u8],
+    negate: bool,
+    bits: ErrorBits,
+    stride: usize,
+    gates: &mut [i8],
+) -> u64 {
+    let up = _mm_cvtsi32_si128(15 - bits.get().cast_signed());
+    let sign = _mm512_set1_epi16(if negate { -1 } else { 0 });
+    let (errors, slopes) = (errors.as_chunks::<64>().0, derivatives.as_chunks::<64>().0);
+    for quad in 0..stride / 4 {
+        let mut rows = [_mm512_setzero_si512(); 4];
+        for (s, row) in rows.iter_mut().enumerate() {
+            if let (Some(errors), Some(slopes)) =
+                (errors.get(quad * 4 + s), slopes.get(quad * 4 + s))
+            {
+                *row = gates_of(errors, slopes, up, sign);
+            }
+        }
+        for (half, v) in interleave(rows).into_iter().enumerate() {
+            let at = half * 16 * stride + quad * 64;
+            store_gates(&mut gates[at..], v);
+        }
+    }
+    0
+}
+
+#[inline]
+#[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi,popcnt")]
+fn store_gates(gates: &mut [i8], v: __m512i) {
+    let gates: &mut [i8; 64] = gates.first_chunk_mut().expect("64 gates a vector");
+    // SAFETY: the reference covers the 64 bytes that an unaligned store writes.
+    unsafe { _mm512_storeu_si512(gates.as_mut_ptr().cast(), v) }
+}

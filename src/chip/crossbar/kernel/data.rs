@@ -1,0 +1,194 @@
+//! What kernels take and give: plain data, the same for every back end.
+#![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
+
+use crate::chip::crossbar::layout::{BLOCK_ROWS, HALF_CELLS, PANEL_COLUMNS};
+
+/// Sums, or levels, of a half block. Sums lie row-major, `[64 rows][16 columns]`; levels, residuals
+/// and dither words lie as [`in_half`](crate::chip::crossbar::layout::in_half) says.
+pub type Half<T> = [T; HALF_CELLS];
+
+/// Drive codes of a batch as kernels take them: `[block of 64 rows][sample][64 rows]`, one byte a code. Rows that
+/// do not exist are driven with 0.
+#[derive(Debug, Clone, Copy)]
+pub struct Drives<'a> {
+    codes: &'a [u8],
+    samples: usize,
+}
+
+impl<'a> Drives<'a> {
+    /// Codes of `samples` samples, whole blocks of rows.
+    ///
+    /// # Panics
+    /// When the codes are not whole blocks.
+    #[must_use]
+    pub const fn new(codes: &'a [u8], samples: usize) -> Self {
+        assert!(
+            samples > 0 && codes.len().is_multiple_of(samples * BLOCK_ROWS),
+            "drives come in whole blocks"
+        );
+        Self { codes, samples }
+    }
+
+    /// All codes.
+    #[must_use]
+    pub const fn codes(self) -> &'a [u8] {
+        self.codes
+    }
+
+    /// Samples of the batch.
+    #[must_use]
+    pub const fn samples(self) -> usize {
+        self.samples
+    }
+
+    /// Blocks of 64 rows.
+    #[must_use]
+    pub const fn blocks(self) -> usize {
+        self.codes.len() / (self.samples * BLOCK_ROWS)
+    }
+
+    /// The drives of some of the blocks.
+    #[must_use]
+    pub fn of_blocks(self, blocks: std::ops::Range<usize>) -> Self {
+        let size = self.samples * BLOCK_ROWS;
+        Self { codes: &self.codes[blocks.start * size..blocks.end * size], samples: self.samples }
+    }
+
+    /// The 64 codes of a block and sample.
+    #[must_use]
+    pub fn row(self, block: usize, sample: usize) -> &'a [u8; BLOCK_ROWS] {
+        let at = (block * self.samples + sample) * BLOCK_ROWS;
+        self.codes[at..at + BLOCK_ROWS].try_into().expect("64 codes")
+    }
+}
+
+/// Converters on the columns of one bank: `code = min( rsh(current, shift), max )`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Conversion {
+    /// Step, as a shift of the current; at most [`Conversion::SHIFT_MAX`].
+    pub shift: u32,
+    /// Greatest code.
+    pub max: u16,
+}
+
+impl Conversion {
+    /// Greatest shift kernels take: half a step is then added to a current without a carry.
+    pub const SHIFT_MAX: u32 = 30;
+}
+
+/// Two banks read by converters, panel by panel.
+#[derive(Debug, Clone, Copy)]
+pub struct Banks<'a> {
+    /// Levels of the excitatory and the inhibitory panel.
+    pub cells: [&'a [u8]; 2],
+    /// What drives each.
+    pub drives: [Drives<'a>; 2],
+    /// Blocks of 64 rows of a physical tile; the last tile may be shorter.
+    pub tile_blocks: usize,
+    /// The converters.
+    pub conversion: Conversion,
+    /// Columns of the panel that exist.
+    pub live: usize,
+}
+
+/// Samples that are read together, so that their sums stay close to the processor.
+pub const TOGETHER: usize = 32;
+
+/// Currents of two banks of a panel for [`TOGETHER`] samples, where matrix tiles are stored fastest.
+#[derive(Debug, Clone)]
+#[repr(align(64))]
+pub struct Scratch {
+    /// `[sample][32]` by bank.
+    pub currents: [[i32; Self::SUMS]; 2],
+}
+
+impl Scratch {
+    /// Sums of a panel for [`TOGETHER`] samples.
+    pub const SUMS: usize = TOGETHER * PANEL_COLUMNS;
+
+    /// Zeros.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self { currents: [[0; Self::SUMS]; 2] }
+    }
+}
+
+impl Default for Scratch {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+/// A unit's table: `index = clamp( rsh(acc, shift), -half, half - 1 ) + half`.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct LookUp {
+    /// `value | derivative << 8` by index; `value` is what the unit hands on.
+    pub entries: Vec<u32>,
+    /// Accumulator units of one step, as a shift.
+    pub shift: u32,
+}
+
+/// Rounding of a sum to pulses.
+#[derive(Debug, Clone, Copy)]
+pub enum Dither<'a> {
+    /// Half-up.
+    Nearest,
+    /// 8 fractional bits and an 8-bit word a cell, in the order of levels.
+    Byte(&'a Half<u8>),
+    /// 16 fractional bits and a 16-bit word a cell, in the order of levels.
+    Word(&'a Half<u16>),
+}
+
+/// How sums become pulses and pulses become levels; the same for every cell of an array in one write.
+#[derive(Debug, Clone, Copy)]
+pub struct Write {
+    /// `k`: one pulse stands for `2^k` units of sum x mantissa.
+    pub shift: u32,
+    /// Small factor of the rate, 1..=15.
+    pub mantissa: i32,
+    /// Inhibitory pathways take the negated sum (negated before rounding).
+    pub negate: bool,
+    /// Bound of pulses, 1..=127.
+    pub increment_max: i32,
+    /// Least level.
+    pub floor: u16,
+    /// Greatest level.
+    pub ceiling: u16,
+    /// `F`: fractional bits of the remainder behind a cell.
+    pub residual_bits: u32,
+}
+
+/// The state behind the cells of a half block.
+#[derive(Debug)]
+pub struct Cells<'a> {
+    /// Low byte of each level.
+    pub low: &'a mut Half<u8>,
+    /// High byte, of arrays with more than 8 bits.
+    pub high: Option<&'a mut Half<u8>>,
+    /// Remainder, of writes with `residual_bits > 0`.
+    pub residual: Option<&'a mut Half<u16>>,
+    /// Cells gone for good, of absorbing floors: one bit a cell, in the order of levels.
+    pub pruned: Option<&'a mut [u64; HALF_CELLS / 64]>,
+}
+
+/// What one write did, summed over cells.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct WriteCounts {
+    /// Cells whose increment was not 0 before the bound.
+    pub requested: u64,
+    /// Cells whose increment the bound changed.
+    pub bounded: u64,
+    /// Pulses after the bound.
+    pub attempted: u64,
+    /// Levels actually moved.
+    pub effective: u64,
+}
+
+impl std::ops::AddAssign for WriteCounts {
+    fn add_assign(&mut self, other: Self) {
+        self.requested += other.requested;
+        self.bounded += other.bounded;
+        self.attempted += other.attempted;
+        self.effective += other.effective;
+    }
+}

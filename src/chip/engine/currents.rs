@@ -1,0 +1,41 @@
+//! Sums of bank currents, for the balance of activity.
+//!
+//! ```text
+//! sum over samples and columns of v = sum over rows of (sum of drives) * (sum of levels)
+//! ```
+//!
+//! Slices and tiles cannot change it. Noted while evaluating only: that is where it is reported.
+#![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
+
+use super::{Engine, Phase};
+use crate::chip::crossbar::layout::BLOCK_ROWS;
+
+impl Engine {
+    pub(super) fn note_currents(&mut self, layer: usize) {
+        if self.phase != Phase::Evaluation {
+            return;
+        }
+        let this = &self.layers[layer];
+        let levels = self.row_sums[layer]
+            .get_or_insert_with(|| this.arrays.iter().map(|array| array.row_sums()).collect());
+        let wiring = this.spec.wiring;
+        for &target in wiring.targets() {
+            for (bank, at) in wiring.banks(target).into_iter().enumerate() {
+                let source = if layer == 0 { 0 } else { wiring.pathways()[at].source.index() };
+                let drives = &self.registers[layer].drives[source];
+                let blocks = drives.chunks_exact(self.samples * BLOCK_ROWS);
+                let sum: i64 = blocks
+                    .zip(levels[at].chunks(BLOCK_ROWS))
+                    .map(|(codes, levels)| {
+                        let mut sums = [0u32; BLOCK_ROWS];
+                        for codes in codes.as_chunks::<BLOCK_ROWS>().0 {
+                            sums.iter_mut().zip(codes).for_each(|(s, &x)| *s += u32::from(x));
+                        }
+                        levels.iter().zip(sums).map(|(&l, x)| l * i64::from(x)).sum::<i64>()
+                    })
+                    .sum();
+                self.currents[layer][target.index()][bank] += sum;
+            }
+        }
+    }
+}

@@ -1,0 +1,139 @@
+//! `ERR`: taps and gates.
+//!
+//! ```text
+//! err      word of the unit's tap; more than one tap: sat_eb( rsh(sum, tap_shift) ); stream n receives -err
+//! u        sat_8( rsh( err * a', error_bits ) )
+//! ```
+//!
+//! See docs/MODEL.md, 3.
+#![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
+
+use std::borrow::Cow;
+use std::ops::Range;
+
+use super::Engine;
+use crate::chip::crossbar::kernel::Kernel;
+use crate::chip::crossbar::layout::{BLOCK_ROWS, HALF_COLUMNS};
+use crate::chip::layer::Taps;
+use crate::chip::ledger::{During, Event};
+use crate::chip::periphery;
+use crate::chip::population::Stream;
+use crate::num::fixed::{ErrorBits, rail, rsh, sat};
+
+/// Samples of a packed update, padded: words of four, or whole tiles of 64 where that costs less than half.
+pub(super) const fn stride_of(samples: usize) -> usize {
+    samples.next_multiple_of(if samples > 32 { 64 } else { 4 })
+}
+
+/// Place of a gate in the packed registers of a layer.
+const fn packed_at(stride: usize, sample: usize, unit: usize) -> usize {
+    unit / HALF_COLUMNS * HALF_COLUMNS * stride
+        + sample / 4 * 64
+        + unit % HALF_COLUMNS * 4
+        + sample % 4
+}
+
+impl Engine {
+    pub(super) fn error(&mut self, layer: usize, samples: Range<usize>, words: &[i16]) {
+        let this = &self.layers[layer];
+        let (taps, units, wiring) = (&this.taps, this.layout.columns, this.spec.wiring);
+        assert_eq!(words.len(), samples.len() * taps.width, "a word a bus slot and sample");
+        // sums are formed when they are programmed: what they are formed of must still be there
+        let pending = self.registers[layer].pending;
+        assert!(samples.is_empty() || samples.start >= pending, "sums wait to be programmed");
+        let bits = self.hardware.error_bits;
+        let registers = &mut self.registers[layer];
+        let stride = stride_of(self.samples);
+        let blocks = units.div_ceil(BLOCK_ROWS);
+        let (mut saturated_words, mut saturated_gates) = (0, [0; 2]);
+        for &target in wiring.targets() {
+            registers.gates[target.index()].resize(blocks * stride * BLOCK_ROWS, 0);
+        }
+        // kernels take what an error unit gives: words inside their rail
+        let inside = words.iter().all(|&word| i64::from(word).abs() <= rail(bits.get()));
+        let all = inside && samples == (0..self.samples);
+        let kernel = Kernel::start(self.backend);
+        let mut errors = vec![0; samples.len() * BLOCK_ROWS];
+        for block in 0..blocks {
+            saturated_words += latch(taps, bits, block, words, &mut errors);
+            for &target in wiring.targets() {
+                let t = target.index();
+                let size = self.samples * BLOCK_ROWS;
+                let slopes = &registers.derivatives[t][block * size..][..size];
+                let negate = target == Stream::N;
+                if all {
+                    let gates = &mut registers.gates[t][block * stride * BLOCK_ROWS..];
+                    let gates = &mut gates[..stride * BLOCK_ROWS];
+                    saturated_gates[t] += kernel.gate(&errors, slopes, negate, bits, stride, gates);
+                    continue;
+                }
+                let sign = if negate { -1 } else { 1 };
+                for (sample, errors) in samples.clone().zip(errors.chunks_exact(BLOCK_ROWS)) {
+                    for (unit, &error) in errors.iter().enumerate() {
+                        let slope = slopes[sample * BLOCK_ROWS + unit];
+                        let (u, saturated) = periphery::gate(sign * error, slope, bits);
+                        saturated_gates[t] += u64::from(saturated);
+                        let at = packed_at(stride, sample, block * BLOCK_ROWS + unit);
+                        registers.gates[t][at] = u;
+                    }
+                }
+            }
+        }
+        let (width, count) = (taps.width as u64, samples.len() as u64);
+        for &target in wiring.targets() {
+            let code = Self::code_of(wiring, target);
+            let during = During::Error;
+            self.charge(layer, code, during, Event::BusWords, width * count);
+            self.charge(layer, code, during, Event::Multiplies, units as u64 * count);
+            let saturated = saturated_gates[target.index()];
+            self.charge(layer, code, during, Event::SaturatedGates, saturated);
+        }
+        let code = Self::code_of(wiring, Stream::P);
+        self.charge(layer, code, During::Error, Event::SaturatedErrors, saturated_words);
+    }
+}
+
+/// Gates of some samples of `loaded` ones, packed as an update of just these takes them.
+pub(super) fn gates_of<'a>(
+    packed: &'a [i8],
+    loaded: usize,
+    samples: &Range<usize>,
+) -> Cow<'a, [i8]> {
+    if *samples == (0..loaded) {
+        return Cow::Borrowed(packed);
+    }
+    let (from, to) = (stride_of(loaded), stride_of(samples.len()));
+    let units = packed.len() / from;
+    let mut out = vec![0; units * to];
+    for unit in 0..units {
+        for (b, sample) in samples.clone().enumerate() {
+            out[packed_at(to, b, unit)] = packed[packed_at(from, sample, unit)];
+        }
+    }
+    Cow::Owned(out)
+}
+
+/// Error words of a block of 64 units, `[sample][64]`, and how many saturated.
+fn latch(taps: &Taps, bits: ErrorBits, block: usize, words: &[i16], errors: &mut [i16]) -> u64 {
+    let units = taps.words.len() / taps.per_unit;
+    let live = (units - block * BLOCK_ROWS).min(BLOCK_ROWS);
+    let taps_here = &taps.words[block * BLOCK_ROWS * taps.per_unit..][..live * taps.per_unit];
+    let mut saturated = 0;
+    for (words, errors) in words.chunks_exact(taps.width).zip(errors.chunks_exact_mut(BLOCK_ROWS)) {
+        let (errors, beyond) = errors.split_at_mut(live);
+        beyond.fill(0);
+        if taps.per_unit == 1 {
+            for (error, &word) in errors.iter_mut().zip(taps_here) {
+                *error = words[usize::from(word)];
+            }
+            continue;
+        }
+        for (error, tapped) in errors.iter_mut().zip(taps_here.chunks_exact(taps.per_unit)) {
+            let sum = tapped.iter().map(|&word| i64::from(words[usize::from(word)])).sum();
+            let (bounded, changed) = sat(rsh(sum, taps.shift), bits.get());
+            saturated += u64::from(changed);
+            *error = bounded as i16;
+        }
+    }
+    saturated
+}

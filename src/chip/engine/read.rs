@@ -1,0 +1,393 @@
+//! Reading a stream: which rows are read together, with which converters, and in which width.
+//!
+//! ```text
+//! narrow   every sum fits 31 bits by the plan: kernels convert and look up
+//! wide     anything else: 64 bits, one conversion after the other
+//! ```
+//!
+//! Both give the same numbers. See docs/MODEL.md, 2.
+#![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
+
+use std::borrow::Cow;
+use std::ops::Range;
+
+use crate::chip::crossbar::Crossbar;
+use crate::chip::crossbar::kernel::{Banks, Conversion, Drives, Kernel, Scratch};
+use crate::chip::crossbar::layout::{BLOCK_ROWS, PANEL_COLUMNS};
+use crate::chip::hardware::{Adc, Hardware, Subtract};
+use crate::chip::layer::{CHUNK_BLOCKS, Layer};
+use crate::chip::periphery::{self, Converter};
+use crate::chip::population::Stream;
+
+/// Histogram of the least shifts at which conversions stay off the rail, and the greatest current, by slice.
+pub(super) type Histogram = Vec<([u64; 64], i64)>;
+
+/// How currents become numbers in one pass.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Mode {
+    /// As the hardware says.
+    Hardware,
+    /// With ideal converters, remembering what finite ones would need.
+    Probe,
+}
+
+/// Rows that are read together with one slice of their drives.
+struct TileRead<'a> {
+    slice: usize,
+    blocks: Range<usize>,
+    /// Blocks of a physical tile among them.
+    tile_blocks: usize,
+    codes: Cow<'a, [u8]>,
+}
+
+/// What reads counted.
+#[derive(Default, Clone)]
+pub(super) struct Seen {
+    pub(super) saturated: [u64; 2],
+    pub(super) look_ups: u64,
+    pub(super) histogram: Histogram,
+}
+
+impl Seen {
+    pub(super) fn new(reader: &Reader<'_>) -> Self {
+        let slices = if reader.probe.is_some() { reader.slices } else { 0 };
+        Self { histogram: vec![([0; 64], 0); slices], ..Self::default() }
+    }
+
+    pub(super) fn merge(&mut self, other: Self) {
+        for bank in 0..2 {
+            self.saturated[bank] += other.saturated[bank];
+        }
+        self.look_ups += other.look_ups;
+        if self.histogram.is_empty() {
+            self.histogram = other.histogram;
+        } else {
+            for (mine, theirs) in self.histogram.iter_mut().zip(other.histogram) {
+                mine.0.iter_mut().zip(theirs.0).for_each(|(a, b)| *a += b);
+                mine.1 = mine.1.max(theirs.1);
+            }
+        }
+    }
+}
+
+/// The two banks of one target stream, and how they are read.
+pub(super) struct Reader<'a> {
+    arrays: [&'a Crossbar; 2],
+    reads: [Vec<TileRead<'a>>; 2],
+    samples: usize,
+    /// Converters by slice; none where they are ideal.
+    converters: Option<(Vec<Converter>, Subtract)>,
+    probe: Option<Converter>,
+    dac_bits: u32,
+    slices: usize,
+    narrow: bool,
+    pub(super) columns: usize,
+}
+
+impl<'a> Reader<'a> {
+    pub(super) fn new(
+        layer: &'a Layer,
+        hardware: &Hardware,
+        target: Stream,
+        samples: usize,
+        mode: Mode,
+        drives: impl Fn(Stream) -> &'a [u8],
+    ) -> Self {
+        let wiring = layer.spec.wiring;
+        let places = wiring.banks(target);
+        let converters = match hardware.adc {
+            Adc::Ideal => None,
+            Adc::Finite { bits, subtract, .. } => {
+                let shifts = layer.adc_shifts[target.index()].iter();
+                let converters =
+                    shifts.map(|&shift| Converter::new(bits, subtract, shift)).collect();
+                Some((converters, subtract))
+            }
+        };
+        let probe = match (mode, hardware.adc) {
+            (Mode::Probe, Adc::Finite { bits, subtract, .. }) => {
+                Some(Converter::new(bits, subtract, 0))
+            }
+            _ => None,
+        };
+        let narrow = probe.is_none() && is_narrow(layer, hardware, converters.as_ref());
+        let tiles = match (&converters, narrow) {
+            (None, _) => Tiles::Whole,
+            (Some(_), true) => Tiles::Together,
+            (Some(_), false) => Tiles::Apart,
+        };
+        let sources = places.map(|at| wiring.pathways()[at].source);
+        Self {
+            arrays: places.map(|at| &layer.arrays[at]),
+            reads: sources
+                .map(|source| tile_reads(layer, hardware, drives(source), samples, tiles)),
+            samples,
+            converters,
+            probe,
+            dac_bits: hardware.dac_bits,
+            slices: hardware.slices() as usize,
+            narrow,
+            columns: layer.layout.columns,
+        }
+    }
+
+    /// Whether every sum fits 31 bits.
+    pub(super) const fn is_narrow(&self) -> bool {
+        self.narrow
+    }
+
+    /// Accumulators of a panel, `[sample][32]`, where they fit 31 bits.
+    pub(super) fn read_narrow(
+        &self,
+        kernel: &Kernel,
+        panel: usize,
+        live: usize,
+        samples: Range<usize>,
+        scratch: &mut Scratch,
+        sums: &mut [i32],
+        seen: &mut Seen,
+    ) {
+        let [excites, inhibits] = &self.reads;
+        if let Some((converters, _)) = &self.converters {
+            sums.fill(0);
+            let mut codes = [0; Scratch::SUMS];
+            let codes = &mut codes[..sums.len()];
+            for (at, (e, i)) in excites.iter().zip(inhibits).enumerate() {
+                if at == 0 || excites[at - 1].slice != e.slice {
+                    codes.fill(0);
+                }
+                let adc = converters[e.slice];
+                let banks = Banks {
+                    cells: self.arrays.map(|array| array.low(panel, e.blocks.clone())),
+                    drives: [e, i].map(|read| Drives::new(&read.codes, self.samples)),
+                    tile_blocks: e.tile_blocks,
+                    conversion: Conversion {
+                        shift: adc.shift,
+                        max: u16::try_from(adc.max).expect("narrow: at most 15 bits"),
+                    },
+                    live,
+                };
+                let counts = kernel.read_converted(&banks, samples.clone(), scratch, codes);
+                seen.saturated.iter_mut().zip(counts).for_each(|(sum, count)| *sum += count);
+                if excites.get(at + 1).is_none_or(|next| next.slice != e.slice) {
+                    let shift = adc.shift + e.slice as u32 * self.dac_bits;
+                    for (sum, &code) in sums.iter_mut().zip(codes.iter()) {
+                        *sum += i32::from(code) << shift;
+                    }
+                }
+            }
+            return;
+        }
+        let ([e], [i]) = (&excites[..], &inhibits[..]) else { unreachable!("read in one piece") };
+        for ((array, read), out) in self.arrays.iter().zip([e, i]).zip(&mut scratch.currents) {
+            let out = &mut out[..sums.len()];
+            let drives = Drives::new(&read.codes, self.samples);
+            kernel.read(array.low(panel, read.blocks.clone()), drives, samples.clone(), out);
+            if let Some(high) = array.high(panel, read.blocks.clone()) {
+                kernel.read(high, drives, samples.clone(), sums);
+                out.iter_mut().zip(&*sums).for_each(|(out, above)| *out += above << 8);
+            }
+        }
+        let [e, i] = &scratch.currents;
+        for (sum, (e, i)) in sums.iter_mut().zip(e.iter().zip(i)) {
+            *sum = e - i;
+        }
+    }
+
+    /// Accumulators of a panel, `[sample][32]`, of any size.
+    pub(super) fn read_wide(
+        &self,
+        kernel: &Kernel,
+        panel: usize,
+        live: usize,
+        samples: Range<usize>,
+        sums: &mut [i64],
+        seen: &mut Seen,
+    ) {
+        sums.fill(0);
+        let mut currents = [[0; Scratch::SUMS]; 2];
+        for at in 0..self.reads[0].len() {
+            let slice = self.reads[0][at].slice;
+            for (bank, out) in currents.iter_mut().enumerate() {
+                self.currents(kernel, bank, at, panel, samples.clone(), &mut out[..sums.len()]);
+            }
+            let [e, i] = &currents;
+            let shift = slice as u32 * self.dac_bits;
+            for (at, sum) in sums.iter_mut().enumerate() {
+                if at % PANEL_COLUMNS >= live {
+                    continue;
+                }
+                let (e, i) = (e[at], i[at]);
+                if let Some(adc) = self.probe {
+                    let entry = &mut seen.histogram[slice];
+                    let mut note = |v: i64| {
+                        entry.0[adc.least_shift(v) as usize] += 1;
+                        entry.1 = entry.1.max(v.abs());
+                    };
+                    if adc.min == 0 {
+                        note(e);
+                        note(i);
+                    } else {
+                        note(e - i);
+                    }
+                }
+                match &self.converters {
+                    Some((converters, subtract)) if self.probe.is_none() => {
+                        let adc = converters[slice];
+                        let d = match subtract {
+                            Subtract::Digital => {
+                                let [e, i] = [e, i].map(|v| adc.convert(v));
+                                seen.saturated[0] += u64::from(e.1);
+                                seen.saturated[1] += u64::from(i.1);
+                                e.0 - i.0
+                            }
+                            Subtract::Current => {
+                                let (d, saturated) = adc.convert(e - i);
+                                seen.saturated[0] += u64::from(saturated);
+                                d
+                            }
+                        };
+                        *sum += d << (adc.shift + shift);
+                    }
+                    _ => *sum += (e - i) << shift,
+                }
+            }
+        }
+    }
+
+    /// Currents of one bank for one of its reads.
+    fn currents(
+        &self,
+        kernel: &Kernel,
+        bank: usize,
+        at: usize,
+        panel: usize,
+        samples: Range<usize>,
+        out: &mut [i64],
+    ) {
+        let (array, read) = (self.arrays[bank], &self.reads[bank][at]);
+        let drives = Drives::new(&read.codes, self.samples);
+        let mut sums = [0; Scratch::SUMS];
+        let sums = &mut sums[..out.len()];
+        kernel.read(array.low(panel, read.blocks.clone()), drives, samples.clone(), sums);
+        out.iter_mut().zip(&*sums).for_each(|(out, &sum)| *out = i64::from(sum));
+        if let Some(high) = array.high(panel, read.blocks.clone()) {
+            kernel.read(high, drives, samples, sums);
+            out.iter_mut().zip(sums).for_each(|(out, sum)| *out += i64::from(*sum) << 8);
+        }
+    }
+}
+
+/// Sums stay below this: then rounding constants fit beside them.
+const NARROW: u128 = 1 << 30;
+
+/// Whether every number of a read keeps to the widths of the kernels, whatever the levels and drives.
+fn is_narrow(
+    layer: &Layer,
+    hardware: &Hardware,
+    converters: Option<&(Vec<Converter>, Subtract)>,
+) -> bool {
+    let ceiling = u128::from(hardware.window.ceiling());
+    let rows = layer.layout.rows;
+    let current = |rows: usize, code: u32| rows as u128 * ceiling * u128::from(code);
+    match converters {
+        None => {
+            layer.layout.blocks() <= CHUNK_BLOCKS
+                && current(rows, hardware.drive_bits.code_max().into()) < NARROW
+        }
+        Some((_, Subtract::Current)) => false,
+        Some((converters, Subtract::Digital)) => {
+            let tiles = rows.div_ceil(hardware.tile_rows) as u128;
+            let slice_max = (1 << hardware.dac_bits.min(hardware.drive_bits.get())) - 1;
+            let fits = |(slice, adc): (u32, &Converter)| {
+                let codes = tiles * adc.max.unsigned_abs() as u128;
+                let total = codes << (adc.shift.min(64) + slice * hardware.dac_bits);
+                let inside = adc.shift <= Conversion::SHIFT_MAX && codes < 1 << 15;
+                (inside && total < NARROW / 8).then_some(total)
+            };
+            hardware.level_bits.get() <= 8
+                && current(hardware.tile_rows.min(rows), slice_max) < NARROW
+                && (0..).zip(converters).all(|entry| fits(entry).is_some())
+        }
+    }
+}
+
+/// How rows are taken together.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Tiles {
+    /// All rows, in chunks whose sums fit 32 bits; the full code.
+    Whole,
+    /// Tiles one after the other in one read, where their edges allow it.
+    Together,
+    /// A read a tile.
+    Apart,
+}
+
+/// Slices and tiles of a batch of drives.
+fn tile_reads<'a>(
+    layer: &Layer,
+    hardware: &Hardware,
+    drives: &'a [u8],
+    samples: usize,
+    tiles: Tiles,
+) -> Vec<TileRead<'a>> {
+    let blocks = layer.layout.blocks();
+    let size = samples * BLOCK_ROWS;
+    let drives = &drives[..blocks * size];
+    if tiles == Tiles::Whole {
+        let starts = (0..blocks).step_by(CHUNK_BLOCKS);
+        let chunk = |start: usize| start..(start + CHUNK_BLOCKS).min(blocks);
+        return starts
+            .map(chunk)
+            .map(|blocks| TileRead {
+                slice: 0,
+                tile_blocks: blocks.len(),
+                codes: Cow::Borrowed(&drives[blocks.start * size..blocks.end * size]),
+                blocks,
+            })
+            .collect();
+    }
+    let (dac_bits, slices) = (hardware.dac_bits, hardware.slices());
+    let aligned =
+        hardware.tile_rows.is_multiple_of(BLOCK_ROWS) || layer.layout.rows <= hardware.tile_rows;
+    let mut reads = Vec::new();
+    for slice in 0..slices {
+        let sliced = |codes: &'a [u8]| -> Cow<'a, [u8]> {
+            if slices == 1 {
+                Cow::Borrowed(codes)
+            } else {
+                codes.iter().map(|&x| periphery::slice(x, slice, dac_bits)).collect()
+            }
+        };
+        if tiles == Tiles::Together && aligned {
+            let tile_blocks = hardware.tile_rows.div_ceil(BLOCK_ROWS);
+            let codes = sliced(drives);
+            reads.push(TileRead { slice: slice as usize, blocks: 0..blocks, tile_blocks, codes });
+            continue;
+        }
+        for rows in layer.row_tiles(hardware) {
+            let blocks = rows.start / BLOCK_ROWS..rows.end.div_ceil(BLOCK_ROWS);
+            let mut codes = sliced(&drives[blocks.start * size..blocks.end * size]);
+            if !aligned {
+                silence(codes.to_mut(), blocks.clone(), &rows, size);
+            }
+            debug_assert!(blocks.len() <= CHUNK_BLOCKS, "a converted tile is one chunk");
+            let tile_blocks = blocks.len();
+            reads.push(TileRead { slice: slice as usize, blocks, tile_blocks, codes });
+        }
+    }
+    reads
+}
+
+/// A tile's edge lies inside a block: drives of its neighbours' rows become 0.
+fn silence(codes: &mut [u8], blocks: Range<usize>, rows: &Range<usize>, size: usize) {
+    for (block, codes) in blocks.zip(codes.chunks_exact_mut(size)) {
+        let first = block * BLOCK_ROWS;
+        let from = rows.start.saturating_sub(first).min(BLOCK_ROWS);
+        let to = (rows.end - first).min(BLOCK_ROWS);
+        for codes in codes.chunks_exact_mut(BLOCK_ROWS) {
+            codes[..from].fill(0);
+            codes[to..].fill(0);
+        }
+    }
+}
