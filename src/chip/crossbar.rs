@@ -12,7 +12,7 @@ use bitvec::prelude::*;
 
 use super::hardware::{DitherBits, DitherPattern, FloorKind, Hardware, Window};
 use crate::num::draw::{Place, Site};
-use kernel::{Cells, Dither, Drives, Half, Kernel, Write, WriteCounts};
+use kernel::{Cells, Dither, Draws, Drives, Half, Kernel, Write, WriteCounts};
 use layout::{BLOCK_CELLS, BLOCK_ROWS, HALF_CELLS, HALF_COLUMNS, Layout, PANEL_COLUMNS, in_half};
 
 pub mod kernel;
@@ -34,10 +34,10 @@ pub struct Crossbar {
     pruned: Option<Vec<u64>>,
 }
 
-/// The parts of one panel that a write may change.
+/// The parts of some panels side by side that a write may change.
 #[derive(Debug)]
-pub struct PanelMut<'a> {
-    panel: usize,
+pub struct StripMut<'a> {
+    first: usize,
     layout: Layout,
     low: &'a mut [u8],
     high: Option<&'a mut [u8]>,
@@ -206,21 +206,21 @@ impl Crossbar {
         currents
     }
 
-    /// The array cut into panels that can be written side by side.
-    pub fn panels_mut(&mut self) -> impl Iterator<Item = PanelMut<'_>> {
+    /// The array cut into strips of so many panels that can be written side by side.
+    pub fn strips_mut(&mut self, panels: usize) -> impl Iterator<Item = StripMut<'_>> {
         let layout = self.layout;
-        let cells = layout.panel_cells();
+        let cells = panels * layout.panel_cells();
         let mut low = self.low.chunks_mut(cells);
         let mut high = self.high.as_mut().map(|plane| plane.chunks_mut(cells));
         let mut residual = self.residual.as_mut().map(|plane| plane.chunks_mut(cells));
         let mut pruned = self.pruned.as_mut().map(|plane| plane.chunks_mut(cells / 64));
-        (0..layout.panels()).map(move |panel| PanelMut {
-            panel,
+        (0..layout.panels()).step_by(panels).map(move |first| StripMut {
+            first,
             layout,
-            low: low.next().expect("one chunk a panel"),
-            high: high.as_mut().map(|chunks| chunks.next().expect("one chunk a panel")),
-            residual: residual.as_mut().map(|chunks| chunks.next().expect("one chunk a panel")),
-            pruned: pruned.as_mut().map(|chunks| chunks.next().expect("one chunk a panel")),
+            low: low.next().expect("one chunk a strip"),
+            high: high.as_mut().map(|chunks| chunks.next().expect("one chunk a strip")),
+            residual: residual.as_mut().map(|chunks| chunks.next().expect("one chunk a strip")),
+            pruned: pruned.as_mut().map(|chunks| chunks.next().expect("one chunk a strip")),
         })
     }
 }
@@ -242,15 +242,15 @@ pub struct WriteRequest<'a> {
     pub place: Place,
 }
 
-impl PanelMut<'_> {
-    /// Which panel this is.
+impl StripMut<'_> {
+    /// Its panels.
     #[must_use]
-    pub const fn panel(&self) -> usize {
-        self.panel
+    pub fn panels(&self) -> Range<usize> {
+        self.first..self.first + self.low.len() / self.layout.panel_cells()
     }
 
-    /// Accumulates, rounds, bounds and programs this panel. `gates` lies
-    /// `[2 halves][stride / 4][16 columns][4 samples]`.
+    /// Accumulates, rounds, bounds and programs these panels. `gates` lies
+    /// `[half][stride / 4][16 columns][4 samples]`.
     ///
     /// Passed over without a draw: blocks that are not driven, columns without a gate, and half blocks whose sums all
     /// round to 0 whatever their words. A remainder alone is less than a pulse.
@@ -263,31 +263,49 @@ impl PanelMut<'_> {
         let stride = request.stride;
         let mut counts = WriteCounts::default();
         let mut sums = Sums([0; HALF_CELLS]);
-        let mut words = Words::new();
-        let live = [0, 1].map(|half| {
-            let column = self.panel * PANEL_COLUMNS + half * HALF_COLUMNS;
-            column < self.layout.columns
-                && gates[half * 16 * stride..][..16 * stride].iter().any(|&gate| gate != 0)
-        });
+        let mut words = Words::new(request.place, self.layout.rows);
+        let live: Vec<_> = gates
+            .chunks_exact(HALF_COLUMNS * stride)
+            .enumerate()
+            .filter(|(_, gates)| gates.iter().any(|&gate| gate != 0))
+            .collect();
+        // words are drawn beside the sums while sums are loud: then they are rarely drawn for nothing
+        let bytes = (request.dither_bits, request.dither_pattern);
+        let mut ahead = bytes == (DitherBits::Eight, DitherPattern::PerCell);
+        let may_be_ahead = ahead;
         for (block, turned) in request.turned.iter().enumerate() {
             let Some(turned) = turned else { continue };
-            for half in (0..2).filter(|&half| live[half]) {
-                let column = self.panel * PANEL_COLUMNS + half * HALF_COLUMNS;
-                let gates = &gates[half * 16 * stride..][..16 * stride];
-                kernel.accumulate(turned, stride, gates, &mut sums.0);
-                if kernel.is_quiet(&sums.0, &request.write, request.dither_bits.get()) {
+            for &(half, gates) in &live {
+                let column = self.first * PANEL_COLUMNS + half * HALF_COLUMNS;
+                let drawn = ahead;
+                if drawn {
+                    let turned = (*turned, stride);
+                    let Words { bytes, draws, .. } = &mut words;
+                    let at = (column, block);
+                    kernel.accumulate_drawn(turned, gates, &mut sums.0, draws, at, bytes);
+                } else {
+                    kernel.accumulate(turned, stride, gates, &mut sums.0);
+                }
+                let quiet = kernel.is_quiet(&sums.0, &request.write, request.dither_bits.get());
+                ahead = may_be_ahead && !quiet;
+                if quiet {
                     continue;
                 }
-                let dither = words.draw(kernel, request, self.layout.rows, column, block);
-                let cells = self.half(block, half);
+                let dither = if drawn {
+                    Dither::Byte(&words.bytes)
+                } else {
+                    words.draw(kernel, request, column, block)
+                };
+                let cells = self.half(half, block);
                 counts += kernel.program(cells, &sums.0, &request.write, dither);
             }
         }
         counts
     }
 
-    fn half(&mut self, block: usize, half: usize) -> Cells<'_> {
-        let at = block * BLOCK_CELLS + half * HALF_CELLS;
+    fn half(&mut self, half: usize, block: usize) -> Cells<'_> {
+        let panel = half / 2 * self.layout.panel_cells();
+        let at = panel + block * BLOCK_CELLS + half % 2 * HALF_CELLS;
         let pruned = self.pruned.as_deref_mut().map(|bits| &mut bits[at / 64..][..HALF_WORDS]);
         Cells {
             low: half_mut(self.low, at),
@@ -311,18 +329,19 @@ fn half_mut<T>(plane: &mut [T], at: usize) -> &mut Half<T> {
 struct Words {
     bytes: Half<u8>,
     halves: Half<u16>,
+    draws: Draws,
 }
 
 impl Words {
-    const fn new() -> Self {
-        Self { bytes: [0; HALF_CELLS], halves: [0; HALF_CELLS] }
+    const fn new(place: Place, rows: usize) -> Self {
+        let draws = Draws::new(place, rows);
+        Self { bytes: [0; HALF_CELLS], halves: [0; HALF_CELLS], draws }
     }
 
     fn draw(
         &mut self,
         kernel: &Kernel,
         request: &WriteRequest<'_>,
-        rows: usize,
         column: usize,
         block: usize,
     ) -> Dither<'_> {
@@ -330,10 +349,10 @@ impl Words {
         match (request.dither_bits, request.dither_pattern) {
             (DitherBits::Zero, _) => return Dither::Nearest,
             (DitherBits::Eight, DitherPattern::PerCell) => {
-                kernel.dither(&place, rows, column, block, &mut self.bytes);
+                kernel.dither(&self.draws, column, block, &mut self.bytes);
             }
             (DitherBits::Sixteen, DitherPattern::PerCell) => {
-                kernel.dither_words(&place, rows, column, block, &mut self.halves);
+                kernel.dither_words(&self.draws, column, block, &mut self.halves);
             }
             (bits, DitherPattern::Separable) => {
                 // numbered as one column each: rows at sub 1, columns at sub 2

@@ -19,7 +19,6 @@ use std::marker::PhantomData;
 use std::ops::Range;
 
 use super::layout::{BLOCK_CELLS, BLOCK_ROWS, HALF_COLUMNS, Layout, PANEL_COLUMNS};
-use crate::num::draw::Place;
 use crate::num::fixed::ErrorBits;
 
 #[cfg(target_arch = "x86_64")]
@@ -29,7 +28,6 @@ mod avx2;
 #[cfg(target_arch = "x86_64")]
 mod avx512;
 mod backend;
-#[cfg(target_arch = "x86_64")]
 mod chacha;
 mod data;
 mod lanes;
@@ -37,10 +35,12 @@ mod scalar;
 #[cfg(test)]
 mod tests;
 
+use self::data::Packed;
 #[cfg(target_arch = "x86_64")]
 pub use self::{amx::Amx, avx2::Avx2, avx512::Avx512};
 pub use self::{
     backend::{Backend, UnknownBackend},
+    chacha::Draws,
     data::{
         Banks, Cells, Conversion, Dither, Drives, Half, LookUp, Scratch, TOGETHER, Write,
         WriteCounts,
@@ -58,25 +58,7 @@ trait Loops: Copy {
         scratch: &mut Scratch,
         codes: &mut [i16],
     ) -> [u64; 2] {
-        let mut saturated = [0; 2];
-        let blocks = banks.drives[0].blocks();
-        let groups = samples.clone().step_by(TOGETHER);
-        for (start, codes) in groups.zip(codes.chunks_mut(Scratch::SUMS)) {
-            let group = start..(start + TOGETHER).min(samples.end);
-            for first in (0..blocks).step_by(banks.tile_blocks) {
-                let tile = first..(first + banks.tile_blocks).min(blocks);
-                for (bank, out) in scratch.currents.iter_mut().enumerate() {
-                    let cells =
-                        &banks.cells[bank][tile.start * BLOCK_CELLS..tile.end * BLOCK_CELLS];
-                    let drives = banks.drives[bank].of_blocks(tile.clone());
-                    self.read(cells, drives, group.clone(), &mut out[..codes.len()]);
-                }
-                let [e, i] = [0, 1].map(|bank| &scratch.currents[bank][..codes.len()]);
-                let counts = self.convert([e, i], banks.conversion, banks.live, codes);
-                saturated.iter_mut().zip(counts).for_each(|(sum, count)| *sum += count);
-            }
-        }
-        saturated
+        apart(self, banks, samples, scratch, codes)
     }
 
     fn convert(
@@ -122,23 +104,30 @@ trait Loops: Copy {
 
     fn accumulate(self, turned: &[u8], stride: usize, gates: &[i8], sums: &mut Half<i32>);
 
+    /// Both at once, where that is faster than one after the other.
+    fn accumulate_drawn(
+        self,
+        (turned, stride): (&[u8], usize),
+        gates: &[i8],
+        sums: &mut Half<i32>,
+        draws: &Draws,
+        (column, block): (usize, usize),
+        words: &mut Half<u8>,
+    ) {
+        self.accumulate(turned, stride, gates, sums);
+        self.dither(draws, column, block, words);
+    }
+
     fn is_quiet(self, sums: &Half<i32>, write: &Write, bits: u32) -> bool {
         scalar::is_quiet(sums, write, bits)
     }
 
-    fn dither(self, place: &Place, rows: usize, column: usize, block: usize, words: &mut Half<u8>) {
-        scalar::dither(place, rows, column, block, words);
+    fn dither(self, draws: &Draws, column: usize, block: usize, words: &mut Half<u8>) {
+        scalar::dither(draws, column, block, words);
     }
 
-    fn dither_words(
-        self,
-        place: &Place,
-        rows: usize,
-        column: usize,
-        block: usize,
-        words: &mut Half<u16>,
-    ) {
-        scalar::dither_words(place, rows, column, block, words);
+    fn dither_words(self, draws: &Draws, column: usize, block: usize, words: &mut Half<u16>) {
+        scalar::dither_words(draws, column, block, words);
     }
 
     fn program(
@@ -150,6 +139,34 @@ trait Loops: Copy {
     ) -> WriteCounts {
         scalar::program(cells, sums, write, dither)
     }
+}
+
+/// Reads and converts one tile after the other.
+fn apart<L: Loops>(
+    loops: L,
+    banks: &Banks<'_>,
+    samples: Range<usize>,
+    scratch: &mut Scratch,
+    codes: &mut [i16],
+) -> [u64; 2] {
+    let mut saturated = [0; 2];
+    let blocks = banks.drives[0].blocks();
+    let groups = samples.clone().step_by(TOGETHER);
+    for (start, codes) in groups.zip(codes.chunks_mut(Scratch::SUMS)) {
+        let group = start..(start + TOGETHER).min(samples.end);
+        for first in (0..blocks).step_by(banks.tile_blocks) {
+            let tile = first..(first + banks.tile_blocks).min(blocks);
+            for (bank, out) in scratch.currents[0].iter_mut().enumerate() {
+                let cells = &banks.cells[bank][tile.start * BLOCK_CELLS..tile.end * BLOCK_CELLS];
+                let drives = banks.drives[bank].of_blocks(tile.clone());
+                loops.read(cells, drives, group.clone(), &mut out[..codes.len()]);
+            }
+            let [e, i] = [0, 1].map(|bank| &scratch.currents[0][bank][..codes.len()]);
+            let counts = loops.convert([e, i], banks.conversion, banks.live, codes);
+            saturated.iter_mut().zip(counts).for_each(|(sum, count)| *sum += count);
+        }
+    }
+    saturated
 }
 
 /// A back end at work on this thread.
@@ -238,6 +255,7 @@ impl Kernel {
             assert!(samples.end <= drives.samples(), "the samples are there");
         }
         assert!(banks.tile_blocks > 0 && banks.live <= PANEL_COLUMNS, "a tile has cells");
+        assert!(blocks.div_ceil(banks.tile_blocks) < 1024, "counts of saturation fit 16 bits");
         assert!(banks.conversion.shift <= Conversion::SHIFT_MAX, "half a step fits");
         assert_eq!(samples.len() * PANEL_COLUMNS, codes.len(), "32 codes a sample");
         if codes.is_empty() {
@@ -333,6 +351,26 @@ impl Kernel {
         with!(self, loops => loops.accumulate(turned, stride, gates, sums));
     }
 
+    /// [`Kernel::accumulate`] and [`Kernel::dither`] of the half block at `(column, block)`, at once where that
+    /// is faster than one after the other.
+    ///
+    /// # Panics
+    /// When the sizes do not match.
+    pub fn accumulate_drawn(
+        &self,
+        (turned, stride): (&[u8], usize),
+        gates: &[i8],
+        sums: &mut Half<i32>,
+        draws: &Draws,
+        at: (usize, usize),
+        words: &mut Half<u8>,
+    ) {
+        assert!(stride > 0 && stride.is_multiple_of(4), "samples are padded to words of four");
+        assert_eq!(turned.len(), BLOCK_ROWS * stride, "64 rows");
+        assert_eq!(gates.len(), HALF_COLUMNS * stride, "16 columns");
+        with!(self, loops => loops.accumulate_drawn((turned, stride), gates, sums, draws, at, words));
+    }
+
     /// Whether every sum rounds to 0 whatever its dither word of `bits` bits: then nothing is drawn, nothing
     /// moves and nothing is counted.
     #[must_use]
@@ -340,29 +378,15 @@ impl Kernel {
         with!(self, loops => loops.is_quiet(sums, write, bits))
     }
 
-    /// The 8-bit dither words of a half block of a logical array with `rows` rows: columns
-    /// `column .. column + 16`, rows `64 * block ..`, in the order of levels.
-    pub fn dither(
-        &self,
-        place: &Place,
-        rows: usize,
-        column: usize,
-        block: usize,
-        words: &mut Half<u8>,
-    ) {
-        with!(self, loops => loops.dither(place, rows, column, block, words));
+    /// The 8-bit dither words of a half block: columns `column .. column + 16`, rows `64 * block ..`, in the order of
+    /// levels.
+    pub fn dither(&self, draws: &Draws, column: usize, block: usize, words: &mut Half<u8>) {
+        with!(self, loops => loops.dither(draws, column, block, words));
     }
 
     /// The 16-bit dither words of a half block, as [`Kernel::dither`] gives 8-bit words.
-    pub fn dither_words(
-        &self,
-        place: &Place,
-        rows: usize,
-        column: usize,
-        block: usize,
-        words: &mut Half<u16>,
-    ) {
-        with!(self, loops => loops.dither_words(place, rows, column, block, words));
+    pub fn dither_words(&self, draws: &Draws, column: usize, block: usize, words: &mut Half<u16>) {
+        with!(self, loops => loops.dither_words(draws, column, block, words));
     }
 
     /// Rounds, bounds and programs a half block.

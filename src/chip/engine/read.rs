@@ -179,7 +179,7 @@ impl<'a> Reader<'a> {
             return;
         }
         let ([e], [i]) = (&excites[..], &inhibits[..]) else { unreachable!("read in one piece") };
-        for ((array, read), out) in self.arrays.iter().zip([e, i]).zip(&mut scratch.currents) {
+        for ((array, read), out) in self.arrays.iter().zip([e, i]).zip(&mut scratch.currents[0]) {
             let out = &mut out[..sums.len()];
             let drives = Drives::new(&read.codes, self.samples);
             kernel.read(array.low(panel, read.blocks.clone()), drives, samples.clone(), out);
@@ -188,7 +188,7 @@ impl<'a> Reader<'a> {
                 out.iter_mut().zip(&*sums).for_each(|(out, above)| *out += above << 8);
             }
         }
-        let [e, i] = &scratch.currents;
+        let [e, i] = &scratch.currents[0];
         for (sum, (e, i)) in sums.iter_mut().zip(e.iter().zip(i)) {
             *sum = e - i;
         }
@@ -306,6 +306,7 @@ fn is_narrow(
                 (inside && total < NARROW / 8).then_some(total)
             };
             hardware.level_bits.get() <= 8
+                && tiles < 1024
                 && current(hardware.tile_rows.min(rows), slice_max) < NARROW
                 && (0..).zip(converters).all(|entry| fits(entry).is_some())
         }

@@ -18,10 +18,13 @@ use super::error::{gates_of, stride_of};
 use super::{Engine, Write};
 use crate::chip::crossbar::kernel::{self, Kernel, WriteCounts};
 use crate::chip::crossbar::layout::{BLOCK_ROWS, PANEL_COLUMNS};
-use crate::chip::crossbar::{PanelMut, WriteRequest};
+use crate::chip::crossbar::{StripMut, WriteRequest};
 use crate::chip::ledger::{During, Event};
 use crate::chip::population::{Polarity, Stream};
 use crate::num::draw::{Place, Site};
+
+/// Panels written together: their gates and a block of drives stay in the processor's first cache.
+const STRIP_PANELS: usize = 4;
 
 impl Engine {
     pub(super) fn update(&mut self, layer: usize, write: Write, samples: Range<usize>, shift: u32) {
@@ -130,16 +133,17 @@ impl Engine {
             }
         };
         let work = this.layout.cells() * this.arrays.len() * samples.len();
-        let mut panels: Vec<(usize, PanelMut<'_>)> = Vec::new();
+        let mut strips: Vec<(usize, StripMut<'_>)> = Vec::new();
         for (at, array) in this.arrays.iter_mut().enumerate() {
-            panels.extend(array.panels_mut().map(|panel| (at, panel)));
+            strips.extend(array.strips_mut(STRIP_PANELS).map(|strip| (at, strip)));
         }
         let writes = &this.writes;
         let panel_gates = PANEL_COLUMNS * stride;
-        let counts = each(work, panels, |(array, mut panel)| {
-            let gates = &gates[array][panel.panel() * panel_gates..][..panel_gates];
+        let counts = each(work, strips, |(array, mut strip)| {
+            let panels = strip.panels();
+            let gates = &gates[array][panels.start * panel_gates..panels.end * panel_gates];
             let kernel = Kernel::start(backend);
-            (array, panel.write(&kernel, &request(array, writes[array]), gates))
+            (array, strip.write(&kernel, &request(array, writes[array]), gates))
         });
         drop(gates);
         self.registers[layer].gates = registers;

@@ -16,11 +16,18 @@ use std::arch::x86_64::{__cpuid, __cpuid_count, _xgetbv};
 use std::ops::Range;
 use std::sync::OnceLock;
 
+use self::fused::TileBank;
+use self::product::{Walk, half_block, levels_by_drives, levels_by_gates, pair};
 use super::avx512::{self, Avx512};
-use super::{Cells, Conversion, Dither, Drives, Half, LookUp, Loops, Write, WriteCounts};
-use crate::chip::crossbar::layout::{BLOCK_CELLS, BLOCK_ROWS, HALF_CELLS, HALF_COLUMNS, Layout};
-use crate::num::draw::Place;
+use super::{
+    Banks, Cells, Conversion, Dither, Draws, Drives, Half, LookUp, Loops, Packed, Scratch,
+    TOGETHER, Write, WriteCounts, apart,
+};
+use crate::chip::crossbar::layout::{BLOCK_CELLS, BLOCK_ROWS, HALF_CELLS, Layout, PANEL_COLUMNS};
 use crate::num::fixed::ErrorBits;
+
+mod fused;
+mod product;
 
 /// Proof that the processor has AMX with 8-bit products and AVX-512, and that the system lets this process use it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -118,178 +125,6 @@ fn permission() -> bool {
     false
 }
 
-/// Where the bytes of a product of two by two tiles lie.
-#[derive(Clone, Copy)]
-struct Walk {
-    /// Products along the common side, 64 bytes each.
-    steps: usize,
-    /// Bytes from a row of A to the next.
-    a_row: usize,
-    /// Bytes from A to the A of the next product.
-    a_step: usize,
-    /// Bytes from the first B to the one beside it.
-    b_half: usize,
-    /// Bytes from B to the B of the next product.
-    b_step: usize,
-    /// Sums from a row of C to the next.
-    c_row: usize,
-}
-
-/// Two by two tiles: 32 rows of A, 32 columns of B. `$product` is the instruction.
-macro_rules! quad {
-    ($name:ident, $product:literal) => {
-        fn $name(_: &Tiles, walk: Walk, a: &[u8], b: &[u8], c: &mut [i32]) {
-            let Walk { steps, a_row, a_step, b_half, b_step, c_row } = walk;
-            assert!(steps > 0, "there is something to multiply");
-            assert!(a.len() >= (steps - 1) * a_step + 31 * a_row + 64, "every row of A is there");
-            assert!(b.len() >= (steps - 1) * b_step + b_half + 1024, "every B is there");
-            assert!(c.len() >= 31 * c_row + 32, "every sum has its place");
-            // SAFETY: a `Tiles` says that tiles of this thread have 16 rows of 64 bytes. Tile rows read at
-            // a + step * a_step + row * a_row (row < 32), b + step * b_step + half * b_half + 64 * row (row < 16)
-            // and written at c + 4 * c_row * row (row < 32, 128 bytes) lie inside the slices by the assertions.
-            // Pointers move past the end only after the last use. All tiles used are named.
-            unsafe {
-                asm!(
-                    "tilezero tmm0",
-                    "tilezero tmm1",
-                    "tilezero tmm2",
-                    "tilezero tmm3",
-                    "2:",
-                    "tileloadd tmm4, [{a} + {a_row}]",
-                    "tileloadd tmm6, [{b} + {b_row}]",
-                    concat!($product, " tmm0, tmm4, tmm6"),
-                    "tileloadd tmm7, [{b2} + {b_row}]",
-                    concat!($product, " tmm1, tmm4, tmm7"),
-                    "tileloadd tmm5, [{a2} + {a_row}]",
-                    concat!($product, " tmm2, tmm5, tmm6"),
-                    concat!($product, " tmm3, tmm5, tmm7"),
-                    "add {a}, {a_step}",
-                    "add {a2}, {a_step}",
-                    "add {b}, {b_step}",
-                    "add {b2}, {b_step}",
-                    "dec {steps}",
-                    "jnz 2b",
-                    "tilestored [{c} + {c_row}], tmm0",
-                    "tilestored [{c} + {c_row} + 64], tmm1",
-                    "tilestored [{c2} + {c_row}], tmm2",
-                    "tilestored [{c2} + {c_row} + 64], tmm3",
-                    steps = inout(reg) steps => _,
-                    a = inout(reg) a.as_ptr() => _,
-                    a2 = inout(reg) a[16 * a_row..].as_ptr() => _,
-                    a_row = in(reg) a_row,
-                    a_step = in(reg) a_step,
-                    b = inout(reg) b.as_ptr() => _,
-                    b2 = inout(reg) b[b_half..].as_ptr() => _,
-                    b_row = in(reg) 64usize,
-                    b_step = in(reg) b_step,
-                    c = in(reg) c.as_mut_ptr(),
-                    c2 = in(reg) c[16 * c_row..].as_mut_ptr(),
-                    c_row = in(reg) 4 * c_row,
-                    out("tmm0") _, out("tmm1") _, out("tmm2") _, out("tmm3") _,
-                    out("tmm4") _, out("tmm5") _, out("tmm6") _, out("tmm7") _,
-                    options(nostack),
-                );
-            }
-        }
-    };
-}
-
-quad!(levels_by_drives, "tdpbuud");
-quad!(levels_by_gates, "tdpbsud");
-
-/// One by two tiles: 16 rows of A, 32 columns of B.
-fn pair(_: &Tiles, walk: Walk, a: &[u8], b: &[u8], c: &mut [i32]) {
-    let Walk { steps, a_row, a_step, b_half, b_step, c_row } = walk;
-    assert!(steps > 0, "there is something to multiply");
-    assert!(a.len() >= (steps - 1) * a_step + 15 * a_row + 64, "every row of A is there");
-    assert!(b.len() >= (steps - 1) * b_step + b_half + 1024, "every B is there");
-    assert!(c.len() >= 15 * c_row + 32, "every sum has its place");
-    // SAFETY: as in `quad`, with 16 rows of A and of C.
-    unsafe {
-        asm!(
-            "tilezero tmm0",
-            "tilezero tmm1",
-            "2:",
-            "tileloadd tmm4, [{a} + {a_row}]",
-            "tileloadd tmm6, [{b} + {b_row}]",
-            "tdpbuud tmm0, tmm4, tmm6",
-            "tileloadd tmm7, [{b2} + {b_row}]",
-            "tdpbuud tmm1, tmm4, tmm7",
-            "add {a}, {a_step}",
-            "add {b}, {b_step}",
-            "add {b2}, {b_step}",
-            "dec {steps}",
-            "jnz 2b",
-            "tilestored [{c} + {c_row}], tmm0",
-            "tilestored [{c} + {c_row} + 64], tmm1",
-            steps = inout(reg) steps => _,
-            a = inout(reg) a.as_ptr() => _,
-            a_row = in(reg) a_row,
-            a_step = in(reg) a_step,
-            b = inout(reg) b.as_ptr() => _,
-            b2 = inout(reg) b[b_half..].as_ptr() => _,
-            b_row = in(reg) 64usize,
-            b_step = in(reg) b_step,
-            c = in(reg) c.as_mut_ptr(),
-            c_row = in(reg) 4 * c_row,
-            out("tmm0") _, out("tmm1") _, out("tmm4") _, out("tmm6") _, out("tmm7") _,
-            options(nostack),
-        );
-    }
-}
-
-/// Four by one tiles: 64 rows of A, 16 columns of B, `steps` times 64 samples.
-fn half_block(_: &Tiles, steps: usize, turned: &[u8], gates: &[u8], sums: &mut Half<i32>) {
-    let stride = steps * 64;
-    assert!(steps > 0, "there is something to multiply");
-    assert!(turned.len() >= BLOCK_ROWS * stride, "every row of A is there");
-    assert!(gates.len() >= HALF_COLUMNS * stride, "every B is there");
-    // SAFETY: a `Tiles` says that tiles of this thread have 16 rows of 64 bytes. Tile rows read at
-    // turned + step * 64 + row * stride (row < 64) and gates + step * 1024 + 64 * row (row < 16) lie inside the slices
-    // by the assertions; the 64 rows of 64 bytes written are all of `sums`. All tiles used are named.
-    unsafe {
-        asm!(
-            "tilezero tmm0",
-            "tilezero tmm1",
-            "tilezero tmm2",
-            "tilezero tmm3",
-            "2:",
-            "tileloadd tmm7, [{b} + {row}]",
-            "tileloadd tmm4, [{a0} + {stride}]",
-            "tdpbusd tmm0, tmm4, tmm7",
-            "tileloadd tmm5, [{a1} + {stride}]",
-            "tdpbusd tmm1, tmm5, tmm7",
-            "tileloadd tmm6, [{a2} + {stride}]",
-            "tdpbusd tmm2, tmm6, tmm7",
-            "tileloadd tmm4, [{a3} + {stride}]",
-            "tdpbusd tmm3, tmm4, tmm7",
-            "add {a0}, 64",
-            "add {a1}, 64",
-            "add {a2}, 64",
-            "add {a3}, 64",
-            "add {b}, 1024",
-            "dec {steps}",
-            "jnz 2b",
-            "tilestored [{c} + {row}], tmm0",
-            "tilestored [{c} + {row} + 1024], tmm1",
-            "tilestored [{c} + {row} + 2048], tmm2",
-            "tilestored [{c} + {row} + 3072], tmm3",
-            steps = inout(reg) steps => _,
-            a0 = inout(reg) turned.as_ptr() => _,
-            a1 = inout(reg) turned[16 * stride..].as_ptr() => _,
-            a2 = inout(reg) turned[32 * stride..].as_ptr() => _,
-            a3 = inout(reg) turned[48 * stride..].as_ptr() => _,
-            b = inout(reg) gates.as_ptr() => _,
-            c = in(reg) sums.as_mut_ptr(),
-            row = in(reg) 64usize,
-            stride = in(reg) stride,
-            out("tmm0") _, out("tmm1") _, out("tmm2") _, out("tmm3") _,
-            out("tmm4") _, out("tmm5") _, out("tmm6") _, out("tmm7") _,
-            options(nostack),
-        );
-    }
-}
-
 impl Loops for &Tiles {
     fn read(self, cells: &[u8], drives: Drives<'_>, samples: Range<usize>, out: &mut [i32]) {
         if cells.is_empty() {
@@ -320,6 +155,63 @@ impl Loops for &Tiles {
         }
     }
 
+    /// Converts each bank of a tile while the next one is multiplied.
+    fn read_converted(
+        self,
+        banks: &Banks<'_>,
+        samples: Range<usize>,
+        scratch: &mut Scratch,
+        codes: &mut [i16],
+    ) -> [u64; 2] {
+        let blocks = banks.drives[0].blocks();
+        let whole = samples.len() / TOGETHER * TOGETHER;
+        let (these, rest) = codes.split_at_mut(whole * PANEL_COLUMNS);
+        let beyond = samples.start + whole..samples.end;
+        let mut saturated =
+            if rest.is_empty() { [0; 2] } else { apart(self, banks, beyond, scratch, rest) };
+        let sums = &mut scratch.currents[0];
+        for (group, codes) in these.as_chunks_mut::<{ Scratch::SUMS }>().0.iter_mut().enumerate() {
+            let first = (samples.start + group * TOGETHER) * BLOCK_ROWS;
+            let mut packed = Packed { codes: [0; Scratch::SUMS], saturated: [[0; 32]; 2] };
+            let tile = |tile: &Range<usize>, bank: usize| {
+                let drives = banks.drives[bank].of_blocks(tile.clone());
+                TileBank {
+                    drives: &drives.codes()[first..],
+                    step: drives.samples() * BLOCK_ROWS,
+                    cells: &banks.cells[bank][tile.start * BLOCK_CELLS..tile.end * BLOCK_CELLS],
+                }
+            };
+            let tiles = (0..blocks).step_by(banks.tile_blocks);
+            for (at, from) in tiles.enumerate() {
+                let blocks = from..(from + banks.tile_blocks).min(blocks);
+                let [e, i] = &mut *sums;
+                if at == 0 {
+                    // nothing to convert yet: zeros are code 0, and no conversion of them saturates
+                    i.fill(0);
+                }
+                fused::converting_inhibition(
+                    self,
+                    tile(&blocks, 0),
+                    e,
+                    i,
+                    banks.conversion,
+                    &mut packed,
+                );
+                fused::converting_excitation(
+                    self,
+                    tile(&blocks, 1),
+                    i,
+                    e,
+                    banks.conversion,
+                    &mut packed,
+                );
+            }
+            let counts = self.0.settle(&sums[1], banks.conversion, banks.live, &mut packed, codes);
+            saturated.iter_mut().zip(counts).for_each(|(sum, count)| *sum += count);
+        }
+        saturated
+    }
+
     fn read_columns(self, plane: &[u8], layout: Layout, gates: Drives<'_>, out: &mut [i32]) {
         let samples = gates.samples();
         let together = samples / 32 * 32;
@@ -348,6 +240,24 @@ impl Loops for &Tiles {
                 }
             }
         }
+    }
+
+    fn accumulate_drawn(
+        self,
+        (turned, stride): (&[u8], usize),
+        gates: &[i8],
+        sums: &mut Half<i32>,
+        draws: &Draws,
+        (column, block): (usize, usize),
+        words: &mut Half<u8>,
+    ) {
+        if !stride.is_multiple_of(64) {
+            self.0.accumulate(turned, stride, gates, sums);
+            return self.0.dither(draws, column, block, words);
+        }
+        let counter = draws.counter(64, column, block);
+        let gates = avx512::as_bytes(gates);
+        fused::half_block_drawn(self, turned, gates, sums, draws.start(), counter, words);
     }
 
     fn accumulate(self, turned: &[u8], stride: usize, gates: &[i8], sums: &mut Half<i32>) {
@@ -399,19 +309,12 @@ impl Loops for &Tiles {
         self.0.is_quiet(sums, write, bits)
     }
 
-    fn dither(self, place: &Place, rows: usize, column: usize, block: usize, words: &mut Half<u8>) {
-        self.0.dither(place, rows, column, block, words);
+    fn dither(self, draws: &Draws, column: usize, block: usize, words: &mut Half<u8>) {
+        self.0.dither(draws, column, block, words);
     }
 
-    fn dither_words(
-        self,
-        place: &Place,
-        rows: usize,
-        column: usize,
-        block: usize,
-        words: &mut Half<u16>,
-    ) {
-        self.0.dither_words(place, rows, column, block, words);
+    fn dither_words(self, draws: &Draws, column: usize, block: usize, words: &mut Half<u16>) {
+        self.0.dither_words(draws, column, block, words);
     }
 
     fn program(

@@ -12,9 +12,8 @@
 use std::arch::x86_64::*;
 use std::ops::Range;
 
-use super::{Cells, Conversion, Dither, Drives, Half, Loops, Write, WriteCounts, lanes};
+use super::{Cells, Conversion, Dither, Draws, Drives, Half, Loops, Write, WriteCounts, lanes};
 use crate::chip::crossbar::layout::{BLOCK_CELLS, BLOCK_ROWS, HALF_CELLS, HALF_COLUMNS, Layout};
-use crate::num::draw::Place;
 use crate::num::fixed::ErrorBits;
 
 mod dither;
@@ -76,8 +75,8 @@ impl Loops for Avx2 {
         compiled!(accumulate(turned, stride, gates, sums));
     }
 
-    fn dither(self, place: &Place, rows: usize, column: usize, block: usize, words: &mut Half<u8>) {
-        compiled!(dither::dither(place, rows, column, block, words));
+    fn dither(self, draws: &Draws, column: usize, block: usize, words: &mut Half<u8>) {
+        compiled!(dither::dither(draws, column, block, words));
     }
 
     fn program(

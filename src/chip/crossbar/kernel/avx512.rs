@@ -15,9 +15,11 @@
 use std::arch::x86_64::*;
 use std::ops::Range;
 
-use super::{Cells, Conversion, Dither, Drives, Half, LookUp, Loops, Write, WriteCounts};
+use super::{
+    Cells, Conversion, Dither, Draws, Drives, Half, LookUp, Loops, Packed, Scratch, Write,
+    WriteCounts,
+};
 use crate::chip::crossbar::layout::{BLOCK_CELLS, BLOCK_ROWS, HALF_CELLS, HALF_COLUMNS, Layout};
-use crate::num::draw::Place;
 use crate::num::fixed::ErrorBits;
 
 mod columns;
@@ -66,6 +68,18 @@ impl Avx512 {
         turned: &mut Turned,
     ) {
         compiled!(columns::turn_columns(plane, layout, block, turned));
+    }
+
+    /// Converts the last inhibitory sums and adds packed codes to `codes`, in order. Returns saturated conversions.
+    pub(super) fn settle(
+        self,
+        last: &[i32; Scratch::SUMS],
+        conversion: Conversion,
+        live: usize,
+        packed: &mut Packed,
+        codes: &mut [i16; Scratch::SUMS],
+    ) -> [u64; 2] {
+        compiled!(units::settle(last, conversion, live, packed, codes))
     }
 
     /// Sums of 32 turned rows for some samples.
@@ -136,19 +150,12 @@ impl Loops for Avx512 {
         compiled!(program::is_quiet(sums, write, bits))
     }
 
-    fn dither(self, place: &Place, rows: usize, column: usize, block: usize, words: &mut Half<u8>) {
-        compiled!(dither::dither(place, rows, column, block, words));
+    fn dither(self, draws: &Draws, column: usize, block: usize, words: &mut Half<u8>) {
+        compiled!(dither::dither(draws, column, block, words));
     }
 
-    fn dither_words(
-        self,
-        place: &Place,
-        rows: usize,
-        column: usize,
-        block: usize,
-        words: &mut Half<u16>,
-    ) {
-        compiled!(dither::dither_words(place, rows, column, block, words));
+    fn dither_words(self, draws: &Draws, column: usize, block: usize, words: &mut Half<u16>) {
+        compiled!(dither::dither_words(draws, column, block, words));
     }
 
     fn program(

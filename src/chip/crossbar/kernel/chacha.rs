@@ -5,27 +5,80 @@
 //! counter of column c = count << 28 | (c * blocks a column + block)
 //! ```
 //!
-//! Only word 12 differs between the columns: it holds the 28 bits of the block number.
+//! The key is the seed, then zeros. Between the blocks of a write only word 12 differs: it holds the 28 bits of the
+//! block number. All others are made once, as a half block is drawn faster than they are.
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
 use crate::chip::crossbar::layout::HALF_COLUMNS;
 use crate::num::draw::Place;
 
-/// The start of the first column, and what word 12 grows by from a column to the next: `step` blocks.
-pub(super) fn start(place: &Place, step: usize, column: usize, block: usize) -> ([i32; 16], i32) {
-    let step = step as u64;
-    let first = column as u64 * step + block as u64;
-    let counter = place.counter(first);
-    // Refuses a block beyond its 28 bits, so that word 12 of no column carries into word 13.
-    let _ = place.counter(first + (HALF_COLUMNS as u64 - 1) * step);
-    let mut bytes = [0; 64];
-    bytes[..16].copy_from_slice(b"expand 32-byte k");
-    bytes[16..48].copy_from_slice(&place.key());
-    bytes[48..56].copy_from_slice(&counter.to_le_bytes());
-    bytes[56..].copy_from_slice(&place.stream().to_le_bytes());
-    let mut words = [0; 16];
-    for (word, bytes) in words.iter_mut().zip(bytes.as_chunks().0) {
-        *word = i32::from_le_bytes(*bytes);
+/// `expand 32-byte k`, little endian.
+const CONSTANTS: [i32; 4] = [0x6170_7865, 0x3320_646e, 0x7962_2d32, 0x6b20_6574];
+
+/// Where the random words of one write of one array come from.
+#[derive(Debug, Clone)]
+pub struct Draws {
+    place: Place,
+    rows: usize,
+    start: [i32; 16],
+}
+
+/// Word 12 of 16 columns: the first, and what it grows by from a column to the next.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Counter {
+    pub(super) first: i32,
+    pub(super) step: i32,
+}
+
+impl Draws {
+    /// The words of an array of `rows` rows at a place.
+    #[must_use]
+    pub const fn new(place: Place, rows: usize) -> Self {
+        let [seed, stream] = [halves(place.seed), halves(place.stream())];
+        let count = halves(place.counter(0));
+        let mut start = [0; 16];
+        let mut word = 0;
+        while word < 4 {
+            start[word] = CONSTANTS[word];
+            word += 1;
+        }
+        [start[4], start[5]] = seed;
+        [start[12], start[13]] = count;
+        [start[14], start[15]] = stream;
+        Self { place, rows, start }
     }
-    (words, i32::try_from(step).expect("a step between blocks of 28 bits"))
+
+    /// Address of the words.
+    #[must_use]
+    pub const fn place(&self) -> &Place {
+        &self.place
+    }
+
+    /// Rows of the logical array.
+    #[must_use]
+    pub const fn rows(&self) -> usize {
+        self.rows
+    }
+
+    /// What ChaCha starts from, but for the block number in word 12.
+    pub(super) const fn start(&self) -> &[i32; 16] {
+        &self.start
+    }
+
+    /// Word 12 of the blocks that hold `rows_per_block` rows each.
+    ///
+    /// # Panics
+    /// When a block lies beyond its 28 bits, so that word 12 would carry into word 13.
+    pub(super) fn counter(&self, rows_per_block: usize, column: usize, block: usize) -> Counter {
+        let step = self.rows.div_ceil(rows_per_block) as u64;
+        let first = column as u64 * step + block as u64;
+        let last = first + (HALF_COLUMNS as u64 - 1) * step;
+        assert!(last < 1 << 28, "an array has fewer than 2^28 blocks of random words");
+        Counter { first: self.start[12] | first as u32 as i32, step: step as u32 as i32 }
+    }
+}
+
+/// Low and high 32 bits.
+const fn halves(v: u64) -> [i32; 2] {
+    [v as u32 as i32, (v >> 32) as i32]
 }

@@ -94,12 +94,12 @@ pub struct Banks<'a> {
 /// Samples that are read together, so that their sums stay close to the processor.
 pub const TOGETHER: usize = 32;
 
-/// Currents of two banks of a panel for [`TOGETHER`] samples, where matrix tiles are stored fastest.
+/// Currents of two banks of a panel for [`TOGETHER`] samples, of two tiles, where matrix tiles are stored fastest.
 #[derive(Debug, Clone)]
 #[repr(align(64))]
 pub struct Scratch {
-    /// `[sample][32]` by bank.
-    pub currents: [[i32; Self::SUMS]; 2],
+    /// `[sample][32]` by tile and bank.
+    pub currents: [[[i32; Self::SUMS]; 2]; 2],
 }
 
 impl Scratch {
@@ -109,7 +109,7 @@ impl Scratch {
     /// Zeros.
     #[must_use]
     pub const fn new() -> Self {
-        Self { currents: [[0; Self::SUMS]; 2] }
+        Self { currents: [[[0; Self::SUMS]; 2]; 2] }
     }
 }
 
@@ -117,6 +117,14 @@ impl Default for Scratch {
     fn default() -> Self {
         Self::new()
     }
+}
+
+/// Codes and saturation counts of a panel for [`TOGETHER`] samples, in the order in which 512-bit vectors are packed.
+#[derive(Debug)]
+#[repr(align(64))]
+pub(super) struct Packed {
+    pub(super) codes: [i16; Scratch::SUMS],
+    pub(super) saturated: [[i16; PANEL_COLUMNS]; 2],
 }
 
 /// A unit's table: `index = clamp( rsh(acc, shift), -half, half - 1 ) + half`.

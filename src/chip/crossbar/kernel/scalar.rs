@@ -19,11 +19,10 @@
 
 use std::ops::Range;
 
-use super::{Cells, Conversion, Dither, Drives, Half, LookUp, Loops, Write, WriteCounts};
+use super::{Cells, Conversion, Dither, Draws, Drives, Half, LookUp, Loops, Write, WriteCounts};
 use crate::chip::crossbar::layout::{
     BLOCK_CELLS, BLOCK_ROWS, HALF_CELLS, HALF_COLUMNS, Layout, PANEL_COLUMNS, in_half,
 };
-use crate::num::draw::Place;
 use crate::num::fixed::{ErrorBits, rsh, sat};
 
 /// The law as a back end.
@@ -146,16 +145,10 @@ pub(super) fn read_columns(plane: &[u8], layout: Layout, gates: Drives<'_>, out:
     }
 }
 
-pub(super) fn dither(
-    place: &Place,
-    rows: usize,
-    column: usize,
-    block: usize,
-    words: &mut Half<u8>,
-) {
+pub(super) fn dither(draws: &Draws, column: usize, block: usize, words: &mut Half<u8>) {
     for c in 0..HALF_COLUMNS {
         let mut bytes = [0; 64];
-        place.bytes(rows, column + c, block, &mut bytes);
+        draws.place().bytes(draws.rows(), column + c, block, &mut bytes);
         for (row, byte) in bytes.iter().enumerate() {
             words[in_half(row, c)] = *byte;
         }
@@ -163,16 +156,11 @@ pub(super) fn dither(
 }
 
 /// Rows of a group beyond the last one have words that nobody reads.
-pub(super) fn dither_words(
-    place: &Place,
-    rows: usize,
-    column: usize,
-    block: usize,
-    words: &mut Half<u16>,
-) {
+pub(super) fn dither_words(draws: &Draws, column: usize, block: usize, words: &mut Half<u16>) {
+    let rows = draws.rows();
     for (c, group) in (0..HALF_COLUMNS).flat_map(|c| [(c, 0), (c, 1)]) {
         if (2 * block + group) * 32 < rows {
-            let drawn = place.halves(rows, column + c, 2 * block + group);
+            let drawn = draws.place().halves(rows, column + c, 2 * block + group);
             for (row, word) in drawn.into_iter().enumerate() {
                 words[in_half(32 * group + row, c)] = word;
             }

@@ -6,7 +6,7 @@ use proptest::prelude::*;
 use super::backend::NAMES;
 use super::*;
 use crate::chip::crossbar::layout::{HALF_CELLS, HALF_COLUMNS, in_half};
-use crate::num::draw::{BLOCK_BYTES, Site};
+use crate::num::draw::{BLOCK_BYTES, Place, Site};
 
 /// Bytes from a seed, or only the greatest when the seed says so.
 fn bytes(seed: u64, len: usize) -> Vec<u8> {
@@ -173,6 +173,12 @@ fn check_accumulate(stride: usize, seed: u64) {
         let mut sums = [9; HALF_CELLS];
         kernel.accumulate(&turned, stride, &gates, &mut sums);
         assert!(sums == want, "{name} {stride}");
+        let place = Place::global(seed, Site::WriteDither, 3);
+        let (mut sums, mut words, mut bytes) = ([9; HALF_CELLS], [3; HALF_CELLS], [4; HALF_CELLS]);
+        let draws = Draws::new(place, 70 + seed as usize % 200);
+        kernel.accumulate_drawn((&turned, stride), &gates, &mut sums, &draws, (16, 1), &mut words);
+        law().dither(&draws, 16, 1, &mut bytes);
+        assert!(sums == want && words == bytes, "{name} {stride} drawn");
     }
 }
 
@@ -319,8 +325,8 @@ fn the_order_of_levels_is_the_order_of_dither() {
     let place = Place::global(7, Site::WriteDither, 3);
     for (_, kernel) in all() {
         let (mut out, mut wide) = ([0; HALF_CELLS], [0; HALF_CELLS]);
-        kernel.dither(&place, 70, 16, 1, &mut out);
-        kernel.dither_words(&place, 170, 16, 1, &mut wide);
+        kernel.dither(&Draws::new(place, 70), 16, 1, &mut out);
+        kernel.dither_words(&Draws::new(place, 170), 16, 1, &mut wide);
         for column in 0..16 {
             let mut words = [0; BLOCK_BYTES];
             place.bytes(70, 16 + column, 1, &mut words);
@@ -338,12 +344,13 @@ fn the_last_block_of_random_words_is_drawn_and_the_next_refused() {
     for backend in Backend::available() {
         let (mut want, mut out) = ([0; HALF_CELLS], [0; HALF_CELLS]);
         let (column, block) = ((1 << 28) - 16, 0);
-        law().dither(&place, 64, column, block, &mut want);
-        Kernel::start(backend).dither(&place, 64, column, block, &mut out);
+        let draws = Draws::new(place, 64);
+        law().dither(&draws, column, block, &mut want);
+        Kernel::start(backend).dither(&draws, column, block, &mut out);
         assert!(out == want);
         let beyond = || {
             let kernel = Kernel::start(backend);
-            kernel.dither(&place, 64, column + 1, block, &mut [0; HALF_CELLS]);
+            kernel.dither(&Draws::new(place, 64), column + 1, block, &mut [0; HALF_CELLS]);
         };
         assert!(std::panic::catch_unwind(beyond).is_err());
     }
@@ -495,12 +502,13 @@ proptest! {
     ) {
         let place = Place { seed, site: Site::WriteDither, layer, pathway, sub, count };
         let (mut want, mut wide) = ([0; HALF_CELLS], [0; HALF_CELLS]);
-        law().dither(&place, rows, column, block, &mut want);
-        law().dither_words(&place, rows, column, block, &mut wide);
+        let draws = Draws::new(place, rows);
+        law().dither(&draws, column, block, &mut want);
+        law().dither_words(&draws, column, block, &mut wide);
         for (name, kernel) in others() {
             let (mut out, mut words) = ([1; HALF_CELLS], [0; HALF_CELLS]);
-            kernel.dither(&place, rows, column, block, &mut out);
-            kernel.dither_words(&place, rows, column, block, &mut words);
+            kernel.dither(&draws, column, block, &mut out);
+            kernel.dither_words(&draws, column, block, &mut words);
             prop_assert!(out == want && words == wide, "{}", name);
         }
     }

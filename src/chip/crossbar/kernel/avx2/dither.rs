@@ -9,8 +9,7 @@
 use std::arch::x86_64::*;
 
 use super::store;
-use crate::chip::crossbar::kernel::{Half, chacha};
-use crate::num::draw::Place;
+use crate::chip::crossbar::kernel::{Draws, Half};
 
 /// Turns the 32-bit lanes left; `LEFT + RIGHT` is 32.
 #[inline]
@@ -42,15 +41,16 @@ fn quarter(s: &mut [__m256i; 16], a: usize, b: usize, c: usize, d: usize) {
 }
 
 #[target_feature(enable = "avx2,popcnt")]
-pub(super) fn dither(place: &Place, rows: usize, column: usize, block: usize, out: &mut Half<u8>) {
-    let (start, step) = chacha::start(place, rows.div_ceil(64), column, block);
+pub(super) fn dither(draws: &Draws, column: usize, block: usize, out: &mut Half<u8>) {
+    let (start, counter) = (draws.start(), draws.counter(64, column, block));
     let mut lane = _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7);
     for group in 0..2 {
         let mut first = [_mm256_setzero_si256(); 16];
         for (first, word) in first.iter_mut().zip(start) {
-            *first = _mm256_set1_epi32(word);
+            *first = _mm256_set1_epi32(*word);
         }
-        first[12] = _mm256_add_epi32(first[12], _mm256_mullo_epi32(lane, _mm256_set1_epi32(step)));
+        let grown = _mm256_mullo_epi32(lane, _mm256_set1_epi32(counter.step));
+        first[12] = _mm256_add_epi32(_mm256_set1_epi32(counter.first), grown);
         let mut s = first;
         for _ in 0..4 {
             quarter(&mut s, 0, 4, 8, 12);

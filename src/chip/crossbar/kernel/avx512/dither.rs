@@ -10,9 +10,9 @@
 
 use std::arch::x86_64::*;
 
-use super::store;
-use crate::chip::crossbar::kernel::{Half, chacha};
-use crate::num::draw::Place;
+use super::{load, store};
+use crate::chip::crossbar::kernel::chacha::Counter;
+use crate::chip::crossbar::kernel::{Draws, Half};
 
 #[inline]
 #[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi,popcnt")]
@@ -28,16 +28,16 @@ fn quarter(s: &mut [__m512i; 16], a: usize, b: usize, c: usize, d: usize) {
 }
 
 /// One block of 64 bytes of 16 columns: word i of lane c.
-#[inline]
 #[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi,popcnt")]
-fn blocks(start: [i32; 16], step: i32) -> [__m512i; 16] {
+fn blocks(start: &[i32; 16], counter: Counter, words: &mut Half<u8>) {
     let mut first = [_mm512_setzero_si512(); 16];
     for (first, word) in first.iter_mut().zip(start) {
-        *first = _mm512_set1_epi32(word);
+        *first = _mm512_set1_epi32(*word);
     }
     let lane = _mm512_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
-    first[12] = _mm512_add_epi32(first[12], _mm512_mullo_epi32(lane, _mm512_set1_epi32(step)));
-    let counter = first[12];
+    let grown = _mm512_mullo_epi32(lane, _mm512_set1_epi32(counter.step));
+    let counter = _mm512_add_epi32(_mm512_set1_epi32(counter.first), grown);
+    first[12] = counter;
     let mut s = first;
     for _ in 0..4 {
         quarter(&mut s, 0, 4, 8, 12);
@@ -49,43 +49,30 @@ fn blocks(start: [i32; 16], step: i32) -> [__m512i; 16] {
         quarter(&mut s, 2, 7, 8, 13);
         quarter(&mut s, 3, 4, 9, 14);
     }
-    for (i, (s, word)) in s.iter_mut().zip(start).enumerate() {
-        let first = if i == 12 { counter } else { _mm512_set1_epi32(word) };
-        *s = _mm512_add_epi32(*s, first);
+    let words = words.as_chunks_mut().0.iter_mut().zip(s);
+    for (i, ((words, s), word)) in words.zip(start).enumerate() {
+        let first = if i == 12 { counter } else { _mm512_set1_epi32(*word) };
+        store(words, _mm512_add_epi32(s, first));
     }
-    s
 }
 
 #[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi,popcnt")]
-pub(super) fn dither(
-    place: &Place,
-    rows: usize,
-    column: usize,
-    block: usize,
-    words: &mut Half<u8>,
-) {
-    let (start, step) = chacha::start(place, rows.div_ceil(64), column, block);
-    for (words, v) in words.as_chunks_mut().0.iter_mut().zip(blocks(start, step)) {
-        store(words, v);
-    }
+pub(super) fn dither(draws: &Draws, column: usize, block: usize, words: &mut Half<u8>) {
+    blocks(draws.start(), draws.counter(64, column, block), words);
 }
 
 /// A 64-byte block holds the 16-bit words of 32 rows: two a block of levels.
 #[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi,popcnt")]
-pub(super) fn dither_words(
-    place: &Place,
-    rows: usize,
-    column: usize,
-    block: usize,
-    words: &mut Half<u16>,
-) {
+pub(super) fn dither_words(draws: &Draws, column: usize, block: usize, words: &mut Half<u16>) {
+    let mut drawn = [0; _];
     for half in 0..2 {
-        if (2 * block + half) * 32 >= rows {
+        if (2 * block + half) * 32 >= draws.rows() {
             return;
         }
-        let (start, step) = chacha::start(place, rows.div_ceil(32), column, 2 * block + half);
         let groups = &mut words.as_chunks_mut::<64>().0[8 * half..][..8];
-        for (words, v) in groups.iter_mut().zip(blocks(start, step).as_chunks::<2>().0) {
+        blocks(draws.start(), draws.counter(32, column, 2 * block + half), &mut drawn);
+        for (words, drawn) in groups.iter_mut().zip(drawn.as_chunks::<128>().0) {
+            let v = [0, 1].map(|i| load(&drawn.as_chunks().0[i]));
             // lane c of v[0] holds rows 0 and 1 of a group, of v[1] rows 2 and 3
             let first = _mm512_setr_epi32(0, 16, 1, 17, 2, 18, 3, 19, 4, 20, 5, 21, 6, 22, 7, 23);
             let second = _mm512_add_epi32(first, _mm512_set1_epi32(8));

@@ -14,7 +14,7 @@ use std::arch::x86_64::*;
 
 use super::load_sums;
 use super::turn::interleave;
-use crate::chip::crossbar::kernel::{Conversion, LookUp};
+use crate::chip::crossbar::kernel::{Conversion, LookUp, Packed, Scratch};
 use crate::chip::crossbar::layout::{BLOCK_ROWS, PANEL_COLUMNS};
 use crate::num::fixed::ErrorBits;
 
@@ -22,41 +22,100 @@ use crate::num::fixed::ErrorBits;
 #[inline]
 #[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi,popcnt")]
 fn steps(currents: &[i32; 32], half: __m512i, shift: __m512i) -> __m512i {
-    let [a, b] = *currents.as_chunks::<16>().0 else { unreachable!("two vectors") };
-    let [a, b] = [a, b].map(|v| _mm512_srlv_epi32(_mm512_add_epi32(load_sums(&v), half), shift));
+    let [a, b] = currents.as_chunks::<16>().0 else { unreachable!("two vectors") };
+    let [a, b] = [a, b].map(|v| _mm512_srlv_epi32(_mm512_add_epi32(load_sums(v), half), shift));
     _mm512_packus_epi32(a, b)
+}
+
+#[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi,popcnt")]
+pub(super) fn convert(
+    currents: [&[i32]; 2],
+    conversion: Conversion,
+    live: usize,
+    codes: &mut [i16],
+) -> [u64; 2] {
+    if live == PANEL_COLUMNS {
+        converted::<true>(currents, conversion, u32::MAX, codes)
+    } else {
+        converted::<false>(currents, conversion, packed_mask((1 << live) - 1), codes)
+    }
 }
 
 #[inline]
 #[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi,popcnt")]
-pub(in crate::chip::crossbar::kernel) fn convert(
+fn converted<const ALL: bool>(
     [e, i]: [&[i32]; 2],
     conversion: Conversion,
-    live: usize,
+    alive: u32,
     codes: &mut [i16],
 ) -> [u64; 2] {
     let half = _mm512_set1_epi32(1 << conversion.shift >> 1);
     let shift = _mm512_set1_epi32(conversion.shift.cast_signed());
     let max = _mm512_set1_epi16(conversion.max.cast_signed());
-    let alive = u32::try_from((1u64 << live) - 1).expect("at most 32 columns");
     // packing leaves quarters of 8 bytes in the order 0 4 1 5 2 6 3 7
     let order = _mm512_setr_epi64(0, 2, 4, 6, 1, 3, 5, 7);
-    let packed_alive = packed_mask(alive);
-    let mut saturated = [0u32; 2];
+    // saturated conversions by lane, counted downward: at most 32 rows
+    let mut saturated = [_mm512_setzero_si512(); 2];
     let rows = e.as_chunks::<PANEL_COLUMNS>().0.iter().zip(i.as_chunks::<PANEL_COLUMNS>().0);
     for (codes, (e, i)) in codes.as_chunks_mut::<PANEL_COLUMNS>().0.iter_mut().zip(rows) {
-        let [e, i] = [steps(e, half, shift), steps(i, half, shift)];
-        saturated[0] += _mm512_mask_cmpgt_epu16_mask(packed_alive, e, max).count_ones();
-        saturated[1] += _mm512_mask_cmpgt_epu16_mask(packed_alive, i, max).count_ones();
-        let d = _mm512_maskz_sub_epi16(
-            packed_alive,
-            _mm512_min_epu16(e, max),
-            _mm512_min_epu16(i, max),
-        );
-        let d = _mm512_permutexvar_epi64(order, d);
-        add_codes(codes, d);
+        let banks = [steps(e, half, shift), steps(i, half, shift)];
+        for (saturated, steps) in saturated.iter_mut().zip(banks) {
+            let above = if ALL {
+                _mm512_cmpgt_epu16_mask(steps, max)
+            } else {
+                _mm512_mask_cmpgt_epu16_mask(alive, steps, max)
+            };
+            *saturated = _mm512_mask_sub_epi16(*saturated, above, *saturated, _mm512_set1_epi16(1));
+        }
+        let [e, i] = banks.map(|steps| _mm512_min_epu16(steps, max));
+        let d = if ALL { _mm512_sub_epi16(e, i) } else { _mm512_maskz_sub_epi16(alive, e, i) };
+        add_codes(codes, _mm512_permutexvar_epi64(order, d));
     }
-    saturated.map(u64::from)
+    saturated.map(|lanes| {
+        // pairs of 16-bit counts add up to 32 bits
+        let pairs = _mm512_madd_epi16(lanes, _mm512_set1_epi16(-1));
+        u64::from(_mm512_reduce_add_epi32(pairs).cast_unsigned())
+    })
+}
+
+/// See [`super::Avx512::settle`].
+#[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi,popcnt")]
+pub(super) fn settle(
+    last: &[i32; Scratch::SUMS],
+    conversion: Conversion,
+    live: usize,
+    packed: &mut Packed,
+    codes: &mut [i16; Scratch::SUMS],
+) -> [u64; 2] {
+    let half = _mm512_set1_epi32(1 << conversion.shift >> 1);
+    let shift = _mm512_set1_epi32(conversion.shift.cast_signed());
+    let max = _mm512_set1_epi16(conversion.max.cast_signed());
+    let order = _mm512_setr_epi64(0, 2, 4, 6, 1, 3, 5, 7);
+    let alive = packed_mask(u32::try_from((1u64 << live) - 1).expect("at most 32 columns"));
+    let mut saturated = load_words(&packed.saturated[1]);
+    let rows = codes.as_chunks_mut::<PANEL_COLUMNS>().0.iter_mut();
+    let rows = rows.zip(packed.codes.as_chunks::<PANEL_COLUMNS>().0);
+    for ((codes, packed), last) in rows.zip(last.as_chunks::<PANEL_COLUMNS>().0) {
+        let i = steps(last, half, shift);
+        let above = _mm512_cmpgt_epu16_mask(i, max);
+        saturated = _mm512_mask_add_epi16(saturated, above, saturated, _mm512_set1_epi16(1));
+        let d = _mm512_sub_epi16(load_words(packed), _mm512_min_epu16(i, max));
+        let d = _mm512_maskz_mov_epi16(alive, d);
+        add_codes(codes, _mm512_permutexvar_epi64(order, d));
+    }
+    [load_words(&packed.saturated[0]), saturated].map(|lanes| {
+        let lanes = _mm512_maskz_mov_epi16(alive, lanes);
+        // pairs of 16-bit counts add up to 32 bits
+        let pairs = _mm512_madd_epi16(lanes, _mm512_set1_epi16(1));
+        u64::from(_mm512_reduce_add_epi32(pairs).cast_unsigned())
+    })
+}
+
+#[inline]
+#[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi,popcnt")]
+fn load_words(words: &[i16; 32]) -> __m512i {
+    // SAFETY: the reference covers the 32 words, 64 bytes, that an unaligned load reads.
+    unsafe { _mm512_loadu_si512(words.as_ptr().cast()) }
 }
 
 /// Bits of columns, in the order in which [`steps`] packs them.
@@ -71,8 +130,7 @@ fn packed_mask(alive: u32) -> u32 {
 #[inline]
 #[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi,popcnt")]
 fn add_codes(codes: &mut [i16; 32], d: __m512i) {
-    // SAFETY: the reference covers the 32 codes, 64 bytes, that an unaligned load reads.
-    let before = unsafe { _mm512_loadu_si512(codes.as_ptr().cast()) };
+    let before = load_words(codes);
     // SAFETY: the reference covers the 32 codes, 64 bytes, that an unaligned store writes.
     unsafe { _mm512_storeu_si512(codes.as_mut_ptr().cast(), _mm512_add_epi16(before, d)) }
 }
@@ -132,7 +190,7 @@ fn store_bytes(bytes: &mut [u8; 16], v: __m128i) {
 /// Gates of 64 columns of one sample.
 #[inline]
 #[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi,popcnt")]
-fn gates_of(errors: &[i16; 64], slopes: &[u8; 64], up: __m128i, sign: __m512i) -> __m512i {
+fn gates_of(errors: &[i16; 64], slopes: &[u8; 64], up: __m512i, sign: __m512i) -> __m512i {
     let mut rows = [_mm256_setzero_si256(); 2];
     let halves = errors.as_chunks::<32>().0.iter().zip(slopes.as_chunks::<32>().0);
     for (row, (errors, slopes)) in rows.iter_mut().zip(halves) {
@@ -141,7 +199,7 @@ fn gates_of(errors: &[i16; 64], slopes: &[u8; 64], up: __m128i, sign: __m512i) -
         // SAFETY: the reference covers the 32 bytes that an unaligned load reads.
         let slopes = unsafe { _mm256_loadu_si256(slopes.as_ptr().cast()) };
         let errors = _mm512_sub_epi16(_mm512_xor_si512(errors, sign), sign);
-        let errors = _mm512_sll_epi16(errors, up);
+        let errors = _mm512_sllv_epi16(errors, up);
         let gates = _mm512_mulhrs_epi16(errors, _mm512_cvtepu8_epi16(slopes));
         *row = _mm512_cvtepi16_epi8(gates);
     }
@@ -157,7 +215,7 @@ pub(super) fn gate(
     stride: usize,
     gates: &mut [i8],
 ) -> u64 {
-    let up = _mm_cvtsi32_si128(15 - bits.get().cast_signed());
+    let up = _mm512_set1_epi16(15 - i16::try_from(bits.get()).expect("at most 9 bits"));
     let sign = _mm512_set1_epi16(if negate { -1 } else { 0 });
     let (errors, slopes) = (errors.as_chunks::<64>().0, derivatives.as_chunks::<64>().0);
     for quad in 0..stride / 4 {
