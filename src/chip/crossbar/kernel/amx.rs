@@ -17,7 +17,7 @@ use std::ops::Range;
 use std::sync::OnceLock;
 
 use super::avx512::{self, Avx512};
-use super::{Cells, Conversion, Dither, Drives, Half, LookUp, Loops, Write, WriteCounts};
+use super::{Cells, Conversion, Dither, Drives, Half, LookUp, Loops, Write, WriteCounts, peak};
 use crate::chip::crossbar::layout::{BLOCK_CELLS, BLOCK_ROWS, HALF_CELLS, HALF_COLUMNS, Layout};
 use crate::num::draw::Place;
 use crate::num::fixed::ErrorBits;
@@ -422,5 +422,9 @@ impl Loops for &Tiles {
         dither: Dither<'_>,
     ) -> WriteCounts {
         self.0.program(cells, sums, write, dither)
+    }
+
+    fn peak(self, rounds: usize) -> u64 {
+        peak::amx(self, rounds)
     }
 }

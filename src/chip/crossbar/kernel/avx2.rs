@@ -12,7 +12,7 @@
 use std::arch::x86_64::*;
 use std::ops::Range;
 
-use super::{Cells, Conversion, Dither, Drives, Half, Loops, Write, WriteCounts, lanes};
+use super::{Cells, Conversion, Dither, Drives, Half, Loops, Write, WriteCounts, lanes, peak};
 use crate::chip::crossbar::layout::{BLOCK_CELLS, BLOCK_ROWS, HALF_CELLS, HALF_COLUMNS, Layout};
 use crate::num::draw::Place;
 use crate::num::fixed::ErrorBits;
@@ -88,6 +88,10 @@ impl Loops for Avx2 {
         dither: Dither<'_>,
     ) -> WriteCounts {
         compiled!(program::program(cells, sums, write, dither))
+    }
+
+    fn peak(self, rounds: usize) -> u64 {
+        peak::avx2(self, rounds)
     }
 }
 

@@ -15,7 +15,7 @@
 use std::arch::x86_64::*;
 use std::ops::Range;
 
-use super::{Cells, Conversion, Dither, Drives, Half, LookUp, Loops, Write, WriteCounts};
+use super::{Cells, Conversion, Dither, Drives, Half, LookUp, Loops, Write, WriteCounts, peak};
 use crate::chip::crossbar::layout::{BLOCK_CELLS, BLOCK_ROWS, HALF_CELLS, HALF_COLUMNS, Layout};
 use crate::num::draw::Place;
 use crate::num::fixed::ErrorBits;
@@ -159,6 +159,10 @@ impl Loops for Avx512 {
         dither: Dither<'_>,
     ) -> WriteCounts {
         compiled!(program::program(cells, sums, write, dither))
+    }
+
+    fn peak(self, rounds: usize) -> u64 {
+        peak::avx512(self, rounds)
     }
 }
 
