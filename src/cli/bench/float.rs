@@ -120,5 +120,7 @@ mod tests {
         assert!(wrong(&net) < 0.5 * before, "{} after {before}", wrong(&net));
         let mut weights = net.layers.iter().flatten().flat_map(|target| &target.weights);
         assert!(weights.all(|weights| weights.iter().all(|&weight| weight >= 0.0)));
+        let gates = net.layers.iter().flatten().flat_map(|target| &target.gates);
+        assert_eq!(gates.filter(|gate| gate.is_subnormal()).count(), 0, "tiny floats are slow");
     }
 }

@@ -18,6 +18,8 @@ use crate::task::classify::Examples;
 const BATCH: usize = 128;
 /// Images of an epoch that seconds are given for.
 const EPOCH: f64 = 60_000.0;
+/// Rate of the float network: so low that no unit is driven to an end, where floats become tiny and slow.
+const FLOAT_RATE: f32 = 1e-5;
 /// Images that are made up.
 const IMAGES: usize = 64 * BATCH;
 /// Batches of the arm that goes through whole epochs.
@@ -288,7 +290,7 @@ fn float_arm<'a>(sizes: &[usize], pool: &'a ThreadPool) -> Arm<'a> {
     let mut next = 0;
     Arm::inside(pool, move || {
         let [inputs, targets] = &batches[next % batches.len()];
-        net.step(inputs, targets, 0.01);
+        net.step(inputs, targets, FLOAT_RATE);
         black_box(&mut net);
         next += 1;
     })
