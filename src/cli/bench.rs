@@ -31,8 +31,8 @@ pub(super) struct BenchArgs {
     /// Loops to time, and the scalar ones beside them [default: all for peak and read, the fastest for the rest]
     #[arg(long, value_name = "NAME")]
     kernel: Option<String>,
-    /// Measure only this section (repeatable)
-    #[arg(long, value_name = "SECTION")]
+    /// Measure only these sections, such as peak,read
+    #[arg(long, value_name = "SECTIONS", value_delimiter = ',')]
     only: Vec<Section>,
     /// A second or so for each section: rough figures
     #[arg(long)]

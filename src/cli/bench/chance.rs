@@ -25,7 +25,7 @@ pub(super) fn array(number: u64, layout: Layout, hardware: &Hardware) -> Crossba
     let mut levels = vec![0; layout.columns];
     for row in 0..layout.rows {
         for (level, word) in levels.iter_mut().zip(&mut words) {
-            let above = u16::try_from(u32::from(word) * span >> 16).expect("below the span");
+            let above = u16::try_from((u32::from(word) * span) >> 16).expect("below the span");
             *level = hardware.window.floor() + above;
         }
         array.load_row(row, &levels);

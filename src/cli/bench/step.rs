@@ -37,7 +37,7 @@ const COLUMNS: &[Column] = &[
     shown("epoch_seconds", "s/epoch", 3),
     shown("images_per_second", "images/s", 0),
     shown("gmac_per_second_best", "GMAC/s", 1),
-    shown("rate_times_ed", "rate / ED", 2),
+    shown("rate_times_ed", "rate / ED", 3),
     shown("times_float", "x f32", 1),
     shown("times_scalar", "x scalar", 1),
     shown("pulsed_percent", "pulsed %", 1),
@@ -53,8 +53,8 @@ struct Entry<'a> {
     pool: &'a ThreadPool,
     /// Updates of a run, when it is a whole pass over the examples.
     steps: Option<usize>,
-    /// Whether the float network does the same.
-    like_float: bool,
+    /// Whether the float network, and the scalar law, do the same.
+    like: [bool; 2],
 }
 
 /// What a race of networks is held against.
@@ -124,15 +124,15 @@ fn small<'a>(
         backend: plan.best,
         pool: one,
         steps: None,
-        like_float: true,
+        like: [true; 2],
     };
     let adc = ["hw.adc.bits=8", "hw.tile.rows=128"];
     let ed = settings("[256,256]", "10", &[]);
     let mut entries = vec![
         entry("ED", &[]),
-        entry("ED, 8-bit converters, 128 rows", &adc),
-        Entry { like_float: false, ..entry("DFA", &["learning.rule=dfa"]) },
-        Entry { like_float: false, ..entry("BP", &["learning.rule=bp"]) },
+        Entry { like: [true, false], ..entry("ED, 8-bit converters, 128 rows", &adc) },
+        Entry { like: [false; 2], ..entry("DFA", &["learning.rule=dfa"]) },
+        Entry { like: [false; 2], ..entry("BP", &["learning.rule=bp"]) },
         Entry {
             net: Net::new(&ed, plan.best, few),
             steps: Some(EPOCH_BATCHES),
@@ -163,7 +163,7 @@ fn wide(plan: &Plan, pool: &ThreadPool, images: &Examples, table: &mut Table) {
         backend: plan.best,
         pool,
         steps: None,
-        like_float: true,
+        like: [true; 2],
     }];
     let sizes = [784, 1024, 1024, 10];
     compare("784-1024-1024-10", entries, Some((&sizes, pool)), plan.seconds(6.0), table);
@@ -181,7 +181,7 @@ fn online(plan: &Plan, pool: &ThreadPool, images: &Examples, real: bool, table: 
             backend: plan.best,
             pool,
             steps: None,
-            like_float: false,
+            like: [false; 2],
         }
     };
     let entries = vec![
@@ -243,12 +243,12 @@ fn compare(
 }
 
 fn row(name: &str, entry: &Entry<'_>, time: Time, reference: &Reference) -> Vec<Cell> {
-    let Entry { net, what, images, backend, pool, like_float, .. } = entry;
+    let Entry { net, what, images, backend, pool, like, .. } = entry;
     let mut cells = vec![name.into(), (*what).into(), (*images).into(), backend.name().into()];
     cells.extend([pool.current_num_threads(), net.batch()].map(Cell::from));
     cells.extend(speeds(time, net.batch(), net.products()));
-    let float = reference.float.filter(|_| *like_float);
-    let scalar = reference.scalar.filter(|_| *like_float);
+    let float = reference.float.filter(|_| like[0]);
+    let scalar = reference.scalar.filter(|_| like[1]);
     cells.extend([
         (giga(net.products(), time.best) / reference.rate).into(),
         float.map(|float| float.best / time.best).into(),
