@@ -153,6 +153,9 @@ fn kernels(backends: &[Backend]) -> Vec<(Backend, Kernel)> {
     backends.iter().map(|&backend| (backend, Kernel::start(backend))).collect()
 }
 
+/// What a reader of scalar times must know.
+const SCALAR_NOTE: &str = "scalar: times are those of one panel of 32 columns";
+
 /// Panels of an array that a back end is timed on: the law is slow, and one tells its rate.
 fn panels_timed(backend: Backend, layout: Layout) -> usize {
     if backend == Backend::Scalar { 1 } else { layout.panels() }

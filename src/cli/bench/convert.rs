@@ -9,7 +9,7 @@ use super::table::{Cell, Column, Table, shown};
 use super::time::{Arm, Time, race};
 use super::{Plan, chance, giga, groups, kernels, panels_timed};
 use crate::chip::crossbar::Crossbar;
-use crate::chip::crossbar::kernel::{Banks, Conversion, Drives, Kernel, Scratch};
+use crate::chip::crossbar::kernel::{Backend, Banks, Conversion, Drives, Kernel, Scratch};
 use crate::chip::crossbar::layout::{BLOCK_ROWS, Layout, PANEL_COLUMNS};
 
 const SHAPES: [[usize; 2]; 2] = [[784, 256], [1024, 1024]];
@@ -43,6 +43,9 @@ pub(super) fn measure(plan: &Plan) -> Vec<Table> {
     table
         .notes
         .push("bit-serial: 8 one-bit slices of each drive, each with its own conversions".into());
+    if plan.best == Backend::Scalar {
+        table.notes.push(super::SCALAR_NOTE.into());
+    }
     vec![table]
 }
 

@@ -39,7 +39,7 @@ pub(super) fn measure(plan: &Plan) -> Vec<Table> {
     }
     table.notes.push("peak: the kernel's own, in registers, in the same race".into());
     table.notes.push("f32: matrix product of the same shape by ndarray (matrixmultiply)".into());
-    table.notes.push("scalar: one panel of 32 columns".into());
+    table.notes.push(super::SCALAR_NOTE.into());
     vec![table]
 }
 

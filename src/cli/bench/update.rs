@@ -6,7 +6,7 @@ use super::table::{Column, Table, shown};
 use super::time::{Arm, race};
 use super::{Plan, chance, kernels, panels_timed};
 use crate::chip::crossbar::WriteRequest;
-use crate::chip::crossbar::kernel::{Half, Kernel, Write};
+use crate::chip::crossbar::kernel::{Backend, Half, Kernel, Write};
 use crate::chip::crossbar::layout::{BLOCK_ROWS, HALF_CELLS, HALF_COLUMNS, Layout, PANEL_COLUMNS};
 use crate::chip::hardware::Hardware;
 use crate::num::draw::{Place, Site};
@@ -44,6 +44,9 @@ pub(super) fn measure(plan: &Plan) -> Vec<Table> {
     let mut table = Table::new("update", title, COLUMNS);
     for [rows, columns] in SHAPES {
         measure_one(plan, Layout { rows, columns }, &mut table);
+    }
+    if plan.best == Backend::Scalar {
+        table.notes.push(super::SCALAR_NOTE.into());
     }
     vec![table]
 }
