@@ -17,6 +17,7 @@ use crate::lab::config::{self, Config, Sources};
 use crate::lab::data::DataRoot;
 use crate::lab::run::Machine;
 
+mod bench;
 mod data;
 mod hw;
 mod progress;
@@ -73,6 +74,8 @@ enum Command {
     /// Show and check hardware models
     #[command(subcommand)]
     Hw(hw::HwCommand),
+    /// Measure how fast this machine is: kernels, and whole updates
+    Bench(bench::BenchArgs),
     /// Print completions for a shell
     Completions {
         /// Which shell
@@ -86,7 +89,7 @@ struct Shared {
     /// Threads; results do not depend on it [default: all cores]
     #[arg(long, value_name = "N")]
     threads: Option<usize>,
-    /// Loops to use: scalar, avx2, avx512; results do not depend on it [default: the fastest there is]
+    /// Loops to use: scalar, avx2, avx512, amx; results do not depend on it [default: the fastest there is]
     #[arg(long, value_name = "NAME")]
     kernel: Option<String>,
     /// Folder of data sets [default: data, or DALEAN_DATA]
@@ -177,6 +180,7 @@ pub fn main() -> ExitCode {
         Command::Verify(args) => run::verify(&args),
         Command::Data(command) => data::execute(&command),
         Command::Hw(command) => hw::execute(&command),
+        Command::Bench(args) => bench::execute(&args),
         Command::Completions { shell } => {
             let mut script = Vec::new();
             clap_complete::generate(shell, &mut Cli::command(), "dalean", &mut script);

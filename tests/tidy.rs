@@ -23,7 +23,7 @@ const HOUSE: [(&str, &[&str]); 6] = [
     ("learn", &["error", "route", "statistics", "rule", "driver"]),
     ("task", &["classify"]),
     ("lab", &["data", "config", "store", "report", "run"]),
-    ("cli", &["progress", "data", "hw", "run"]),
+    ("cli", &["progress", "data", "hw", "run", "bench"]),
 ];
 
 /// Wings that know no floats, clocks, hash maps, environment or files.

@@ -46,6 +46,9 @@ pub struct StripMut<'a> {
 }
 
 impl Crossbar {
+    /// Panels worth writing together: their gates and a block of drives stay in a processor's first cache.
+    pub const STRIP_PANELS: usize = 4;
+
     /// An array with every cell on the floor.
     #[must_use]
     pub fn new(layout: Layout, hardware: &Hardware) -> Self {

@@ -6,6 +6,7 @@
 )]
 
 mod bad_input;
+mod bench;
 mod laws;
 mod oracle;
 mod program;

@@ -31,6 +31,8 @@ mod backend;
 mod chacha;
 mod data;
 mod lanes;
+#[cfg(target_arch = "x86_64")]
+mod peak;
 mod scalar;
 #[cfg(test)]
 mod tests;
@@ -138,6 +140,10 @@ trait Loops: Copy {
         dither: Dither<'_>,
     ) -> WriteCounts {
         scalar::program(cells, sums, write, dither)
+    }
+
+    fn peak(self, _rounds: usize) -> u64 {
+        0
     }
 }
 
@@ -402,5 +408,11 @@ impl Kernel {
     ) -> WriteCounts {
         assert!(write.floor <= write.ceiling, "the window is not empty");
         with!(self, loops => loops.program(cells, sums, write, dither))
+    }
+    /// Multiplies random numbers in registers, and nothing else, for some rounds. Returns the products made: what this
+    /// back end's instruction reaches at most, once a caller has timed it. 0 where a back end has no such measure.
+    #[must_use]
+    pub fn peak(&self, rounds: usize) -> u64 {
+        with!(self, loops => loops.peak(rounds))
     }
 }

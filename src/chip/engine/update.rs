@@ -18,13 +18,10 @@ use super::error::{gates_of, stride_of};
 use super::{Engine, Write};
 use crate::chip::crossbar::kernel::{self, Kernel, WriteCounts};
 use crate::chip::crossbar::layout::{BLOCK_ROWS, PANEL_COLUMNS};
-use crate::chip::crossbar::{StripMut, WriteRequest};
+use crate::chip::crossbar::{Crossbar, StripMut, WriteRequest};
 use crate::chip::ledger::{During, Event};
 use crate::chip::population::{Polarity, Stream};
 use crate::num::draw::{Place, Site};
-
-/// Panels written together: their gates and a block of drives stay in the processor's first cache.
-const STRIP_PANELS: usize = 4;
 
 impl Engine {
     pub(super) fn update(&mut self, layer: usize, write: Write, samples: Range<usize>, shift: u32) {
@@ -135,7 +132,7 @@ impl Engine {
         let work = this.layout.cells() * this.arrays.len() * samples.len();
         let mut strips: Vec<(usize, StripMut<'_>)> = Vec::new();
         for (at, array) in this.arrays.iter_mut().enumerate() {
-            strips.extend(array.strips_mut(STRIP_PANELS).map(|strip| (at, strip)));
+            strips.extend(array.strips_mut(Crossbar::STRIP_PANELS).map(|strip| (at, strip)));
         }
         let writes = &this.writes;
         let panel_gates = PANEL_COLUMNS * stride;

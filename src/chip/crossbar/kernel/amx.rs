@@ -21,7 +21,7 @@ use self::product::{Walk, half_block, levels_by_drives, levels_by_gates, pair};
 use super::avx512::{self, Avx512};
 use super::{
     Banks, Cells, Conversion, Dither, Draws, Drives, Half, LookUp, Loops, Packed, Scratch,
-    TOGETHER, Write, WriteCounts, apart,
+    TOGETHER, Write, WriteCounts, apart, peak,
 };
 use crate::chip::crossbar::layout::{BLOCK_CELLS, BLOCK_ROWS, HALF_CELLS, Layout, PANEL_COLUMNS};
 use crate::num::fixed::ErrorBits;
@@ -325,5 +325,9 @@ impl Loops for &Tiles {
         dither: Dither<'_>,
     ) -> WriteCounts {
         self.0.program(cells, sums, write, dither)
+    }
+
+    fn peak(self, rounds: usize) -> u64 {
+        peak::amx(self, rounds)
     }
 }

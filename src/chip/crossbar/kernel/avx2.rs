@@ -12,7 +12,7 @@
 use std::arch::x86_64::*;
 use std::ops::Range;
 
-use super::{Cells, Conversion, Dither, Draws, Drives, Half, Loops, Write, WriteCounts, lanes};
+use super::{Cells, Conversion, Dither, Draws, Drives, Half, Loops, Write, WriteCounts, lanes, peak};
 use crate::chip::crossbar::layout::{BLOCK_CELLS, BLOCK_ROWS, HALF_CELLS, HALF_COLUMNS, Layout};
 use crate::num::fixed::ErrorBits;
 
@@ -87,6 +87,10 @@ impl Loops for Avx2 {
         dither: Dither<'_>,
     ) -> WriteCounts {
         compiled!(program::program(cells, sums, write, dither))
+    }
+
+    fn peak(self, rounds: usize) -> u64 {
+        peak::avx2(self, rounds)
     }
 }
 

@@ -17,7 +17,7 @@ use std::ops::Range;
 
 use super::{
     Cells, Conversion, Dither, Draws, Drives, Half, LookUp, Loops, Packed, Scratch, Write,
-    WriteCounts,
+    WriteCounts, peak,
 };
 use crate::chip::crossbar::layout::{BLOCK_CELLS, BLOCK_ROWS, HALF_CELLS, HALF_COLUMNS, Layout};
 use crate::num::fixed::ErrorBits;
@@ -166,6 +166,10 @@ impl Loops for Avx512 {
         dither: Dither<'_>,
     ) -> WriteCounts {
         compiled!(program::program(cells, sums, write, dither))
+    }
+
+    fn peak(self, rounds: usize) -> u64 {
+        peak::avx512(self, rounds)
     }
 }
 
