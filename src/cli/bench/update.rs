@@ -5,9 +5,9 @@ use std::hint::black_box;
 use super::table::{Column, Table, shown};
 use super::time::{Arm, race};
 use super::{Plan, chance, kernels, panels_timed};
-use crate::chip::crossbar::{Crossbar, WriteRequest};
 use crate::chip::crossbar::kernel::{Backend, Half, Kernel, Write};
 use crate::chip::crossbar::layout::{BLOCK_ROWS, HALF_CELLS, HALF_COLUMNS, Layout, PANEL_COLUMNS};
+use crate::chip::crossbar::{Crossbar, WriteRequest};
 use crate::chip::hardware::Hardware;
 use crate::num::draw::{Place, Site};
 

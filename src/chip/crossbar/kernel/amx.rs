@@ -174,11 +174,20 @@ impl Loops for &Tiles {
             let first = (samples.start + group * TOGETHER) * BLOCK_ROWS;
             let mut packed = Packed { codes: [0; Scratch::SUMS], saturated: [[0; 32]; 2] };
             let tile = |tile: &Range<usize>, bank: usize| {
-                let drives = banks.drives[bank].of_blocks(tile.clone());
+                let drives = banks.drives[bank];
+                let size = drives.samples() * BLOCK_ROWS;
+                let next = |bank: usize, block: usize| {
+                    let block = if block < blocks { block } else { 0 };
+                    [
+                        banks.drives[bank].codes()[block * size + first..].as_ptr(),
+                        banks.cells[bank][block * BLOCK_CELLS..].as_ptr(),
+                    ]
+                };
                 TileBank {
-                    drives: &drives.codes()[first..],
-                    step: drives.samples() * BLOCK_ROWS,
+                    drives: &drives.codes()[tile.start * size + first..tile.end * size],
+                    step: size,
                     cells: &banks.cells[bank][tile.start * BLOCK_CELLS..tile.end * BLOCK_CELLS],
+                    next: if bank == 0 { next(1, tile.start) } else { next(0, tile.end) },
                 }
             };
             let tiles = (0..blocks).step_by(banks.tile_blocks);
@@ -257,7 +266,7 @@ impl Loops for &Tiles {
         }
         let counter = draws.counter(64, column, block);
         let gates = avx512::as_bytes(gates);
-        fused::half_block_drawn(self, turned, gates, sums, draws.start(), counter, words);
+        fused::half_block_drawn(self, turned, gates, sums, draws, counter, words);
     }
 
     fn accumulate(self, turned: &[u8], stride: usize, gates: &[i8], sums: &mut Half<i32>) {

@@ -12,7 +12,9 @@
 use std::arch::x86_64::*;
 use std::ops::Range;
 
-use super::{Cells, Conversion, Dither, Draws, Drives, Half, Loops, Write, WriteCounts, lanes, peak};
+use super::{
+    Cells, Conversion, Dither, Draws, Drives, Half, Loops, Write, WriteCounts, lanes, peak,
+};
 use crate::chip::crossbar::layout::{BLOCK_CELLS, BLOCK_ROWS, HALF_CELLS, HALF_COLUMNS, Layout};
 use crate::num::fixed::ErrorBits;
 

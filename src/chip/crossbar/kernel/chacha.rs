@@ -6,7 +6,8 @@
 //! ```
 //!
 //! The key is the seed, then zeros. Between the blocks of a write only word 12 differs: it holds the 28 bits of the
-//! block number. All others are made once, as a half block is drawn faster than they are.
+//! block number. All others are made once, as a half block is drawn faster than they are; and so are three of the
+//! four quarter rounds of the first round, which do not see word 12.
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
 use crate::chip::crossbar::layout::HALF_COLUMNS;
@@ -21,6 +22,8 @@ pub struct Draws {
     place: Place,
     rows: usize,
     start: [i32; 16],
+    /// After the quarter rounds of columns 1, 2 and 3; words 0, 4, 8 and 12 as they start.
+    mixed: [i32; 16],
 }
 
 /// Word 12 of 16 columns: the first, and what it grows by from a column to the next.
@@ -45,7 +48,11 @@ impl Draws {
         [start[4], start[5]] = seed;
         [start[12], start[13]] = count;
         [start[14], start[15]] = stream;
-        Self { place, rows, start }
+        let mut mixed = start;
+        quarter(&mut mixed, 1);
+        quarter(&mut mixed, 2);
+        quarter(&mut mixed, 3);
+        Self { place, rows, start, mixed }
     }
 
     /// Address of the words.
@@ -65,6 +72,11 @@ impl Draws {
         &self.start
     }
 
+    /// The state before the first round's quarter round of column 0, but for word 12.
+    pub(super) const fn mixed(&self) -> &[i32; 16] {
+        &self.mixed
+    }
+
     /// Word 12 of the blocks that hold `rows_per_block` rows each.
     ///
     /// # Panics
@@ -75,6 +87,20 @@ impl Draws {
         let last = first + (HALF_COLUMNS as u64 - 1) * step;
         assert!(last < 1 << 28, "an array has fewer than 2^28 blocks of random words");
         Counter { first: self.start[12] | first as u32 as i32, step: step as u32 as i32 }
+    }
+}
+
+/// The quarter round of a column.
+const fn quarter(s: &mut [i32; 16], column: usize) {
+    let [a, b, c, d] = [column, column + 4, column + 8, column + 12];
+    let mut turn = 0;
+    while turn < 2 {
+        let [left, right] = [[16, 12], [8, 7]][turn];
+        s[a] = s[a].wrapping_add(s[b]);
+        s[d] = (s[d] ^ s[a]).rotate_left(left);
+        s[c] = s[c].wrapping_add(s[d]);
+        s[b] = (s[b] ^ s[c]).rotate_left(right);
+        turn += 1;
     }
 }
 

@@ -10,7 +10,7 @@ use std::arch::asm;
 use super::Tiles;
 use crate::chip::crossbar::kernel::chacha::Counter;
 use crate::chip::crossbar::kernel::data::Packed;
-use crate::chip::crossbar::kernel::{Conversion, Half, Scratch};
+use crate::chip::crossbar::kernel::{Conversion, Draws, Half, Scratch};
 use crate::chip::crossbar::layout::{BLOCK_CELLS, BLOCK_ROWS, HALF_COLUMNS};
 
 /// Sums of 32 samples and 32 columns.
@@ -25,6 +25,8 @@ pub(super) struct TileBank<'a> {
     pub(super) step: usize,
     /// Levels.
     pub(super) cells: &'a [u8],
+    /// Drives and levels that are wanted next: fetched meanwhile.
+    pub(super) next: [*const u8; 2],
 }
 
 /// Multiplies 32 samples by 32 columns into `now`; converts `before` meanwhile. `$combine` adds to or takes from codes.
@@ -38,15 +40,17 @@ macro_rules! converting {
             conversion: Conversion,
             packed: &mut Packed,
         ) {
-            let TileBank { drives, step, cells } = tile;
+            let TileBank { drives, step, cells, next } = tile;
             let steps = cells.len() / BLOCK_CELLS;
             assert!(steps > 0, "there is something to multiply");
             assert!(drives.len() >= (steps - 1) * step + 32 * BLOCK_ROWS, "32 samples are there");
+            let half = 1u32 << conversion.shift >> 1;
+            let settings = [half, conversion.shift, u32::from(conversion.max)];
             // SAFETY: a `Tiles` says that tiles of this thread have 16 rows of 64 bytes and that the processor has
             // AVX-512 BW. Tile rows read at drives + i * step + 64 * row (row < 32) and cells + i * 2048 + 64 * row
             // (row < 32) for i < steps lie inside the slices by the assertion and the division. 32 rows of 128 bytes
             // of `before`, of 64 bytes of codes, and of 128 bytes of `now` are all of these arrays; codes and counts
-            // are aligned to 64 bytes. All registers used are named.
+            // are aligned to 64 bytes. Fetching ahead reads nothing. All registers used are named.
             unsafe {
                 asm!(
                     "tilezero tmm0",
@@ -66,13 +70,15 @@ macro_rules! converting {
                     "add {b}, 2048",
                     "dec {steps}",
                     "jnz 2b",
-                    "vpbroadcastd zmm16, {half:e}",
-                    "vpbroadcastd zmm17, {shift:e}",
-                    "vpbroadcastw zmm18, {max:e}",
+                    "vpbroadcastd zmm16, dword ptr [{settings}]",
+                    "vpbroadcastd zmm17, dword ptr [{settings} + 4]",
+                    "vpbroadcastw zmm18, word ptr [{settings} + 8]",
                     "vpternlogd zmm19, zmm19, zmm19, 255",
                     "vmovdqa64 zmm20, [{saturated}]",
                     "mov {steps:e}, 32",
                     "3:",
+                    "prefetcht0 [{next_a}]",
+                    "prefetcht0 [{next_b}]",
                     "vpaddd zmm0, zmm16, [{before}]",
                     "vpaddd zmm1, zmm16, [{before} + 64]",
                     "vpsrlvd zmm0, zmm0, zmm17",
@@ -86,26 +92,27 @@ macro_rules! converting {
                     "vmovdqa64 [{codes}], zmm0",
                     "add {before}, 128",
                     "add {codes}, 64",
+                    "add {next_a}, 64",
+                    "add {next_b}, 64",
                     "dec {steps:e}",
                     "jnz 3b",
                     "vmovdqa64 [{saturated}], zmm20",
-                    "tilestored [{c} + {row2}], tmm0",
-                    "tilestored [{c} + {row2} + 64], tmm1",
-                    "tilestored [{c} + {row2} + 2048], tmm2",
-                    "tilestored [{c} + {row2} + 2112], tmm3",
+                    "tilestored [{c} + {row} * 2], tmm0",
+                    "tilestored [{c} + {row} * 2 + 64], tmm1",
+                    "tilestored [{c} + {row} * 2 + 2048], tmm2",
+                    "tilestored [{c} + {row} * 2 + 2112], tmm3",
                     steps = inout(reg) steps => _,
                     a = inout(reg) drives.as_ptr() => _,
                     step = in(reg) step,
                     b = inout(reg) cells.as_ptr() => _,
+                    next_a = inout(reg) next[0] => _,
+                    next_b = inout(reg) next[1] => _,
                     row = in(reg) 64usize,
-                    row2 = in(reg) 128usize,
                     c = in(reg) now.as_mut_ptr(),
                     before = inout(reg) before.as_ptr() => _,
                     codes = inout(reg) packed.codes.as_mut_ptr() => _,
                     saturated = in(reg) packed.saturated[$bank].as_mut_ptr(),
-                    half = in(reg) 1u32 << conversion.shift >> 1,
-                    shift = in(reg) conversion.shift,
-                    max = in(reg) u32::from(conversion.max),
+                    settings = in(reg) settings.as_ptr(),
                     out("zmm0") _, out("zmm1") _, out("zmm16") _, out("zmm17") _,
                     out("zmm18") _, out("zmm19") _, out("zmm20") _, out("k1") _,
                     out("tmm0") _, out("tmm1") _, out("tmm2") _, out("tmm3") _,
@@ -140,10 +147,10 @@ macro_rules! quarters {
     };
 }
 
-/// Starts ChaCha: word i of all lanes.
+/// Starts ChaCha: word i of all lanes, where columns 1, 2 and 3 of the first round are done.
 macro_rules! start {
     ($([$word:literal $at:literal])*) => {
-        concat!($("vpbroadcastd zmm", $word, ", dword ptr [{start} + ", $at, "]\n",)*)
+        concat!($("vpbroadcastd zmm", $word, ", dword ptr [{mixed} + ", $at, "]\n",)*)
     };
 }
 
@@ -164,13 +171,13 @@ static LANES: Lanes = Lanes([0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 1
 struct Lanes([i32; 16]);
 
 /// Sums of a half block, as [`super::product::half_block`], and meanwhile its 8-bit words: ChaCha8 of 16 blocks that
-/// start from `start`, with word 12 by lane.
+/// start from `draws`, with word 12 by lane.
 pub(super) fn half_block_drawn(
     _: &Tiles,
     turned: &[u8],
     gates: &[u8],
     sums: &mut Half<i32>,
-    start: &[i32; 16],
+    draws: &Draws,
     counter: Counter,
     words: &mut Half<u8>,
 ) {
@@ -213,7 +220,9 @@ pub(super) fn half_block_drawn(
             "vpbroadcastd zmm12, {first:e}",
             "vpaddd zmm16, zmm12, zmm16",
             "vmovdqa64 zmm12, zmm16",
-            "mov {steps:e}, 4",
+            quarters!([0 4 8 12]),
+            quarters!([0 5 10 15][1 6 11 12][2 7 8 13][3 4 9 14]),
+            "mov {steps:e}, 3",
             "3:",
             quarters!([0 4 8 12][1 5 9 13][2 6 10 14][3 7 11 15]),
             quarters!([0 5 10 15][1 6 11 12][2 7 8 13][3 4 9 14]),
@@ -237,7 +246,8 @@ pub(super) fn half_block_drawn(
             c = in(reg) sums.as_mut_ptr(),
             row = in(reg) 64usize,
             stride = in(reg) stride,
-            start = in(reg) start.as_ptr(),
+            start = in(reg) draws.start().as_ptr(),
+            mixed = in(reg) draws.mixed().as_ptr(),
             first = in(reg) counter.first,
             step = in(reg) counter.step,
             lanes = in(reg) LANES.0.as_ptr(),

@@ -27,11 +27,20 @@ fn quarter(s: &mut [__m512i; 16], a: usize, b: usize, c: usize, d: usize) {
     s[b] = _mm512_rol_epi32::<7>(_mm512_xor_si512(s[b], s[c]));
 }
 
+#[inline]
+#[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi,popcnt")]
+fn diagonals(s: &mut [__m512i; 16]) {
+    quarter(s, 0, 5, 10, 15);
+    quarter(s, 1, 6, 11, 12);
+    quarter(s, 2, 7, 8, 13);
+    quarter(s, 3, 4, 9, 14);
+}
+
 /// One block of 64 bytes of 16 columns: word i of lane c.
 #[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi,popcnt")]
-fn blocks(start: &[i32; 16], counter: Counter, words: &mut Half<u8>) {
+fn blocks(draws: &Draws, counter: Counter, words: &mut Half<u8>) {
     let mut first = [_mm512_setzero_si512(); 16];
-    for (first, word) in first.iter_mut().zip(start) {
+    for (first, word) in first.iter_mut().zip(draws.mixed()) {
         *first = _mm512_set1_epi32(*word);
     }
     let lane = _mm512_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
@@ -39,18 +48,17 @@ fn blocks(start: &[i32; 16], counter: Counter, words: &mut Half<u8>) {
     let counter = _mm512_add_epi32(_mm512_set1_epi32(counter.first), grown);
     first[12] = counter;
     let mut s = first;
-    for _ in 0..4 {
+    quarter(&mut s, 0, 4, 8, 12);
+    diagonals(&mut s);
+    for _ in 0..3 {
         quarter(&mut s, 0, 4, 8, 12);
         quarter(&mut s, 1, 5, 9, 13);
         quarter(&mut s, 2, 6, 10, 14);
         quarter(&mut s, 3, 7, 11, 15);
-        quarter(&mut s, 0, 5, 10, 15);
-        quarter(&mut s, 1, 6, 11, 12);
-        quarter(&mut s, 2, 7, 8, 13);
-        quarter(&mut s, 3, 4, 9, 14);
+        diagonals(&mut s);
     }
     let words = words.as_chunks_mut().0.iter_mut().zip(s);
-    for (i, ((words, s), word)) in words.zip(start).enumerate() {
+    for (i, ((words, s), word)) in words.zip(draws.start()).enumerate() {
         let first = if i == 12 { counter } else { _mm512_set1_epi32(*word) };
         store(words, _mm512_add_epi32(s, first));
     }
@@ -58,7 +66,7 @@ fn blocks(start: &[i32; 16], counter: Counter, words: &mut Half<u8>) {
 
 #[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi,popcnt")]
 pub(super) fn dither(draws: &Draws, column: usize, block: usize, words: &mut Half<u8>) {
-    blocks(draws.start(), draws.counter(64, column, block), words);
+    blocks(draws, draws.counter(64, column, block), words);
 }
 
 /// A 64-byte block holds the 16-bit words of 32 rows: two a block of levels.
@@ -70,7 +78,7 @@ pub(super) fn dither_words(draws: &Draws, column: usize, block: usize, words: &m
             return;
         }
         let groups = &mut words.as_chunks_mut::<64>().0[8 * half..][..8];
-        blocks(draws.start(), draws.counter(32, column, 2 * block + half), &mut drawn);
+        blocks(draws, draws.counter(32, column, 2 * block + half), &mut drawn);
         for (words, drawn) in groups.iter_mut().zip(drawn.as_chunks::<128>().0) {
             let v = [0, 1].map(|i| load(&drawn.as_chunks().0[i]));
             // lane c of v[0] holds rows 0 and 1 of a group, of v[1] rows 2 and 3
