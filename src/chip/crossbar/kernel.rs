@@ -29,14 +29,18 @@ mod avx2;
 #[cfg(target_arch = "x86_64")]
 mod avx512;
 mod backend;
-#[cfg(target_arch = "x86_64")]
+#[cfg(any(target_arch = "x86_64", target_arch = "aarch64"))]
 mod chacha;
 mod data;
 mod lanes;
+#[cfg(target_arch = "aarch64")]
+mod neon;
 mod scalar;
 #[cfg(test)]
 mod tests;
 
+#[cfg(target_arch = "aarch64")]
+pub use self::neon::Neon;
 #[cfg(target_arch = "x86_64")]
 pub use self::{amx::Amx, avx2::Avx2, avx512::Avx512};
 pub use self::{
@@ -163,6 +167,8 @@ pub struct Kernel {
 #[derive(Debug)]
 enum Ready {
     Scalar,
+    #[cfg(target_arch = "aarch64")]
+    Neon(Neon),
     #[cfg(target_arch = "x86_64")]
     Avx2(Avx2),
     #[cfg(target_arch = "x86_64")]
@@ -179,6 +185,8 @@ macro_rules! with {
                 let $loops = scalar::Scalar;
                 $call
             }
+            #[cfg(target_arch = "aarch64")]
+            &Ready::Neon($loops) => $call,
             #[cfg(target_arch = "x86_64")]
             &Ready::Avx2($loops) => $call,
             #[cfg(target_arch = "x86_64")]
@@ -195,6 +203,8 @@ impl Kernel {
     pub fn start(backend: Backend) -> Self {
         let loops = match backend {
             Backend::Scalar => Ready::Scalar,
+            #[cfg(target_arch = "aarch64")]
+            Backend::Neon(neon) => Ready::Neon(neon),
             #[cfg(target_arch = "x86_64")]
             Backend::Avx2(avx2) => Ready::Avx2(avx2),
             #[cfg(target_arch = "x86_64")]

@@ -425,8 +425,11 @@ fn a_name_says_whether_it_is_unknown_or_absent() {
         assert_eq!(Backend::named(backend.name()), Ok(backend));
         assert!(NAMES.contains(&backend.name()));
     }
-    let unknown = Backend::named("neon").unwrap_err().to_string();
-    assert_eq!(unknown, "there is no kernel `neon`; say one of scalar, avx2, avx512, amx");
+    let unknown = Backend::named("fast").unwrap_err().to_string();
+    assert_eq!(unknown, "there is no kernel `fast`; say one of scalar, neon, avx2, avx512, amx");
+    let elsewhere = if cfg!(target_arch = "aarch64") { "avx2" } else { "neon" };
+    let absent = Backend::named(elsewhere).unwrap_err();
+    assert!(matches!(absent, UnknownBackend::Absent { name, .. } if name == elsewhere));
     let absent = UnknownBackend::Absent { name: "avx512".into(), there: vec!["scalar", "avx2"] };
     assert_eq!(
         absent.to_string(),
