@@ -153,7 +153,7 @@ fn store(bytes: &mut [u8; 16], v: uint8x16_t) {
 /// A way to multiply 4 lanes of 4 bytes.
 trait Multiply: Copy {
     /// Streams that [`dots`] takes at a time: their sums and one vector of 64 bytes fit the registers.
-    const TOGETHER: usize;
+    const STREAMS: usize;
     /// Whether the sums of a lane lie in two halves, side by side; else the first vector holds all of them.
     const HALVED: bool;
 
@@ -164,7 +164,7 @@ trait Multiply: Copy {
 type Sums = [uint32x4_t; 2];
 
 impl Multiply for Long {
-    const TOGETHER: usize = 2;
+    const STREAMS: usize = 2;
     const HALVED: bool = true;
 
     #[inline(always)]
@@ -191,7 +191,7 @@ fn long<const SIGNED: bool>([low, high]: Sums, x: uint8x16_t, y: uint8x16_t) -> 
 }
 
 impl Multiply for Dot {
-    const TOGETHER: usize = 4;
+    const STREAMS: usize = 4;
     const HALVED: bool = false;
 
     #[inline(always)]
@@ -305,10 +305,10 @@ fn dots_batch<M: Multiply, const KIND: u8>(
     vectors: &[[u8; 64]],
     out: &mut [i32],
 ) {
-    for from in (0..samples).step_by(M::TOGETHER) {
+    for from in (0..samples).step_by(M::STREAMS) {
         let x = &streams[from * walk.stride..];
         let out = &mut out[from * walk.out..];
-        match (samples - from).min(M::TOGETHER) {
+        match (samples - from).min(M::STREAMS) {
             1 => dots::<M, KIND, 1>(products, walk, x, vectors, out),
             2 => dots::<M, KIND, 2>(products, walk, x, vectors, out),
             3 => dots::<M, KIND, 3>(products, walk, x, vectors, out),
