@@ -189,9 +189,7 @@ impl<'a> Reader<'a> {
             }
         }
         let [e, i] = &scratch.currents[0];
-        for (sum, (e, i)) in sums.iter_mut().zip(e.iter().zip(i)) {
-            *sum = e - i;
-        }
+        kernel.difference([&e[..sums.len()], &i[..sums.len()]], sums);
     }
 
     /// Accumulators of a panel, `[sample][32]`, of any size.

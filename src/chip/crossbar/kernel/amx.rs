@@ -298,6 +298,14 @@ impl Loops for &Tiles {
         self.0.look_up(accumulators, table, live, values, derivatives)
     }
 
+    fn difference(self, currents: [&[i32]; 2], sums: &mut [i32]) {
+        self.0.difference(currents, sums);
+    }
+
+    fn latch(self, words: &[i16], width: usize, taps: &[u16], errors: &mut [i16]) {
+        self.0.latch(words, width, taps, errors);
+    }
+
     fn gate(
         self,
         errors: &[i16],

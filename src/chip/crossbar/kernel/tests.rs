@@ -131,6 +131,19 @@ fn check_gate(samples: usize, stride: usize, bits: i64, seed: u64) {
     }
 }
 
+fn check_latch(samples: usize, width: usize, units: usize, seed: u64) {
+    let raw = bytes(seed | 1, samples * width * 2);
+    let words: Vec<_> = raw.as_chunks().0.iter().map(|word| i16::from_le_bytes(*word)).collect();
+    let taps: Vec<_> = (0..units).map(|unit| (unit * 7 % width) as u16).collect();
+    let mut want = vec![3; samples * 64];
+    law().latch(&words, width, &taps, &mut want);
+    for (name, kernel) in others() {
+        let mut out = vec![5; samples * 64];
+        kernel.latch(&words, width, &taps, &mut out);
+        assert_eq!(out, want, "{name} {samples} {width} {units}");
+    }
+}
+
 fn check_turn(samples: usize, stride: usize, seed: u64) {
     let codes = bytes(seed, samples * 64);
     let mut want = vec![1; stride * 64];
@@ -432,8 +445,11 @@ fn a_name_says_whether_it_is_unknown_or_absent() {
         assert_eq!(Backend::named(backend.name()), Ok(backend));
         assert!(NAMES.contains(&backend.name()));
     }
-    let unknown = Backend::named("neon").unwrap_err().to_string();
-    assert_eq!(unknown, "there is no kernel `neon`; say one of scalar, avx2, avx512, amx");
+    let unknown = Backend::named("fast").unwrap_err().to_string();
+    assert_eq!(unknown, "there is no kernel `fast`; say one of scalar, neon, avx2, avx512, amx");
+    let elsewhere = if cfg!(target_arch = "aarch64") { "avx2" } else { "neon" };
+    let absent = Backend::named(elsewhere).unwrap_err();
+    assert!(matches!(absent, UnknownBackend::Absent { name, .. } if name == elsewhere));
     let absent = UnknownBackend::Absent { name: "avx512".into(), there: vec!["scalar", "avx2"] };
     assert_eq!(
         absent.to_string(),
@@ -488,6 +504,7 @@ proptest! {
         let stride = samples.next_multiple_of(4) + 4 * beyond;
         check_gate(samples, stride, bits, seed);
         check_turn(samples, stride, seed);
+        check_latch(samples, 1 + beyond * 3, 1 + samples % 64, seed);
     }
 
     #[test]
