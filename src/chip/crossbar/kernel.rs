@@ -375,7 +375,8 @@ impl Kernel {
 
     /// Reads a whole array from its columns: `out[b][r] = sum of level[r][c] * gates[b][c]` over all columns.
     /// `plane` is one byte plane of the array; `gates` are signed bytes (-127..=127) that lie as drives do, by
-    /// column; `out` holds the padded rows of each sample. 65,535 products of a level and a gate fit 32 bits.
+    /// column, 0 beyond the last column; `out` holds the padded rows of each sample. 65,535 products of a level and a
+    /// gate fit 32 bits.
     ///
     /// # Panics
     /// When the sizes do not match.

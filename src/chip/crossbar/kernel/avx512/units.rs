@@ -192,11 +192,21 @@ pub(super) fn difference(currents: [&[i32]; 2], sums: &mut [i32]) {
     scalar::difference(currents, sums);
 }
 
-/// Words of a sample fit one vector: a permutation taps them. Wider buses are tapped one word after the other.
+/// Words of a sample fit one vector: a permutation taps them. Of wider buses, neighbours are copied, and other words
+/// tapped one after the other.
 #[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi,popcnt")]
 pub(super) fn latch(words: &[i16], width: usize, taps: &[u16], errors: &mut [i16]) {
     if width > 32 {
-        return scalar::latch(words, width, taps, errors);
+        let neighbours = taps.windows(2).all(|pair| pair[0] + 1 == pair[1]);
+        let Some(&first) = taps.first().filter(|_| neighbours) else {
+            return scalar::latch(words, width, taps, errors);
+        };
+        let rows = errors.as_chunks_mut::<64>().0.iter_mut();
+        for (words, errors) in words.chunks_exact(width).zip(rows) {
+            errors[..taps.len()].copy_from_slice(&words[usize::from(first)..][..taps.len()]);
+            errors[taps.len()..].fill(0);
+        }
+        return;
     }
     let mut all = [0; 64];
     all.iter_mut().zip(taps).for_each(|(all, tap)| *all = tap.cast_signed());
