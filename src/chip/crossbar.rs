@@ -18,6 +18,8 @@ use layout::{BLOCK_CELLS, BLOCK_ROWS, HALF_CELLS, HALF_COLUMNS, Layout, PANEL_CO
 pub mod kernel;
 pub mod layout;
 
+/// Columns of a full strip.
+const STRIP_COLUMNS: usize = Crossbar::STRIP_PANELS * PANEL_COLUMNS;
 /// 64-bit words of pruned bits in a half block.
 const HALF_WORDS: usize = HALF_CELLS / 64;
 
@@ -333,12 +335,16 @@ struct Words {
     bytes: Half<u8>,
     halves: Half<u16>,
     draws: Draws,
+    /// Separable words of all rows, and of the columns of a strip; made when first drawn.
+    down: Vec<u16>,
+    across: Vec<u16>,
 }
 
 impl Words {
     const fn new(place: Place, rows: usize) -> Self {
         let draws = Draws::new(place, rows);
-        Self { bytes: [0; HALF_CELLS], halves: [0; HALF_CELLS], draws }
+        let (down, across) = (vec![], vec![]);
+        Self { bytes: [0; HALF_CELLS], halves: [0; HALF_CELLS], draws, down, across }
     }
 
     fn draw(
@@ -358,14 +364,25 @@ impl Words {
                 kernel.dither_words(&self.draws, column, block, &mut self.halves);
             }
             (bits, DitherPattern::Separable) => {
-                // numbered as one column each: rows at sub 1, columns at sub 2
-                let down = separable_words(&Place { sub: 1, ..place }, bits, block * 64, 64);
-                let across = separable_words(&Place { sub: 2, ..place }, bits, column, 16);
-                for (c, across) in across.iter().enumerate() {
-                    for (row, down) in down.iter().enumerate() {
-                        let [byte, _] = (down ^ across).to_le_bytes();
-                        self.bytes[in_half(row, c)] = byte;
-                        self.halves[in_half(row, c)] = down ^ across;
+                // numbered as one column each: rows at sub 1, columns at sub 2; all rows once, columns once a strip
+                if self.down.is_empty() {
+                    let blocks = self.draws.rows().div_ceil(64);
+                    self.down = separable_words(&Place { sub: 1, ..place }, bits, 0, blocks * 64);
+                    let first = column / STRIP_COLUMNS * STRIP_COLUMNS;
+                    let columns = Place { sub: 2, ..place };
+                    self.across = separable_words(&columns, bits, first, STRIP_COLUMNS);
+                }
+                let across = &self.across[column % STRIP_COLUMNS..][..HALF_COLUMNS];
+                let down = self.down[block * 64..].as_chunks::<4>().0;
+                for (group, down) in down.iter().take(16).enumerate() {
+                    let to = group * 64..group * 64 + 64;
+                    let words = self.halves[to.clone()].as_chunks_mut::<4>().0.iter_mut();
+                    for (words, across) in words.zip(across) {
+                        *words = down.map(|down| down ^ across);
+                    }
+                    if bits == DitherBits::Eight {
+                        let words = self.halves[to.clone()].iter();
+                        self.bytes[to].iter_mut().zip(words).for_each(|(b, &w)| *b = w as u8);
                     }
                 }
             }
@@ -377,17 +394,18 @@ impl Words {
     }
 }
 
-/// Words `first ..` of an array of one column, 8 or 16 bits wide, as many as a block has rows or a half columns.
+/// Words `first ..` of an array of one column, 8 or 16 bits wide.
 fn separable_words(place: &Place, bits: DitherBits, first: usize, count: usize) -> Vec<u16> {
     // an array of one column has its blocks one after the other, however many rows it has
-    let mut bytes = [0; 128];
-    if bits == DitherBits::Sixteen {
-        place.fill((first / 32) as u64, &mut bytes);
-        let words = bytes[first % 32 * 2..].as_chunks::<2>().0;
+    let wide = bits == DitherBits::Sixteen;
+    let in_block = if wide { 32 } else { 64 };
+    let mut bytes = vec![0; (first % in_block + count).div_ceil(in_block) * 64];
+    place.fill((first / in_block) as u64, &mut bytes);
+    if wide {
+        let words = bytes[first % in_block * 2..].as_chunks::<2>().0;
         words.iter().take(count).map(|word| u16::from_le_bytes(*word)).collect()
     } else {
-        place.fill((first / 64) as u64, &mut bytes);
-        bytes[first % 64..].iter().take(count).map(|&byte| u16::from(byte)).collect()
+        bytes[first % in_block..].iter().take(count).map(|&byte| u16::from(byte)).collect()
     }
 }
 

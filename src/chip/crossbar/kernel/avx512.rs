@@ -31,7 +31,7 @@ mod units;
 
 pub(super) use columns::Turned;
 
-/// Proof that the processor has AVX-512 F, BW, VL, VNNI and VBMI, and counts bits.
+/// Proof that the processor has AVX-512 F, BW, VL, VNNI and VBMI, counts bits and gathers them (BMI2).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Avx512(());
 
@@ -44,7 +44,8 @@ impl Avx512 {
             && is_x86_feature_detected!("avx512vl")
             && is_x86_feature_detected!("avx512vnni")
             && is_x86_feature_detected!("avx512vbmi")
-            && is_x86_feature_detected!("popcnt");
+            && is_x86_feature_detected!("popcnt")
+            && is_x86_feature_detected!("bmi2");
         there.then_some(Self(()))
     }
 }

@@ -24,11 +24,11 @@
 
 use std::arch::x86_64::*;
 
-use self::residual::residual;
+use self::general::general;
 use super::{load, load_sums, store};
-use crate::chip::crossbar::kernel::{Cells, Dither, Half, Write, WriteCounts, lanes};
+use crate::chip::crossbar::kernel::{Cells, Dither, Half, Write, WriteCounts, scalar};
 
-mod residual;
+mod general;
 
 /// Half-up.
 const NEAREST: u8 = 0;
@@ -46,36 +46,33 @@ const MINUS: u8 = 1;
 /// `sum * (+-mantissa)`.
 const TIMES: u8 = 2;
 
-#[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi,popcnt")]
+#[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi,popcnt,bmi2")]
 pub(super) fn program(
     cells: Cells<'_>,
     sums: &Half<i32>,
     write: &Write,
     dither: Dither<'_>,
 ) -> WriteCounts {
-    let plain = cells.high.is_none()
-        && cells.pruned.is_none()
-        && cells.residual.is_some() == (write.residual_bits > 0)
+    let inside = cells.residual.is_some() == (write.residual_bits > 0)
         && write.residual_bits <= 15
         && write.shift <= 31
         && (1..=127).contains(&write.increment_max)
         && (1..=15).contains(&write.mantissa);
+    if !inside {
+        return scalar::program(cells, sums, write, dither);
+    }
+    let plain = cells.high.is_none() && cells.pruned.is_none() && cells.residual.is_none();
     let (true, Ok(floor), Ok(ceiling)) =
         (plain, u8::try_from(write.floor), u8::try_from(write.ceiling))
     else {
-        return lanes::program(cells, sums, write, dither);
+        return match dither {
+            Dither::Nearest => general::<NEAREST>(cells, sums, write, &[0; _], &[0; _]),
+            Dither::Byte(words) => general::<WIDE>(cells, sums, write, words, &[0; _]),
+            Dither::Word(words) => general::<WORD>(cells, sums, write, &[0; _], words),
+        };
     };
     let window = (floor, ceiling);
     let low = cells.low;
-    if let Some(left) = cells.residual {
-        return match dither {
-            Dither::Nearest => {
-                residual::<NEAREST>(low, left, sums, write, window, &[0; _], &[0; _])
-            }
-            Dither::Byte(words) => residual::<WIDE>(low, left, sums, write, window, words, &[0; _]),
-            Dither::Word(words) => residual::<WORD>(low, left, sums, write, window, &[0; _], words),
-        };
-    }
     match dither {
         Dither::Nearest => scaled::<NEAREST>(low, sums, write, window, &[0; _], &[0; _]),
         Dither::Byte(words) if write.shift >= 8 && write.increment_max <= 15 => {
