@@ -13,13 +13,11 @@ use bitvec::prelude::*;
 use super::hardware::{DitherBits, DitherPattern, FloorKind, Hardware, Window};
 use crate::num::draw::{Place, Site};
 use kernel::{Cells, Dither, Draws, Drives, Half, Kernel, Write, WriteCounts};
-use layout::{BLOCK_CELLS, BLOCK_ROWS, HALF_CELLS, HALF_COLUMNS, Layout, PANEL_COLUMNS, in_half};
+use layout::{BLOCK_CELLS, BLOCK_ROWS, HALF_CELLS, HALF_COLUMNS, Layout, PANEL_COLUMNS};
 
 pub mod kernel;
 pub mod layout;
 
-/// Columns of a full strip.
-const STRIP_COLUMNS: usize = Crossbar::STRIP_PANELS * PANEL_COLUMNS;
 /// 64-bit words of pruned bits in a half block.
 const HALF_WORDS: usize = HALF_CELLS / 64;
 
@@ -268,7 +266,9 @@ impl StripMut<'_> {
         let stride = request.stride;
         let mut counts = WriteCounts::default();
         let mut sums = Sums([0; HALF_CELLS]);
-        let mut words = Words::new(request.place, self.layout.rows);
+        let Range { start, end } = self.panels();
+        let draws = Draws::new(request.place, self.layout.rows);
+        let mut words = Words::new(draws, start * PANEL_COLUMNS..end * PANEL_COLUMNS);
         let live: Vec<_> = gates
             .chunks_exact(HALF_COLUMNS * stride)
             .enumerate()
@@ -335,16 +335,17 @@ struct Words {
     bytes: Half<u8>,
     halves: Half<u16>,
     draws: Draws,
-    /// Separable words of all rows, and of the columns of a strip; made when first drawn.
+    /// Columns of the strip.
+    columns: Range<usize>,
+    /// Separable words of all rows, and of the columns of the strip; made when first drawn.
     down: Vec<u16>,
     across: Vec<u16>,
 }
 
 impl Words {
-    const fn new(place: Place, rows: usize) -> Self {
-        let draws = Draws::new(place, rows);
-        let (down, across) = (vec![], vec![]);
-        Self { bytes: [0; HALF_CELLS], halves: [0; HALF_CELLS], draws, down, across }
+    fn new(draws: Draws, columns: Range<usize>) -> Self {
+        let (bytes, halves) = ([0; HALF_CELLS], [0; HALF_CELLS]);
+        Self { bytes, halves, draws, columns, down: vec![], across: vec![] }
     }
 
     fn draw(
@@ -368,11 +369,10 @@ impl Words {
                 if self.down.is_empty() {
                     let blocks = self.draws.rows().div_ceil(64);
                     self.down = separable_words(&Place { sub: 1, ..place }, bits, 0, blocks * 64);
-                    let first = column / STRIP_COLUMNS * STRIP_COLUMNS;
-                    let columns = Place { sub: 2, ..place };
-                    self.across = separable_words(&columns, bits, first, STRIP_COLUMNS);
+                    let (first, count) = (self.columns.start, self.columns.len());
+                    self.across = separable_words(&Place { sub: 2, ..place }, bits, first, count);
                 }
-                let across = &self.across[column % STRIP_COLUMNS..][..HALF_COLUMNS];
+                let across = &self.across[column - self.columns.start..][..HALF_COLUMNS];
                 let down = self.down[block * 64..].as_chunks::<4>().0;
                 for (group, down) in down.iter().take(16).enumerate() {
                     let to = group * 64..group * 64 + 64;
