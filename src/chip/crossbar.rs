@@ -255,8 +255,8 @@ impl StripMut<'_> {
     /// Accumulates, rounds, bounds and programs these panels. `gates` lies
     /// `[half][stride / 4][16 columns][4 samples]`.
     ///
-    /// Passed over without a draw: blocks that are not driven, columns without a gate, and half blocks whose sums all
-    /// round to 0 whatever their words. A remainder alone is less than a pulse.
+    /// Passed over without a draw: blocks that are not driven, columns without a gate, and sums that round to 0
+    /// whatever their words. A remainder alone is less than a pulse.
     pub fn write(
         &mut self,
         kernel: &Kernel,
@@ -291,9 +291,9 @@ impl StripMut<'_> {
                 } else {
                     kernel.accumulate(turned, stride, gates, &mut sums.0);
                 }
-                let quiet = kernel.is_quiet(&sums.0, &request.write, request.dither_bits.get());
-                ahead = may_be_ahead && !quiet;
-                if quiet {
+                let groups = kernel.loud(&sums.0, &request.write, request.dither_bits.get());
+                ahead = may_be_ahead && groups != 0;
+                if groups == 0 {
                     continue;
                 }
                 let dither = if drawn {
@@ -302,7 +302,8 @@ impl StripMut<'_> {
                     words.draw(kernel, request, column, block)
                 };
                 let cells = self.half(half, block);
-                counts += kernel.program(cells, &sums.0, &request.write, dither);
+                let write = Write { groups, ..request.write };
+                counts += kernel.program(cells, &sums.0, &write, dither);
             }
         }
         counts

@@ -133,8 +133,8 @@ trait Loops: Copy {
         self.dither(draws, column, block, words);
     }
 
-    fn is_quiet(self, sums: &Half<i32>, write: &Write, bits: u32) -> bool {
-        scalar::is_quiet(sums, write, bits)
+    fn loud(self, sums: &Half<i32>, write: &Write, bits: u32) -> u16 {
+        scalar::loud(sums, write, bits)
     }
 
     fn dither(self, draws: &Draws, column: usize, block: usize, words: &mut Half<u8>) {
@@ -419,11 +419,11 @@ impl Kernel {
         with!(self, loops => loops.accumulate_drawn((turned, stride), gates, sums, draws, at, words));
     }
 
-    /// Whether every sum rounds to 0 whatever its dither word of `bits` bits: then nothing is drawn, nothing
-    /// moves and nothing is counted.
+    /// Groups of four rows, a bit each, with a sum that does not round to 0 whatever its dither word of `bits` bits. In
+    /// all others nothing is drawn, nothing moves and nothing is counted.
     #[must_use]
-    pub fn is_quiet(&self, sums: &Half<i32>, write: &Write, bits: u32) -> bool {
-        with!(self, loops => loops.is_quiet(sums, write, bits))
+    pub fn loud(&self, sums: &Half<i32>, write: &Write, bits: u32) -> u16 {
+        with!(self, loops => loops.loud(sums, write, bits))
     }
 
     /// The 8-bit dither words of a half block: columns `column .. column + 16`, rows `64 * block ..`, in the order of

@@ -114,6 +114,7 @@ impl Engine {
             mantissa: i32::try_from(self.mantissa).expect("1..=15"),
             negate: false,
             increment_max: i32::try_from(hardware.increment_max.get()).expect("1..=127"),
+            groups: u16::MAX,
             floor: hardware.window.floor(),
             ceiling: hardware.window.ceiling(),
             residual_bits: hardware.residual_bits.get(),

@@ -124,6 +124,7 @@ fn written<'a>(
             mantissa: 1,
             negate: false,
             increment_max: i32::try_from(hardware.increment_max.get()).expect("1..=127"),
+            groups: u16::MAX,
             floor: hardware.window.floor(),
             ceiling: hardware.window.ceiling(),
             residual_bits: hardware.residual_bits.get(),

@@ -337,8 +337,8 @@ impl Loops for &Tiles {
         self.0.turn(codes, stride, turned);
     }
 
-    fn is_quiet(self, sums: &Half<i32>, write: &Write, bits: u32) -> bool {
-        self.0.is_quiet(sums, write, bits)
+    fn loud(self, sums: &Half<i32>, write: &Write, bits: u32) -> u16 {
+        self.0.loud(sums, write, bits)
     }
 
     fn dither(self, draws: &Draws, column: usize, block: usize, words: &mut Half<u8>) {

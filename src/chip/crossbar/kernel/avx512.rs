@@ -155,8 +155,8 @@ impl Loops for Avx512 {
         compiled!(accumulate(turned, stride, gates, sums));
     }
 
-    fn is_quiet(self, sums: &Half<i32>, write: &Write, bits: u32) -> bool {
-        compiled!(program::is_quiet(sums, write, bits))
+    fn loud(self, sums: &Half<i32>, write: &Write, bits: u32) -> u16 {
+        compiled!(program::loud(sums, write, bits))
     }
 
     fn dither(self, draws: &Draws, column: usize, block: usize, words: &mut Half<u8>) {

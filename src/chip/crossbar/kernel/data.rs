@@ -159,6 +159,8 @@ pub struct Write {
     pub negate: bool,
     /// Bound of pulses, 1..=127.
     pub increment_max: i32,
+    /// Groups of four rows that may have a loud sum; all others change nothing and may be passed over.
+    pub groups: u16,
     /// Least level.
     pub floor: u16,
     /// Greatest level.

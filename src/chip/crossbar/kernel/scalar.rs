@@ -206,11 +206,13 @@ fn scaled(sum: i32, write: &Write) -> (i64, i64) {
     (sum, i64::from(write.shift) - i64::from(write.residual_bits))
 }
 
-pub(super) fn is_quiet(sums: &Half<i32>, write: &Write, bits: u32) -> bool {
-    sums.iter().all(|&sum| {
+pub(super) fn loud(sums: &Half<i32>, write: &Write, bits: u32) -> u16 {
+    let loud = |&sum: &i32| {
         let (sum, shift) = scaled(sum, write);
-        quotient(sum, shift, bits) == 0
-    })
+        quotient(sum, shift, bits) != 0
+    };
+    let groups = sums.chunks_exact(4 * HALF_COLUMNS).enumerate();
+    groups.fold(0, |mask, (group, sums)| mask | u16::from(sums.iter().any(loud)) << group)
 }
 
 pub(super) fn program(

@@ -123,8 +123,13 @@ fn usual_cells<const SCALE: u8, const FULL: bool>(
     let one = _mm512_set1_epi8(1);
     let zero = _mm512_setzero_si512();
     let (mut requested, mut attempted, mut effective, mut held) = (zero, zero, zero, zero);
-    let groups = sums.as_chunks::<64>().0.iter().zip(low.as_chunks_mut::<64>().0);
-    for ((sums, low), words) in groups.zip(words.as_chunks::<64>().0) {
+    let (all_sums, all_words) = (sums.as_chunks::<64>().0, words.as_chunks::<64>().0);
+    let low = low.as_chunks_mut::<64>().0;
+    let mut groups = write.groups;
+    while groups != 0 {
+        let group = groups.trailing_zeros() as usize;
+        groups &= groups - 1;
+        let (sums, words, low) = (&all_sums[group], &all_words[group], &mut low[group]);
         let wanted = usual_wanted::<SCALE>(sums, words, scale);
         let pulses = _mm512_max_epi8(_mm512_min_epi8(wanted, most), least);
         let before = load(low);
@@ -419,24 +424,37 @@ fn cells<const DITHER: u8, const SCALE: u8>(
     counts(&tally)
 }
 
-/// See [`super::super::Kernel::is_quiet`]: `q` is 0 exactly where `-2^(s-1) <= v < 2^(s-1)`, `s = shift - bits`.
+/// See [`super::super::Kernel::loud`]: `q` is 0 exactly where `-2^(s-1) <= v < 2^(s-1)`, `s = shift - bits`.
 #[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi,popcnt")]
-pub(super) fn is_quiet(sums: &Half<i32>, write: &Write, bits: u32) -> bool {
+pub(super) fn loud(sums: &Half<i32>, write: &Write, bits: u32) -> u16 {
+    match (write.mantissa, write.negate) {
+        (1, false) => loud_groups::<PLUS>(sums, write, bits),
+        (1, true) => loud_groups::<MINUS>(sums, write, bits),
+        _ => loud_groups::<TIMES>(sums, write, bits),
+    }
+}
+
+#[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi,popcnt")]
+fn loud_groups<const SCALE: u8>(sums: &Half<i32>, write: &Write, bits: u32) -> u16 {
     let by = write.shift.saturating_sub(write.residual_bits).saturating_sub(bits).min(30);
     let half = _mm512_set1_epi32(1 << by >> 1);
-    // all bits of a loud quotient that a quiet one does not have
-    let loud = _mm512_set1_epi32(-(1 << by));
+    // all bits of a loud sum that a quiet one does not have
+    let beyond = _mm512_set1_epi32(-(1 << by));
     let mantissa = if write.negate { -write.mantissa } else { write.mantissa };
     let mantissa = _mm512_set1_epi32(mantissa);
-    for sums in sums.as_chunks::<64>().0 {
+    let mut loud = 0;
+    for (group, sums) in sums.as_chunks::<64>().0.iter().enumerate() {
         let mut any = _mm512_setzero_si512();
         for sums in sums.as_chunks::<16>().0 {
-            let v = _mm512_mullo_epi32(load_sums(sums), mantissa);
-            any = _mm512_or_si512(any, _mm512_add_epi32(v, half));
+            let sums = load_sums(sums);
+            let v = match SCALE {
+                PLUS => _mm512_add_epi32(half, sums),
+                MINUS => _mm512_sub_epi32(half, sums),
+                _ => _mm512_add_epi32(_mm512_mullo_epi32(sums, mantissa), half),
+            };
+            any = _mm512_or_si512(any, v);
         }
-        if _mm512_test_epi32_mask(any, loud) != 0 {
-            return false;
-        }
+        loud |= u16::from(_mm512_test_epi32_mask(any, beyond) != 0) << group;
     }
-    true
+    loud
 }
