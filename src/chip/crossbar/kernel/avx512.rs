@@ -374,8 +374,15 @@ fn read(cells: &[u8], drives: Drives<'_>, samples: Range<usize>, out: &mut [i32]
 
 #[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi,popcnt")]
 fn accumulate(turned: &[u8], stride: usize, gates: &[i8], sums: &mut Half<i32>) {
-    let walk =
-        Walk { runs: 1, quads: stride / 4, run: 0, half: 0, words: 0, stride, out: HALF_COLUMNS };
+    let walk = Walk {
+        runs: 1,
+        quads: gates.len() / 64,
+        run: 0,
+        half: 0,
+        words: 0,
+        stride,
+        out: HALF_COLUMNS,
+    };
     let gates = as_bytes(gates);
     for row in (0..BLOCK_ROWS).step_by(16) {
         let sums = &mut sums[row * HALF_COLUMNS..][..16 * HALF_COLUMNS];
