@@ -16,13 +16,14 @@ use std::arch::x86_64::*;
 use std::ops::Range;
 
 use super::{
-    Cells, Conversion, Dither, Draws, Drives, Half, LookUp, Loops, Packed, Scratch, Write,
-    WriteCounts, peak,
+    Cells, ConvScratch, Conversion, Dither, Draws, Drives, Half, Image, LookUp, Loops, Packed,
+    Scratch, Write, WriteCounts, peak,
 };
 use crate::chip::crossbar::layout::{BLOCK_CELLS, BLOCK_ROWS, HALF_CELLS, HALF_COLUMNS, Layout};
 use crate::num::fixed::ErrorBits;
 
 mod columns;
+mod conv;
 mod dither;
 mod few;
 mod program;
@@ -99,6 +100,23 @@ impl Avx512 {
 impl Loops for Avx512 {
     fn read(self, cells: &[u8], drives: Drives<'_>, samples: Range<usize>, out: &mut [i32]) {
         compiled!(read(cells, drives, samples, out));
+    }
+
+    fn read_conv(
+        self,
+        cells: &[u8],
+        image: Image<'_>,
+        (blocks, positions): (Range<usize>, Range<usize>),
+        scratch: &mut ConvScratch,
+        out: &mut [i32],
+    ) {
+        let [_, across] = image.plan().shape().output();
+        match image.plan().offsets() {
+            Some(offsets) if blocks.len() == offsets.len() && across > 4 => {
+                compiled!(conv::read(cells, image, offsets, positions, out));
+            }
+            _ => super::conv::assembled(self, cells, image, (blocks, positions), scratch, out),
+        }
     }
 
     fn convert(
