@@ -196,12 +196,13 @@ pub(super) fn read(
     out: &mut [i32],
 ) {
     for (position, out) in positions.zip(out.chunks_exact_mut(PANEL_COLUMNS)) {
-        for (column, out) in out.iter_mut().enumerate() {
-            *out = 0;
-            for row in blocks.start * BLOCK_ROWS..blocks.end * BLOCK_ROWS {
+        out.fill(0);
+        for row in blocks.start * BLOCK_ROWS..blocks.end * BLOCK_ROWS {
+            let drive = i32::from(image.drive(row, position));
+            for (column, out) in out.iter_mut().enumerate() {
                 let half = (row / BLOCK_ROWS - blocks.start) * 2 + column / HALF_COLUMNS;
                 let at = half * HALF_CELLS + in_half(row % BLOCK_ROWS, column % HALF_COLUMNS);
-                *out += i32::from(cells[at]) * i32::from(image.drive(row, position));
+                *out += i32::from(cells[at]) * drive;
             }
         }
     }

@@ -10,7 +10,6 @@
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
 use std::arch::asm;
-use std::iter::Peekable;
 use std::ops::Range;
 
 use super::Tiles;
@@ -36,18 +35,21 @@ struct Run {
 impl Run {
     /// The run for the next of at most `left` positions, taking those it holds. It begins at `last` at the latest, which
     /// leaves 16 pixels; none where that is before the first pixel.
-    fn take(steps: &mut Peekable<Steps>, stride: usize, left: usize, last: usize) -> Option<Self> {
-        let from = *steps.peek().expect("steps are without end");
+    fn take(steps: &mut Steps, stride: usize, left: usize, last: usize) -> Option<Self> {
+        let from = steps.pixel();
+        if from <= last && left >= TILE && steps.pass(TILE) {
+            return Some(Self { pixel: from, rows: std::array::from_fn(|row| row), count: TILE });
+        }
         let back = from.saturating_sub(last).div_ceil(stride) * stride;
-        let pixel = from.checked_sub(back)?;
-        let mut run = Self { pixel, rows: [0; TILE], count: 0 };
-        let inside =
-            |next: &usize| (next - pixel).is_multiple_of(stride) && (next - pixel) / stride < TILE;
-        while run.count < left
-            && let Some(next) = steps.next_if(inside)
-        {
-            run.rows[run.count] = (next - pixel) / stride;
-            run.count += 1;
+        let mut run = Self { pixel: from.checked_sub(back)?, rows: [0; TILE], count: 0 };
+        let mut pixel = run.pixel;
+        for row in 0..TILE {
+            if steps.pixel() == pixel && run.count < left {
+                run.rows[run.count] = row;
+                run.count += 1;
+                steps.pass(1);
+            }
+            pixel += stride;
         }
         Some(run)
     }
@@ -68,7 +70,7 @@ pub(super) fn read(
     else {
         return false;
     };
-    let mut steps = image.plan().shape().steps(positions.start).peekable();
+    let mut steps = image.plan().shape().steps(positions.start);
     let mut aside = Aside([0; Scratch::SUMS]);
     let (mut left, mut out) = (positions.len(), out);
     while left > 0 {

@@ -67,9 +67,18 @@ impl ConvShape {
 
     /// Pixels of the first taps of a position and of those behind it, without end.
     pub(in super::super) const fn steps(self, position: usize) -> Steps {
-        let [_, across] = self.output();
+        let ([height, width], [down, across]) = (self.padded(), self.output());
         let place = position % self.positions();
-        Steps { shape: self, x: place % across, y: place / across, pixel: self.pixel(position) }
+        Steps {
+            pixel: self.pixel(position),
+            x: place % across,
+            y: place / across,
+            across,
+            down,
+            stride: self.stride,
+            row: self.stride * width,
+            sample: height * width,
+        }
     }
 
     /// Pixel of a position's first tap, over all samples.
@@ -84,10 +93,44 @@ impl ConvShape {
 /// See [`ConvShape::steps`].
 #[derive(Debug, Clone)]
 pub(in super::super) struct Steps {
-    shape: ConvShape,
+    pixel: usize,
     x: usize,
     y: usize,
-    pixel: usize,
+    across: usize,
+    down: usize,
+    /// Pixels from a position to the next, to the next row of positions, and to the next sample.
+    stride: usize,
+    row: usize,
+    sample: usize,
+}
+
+impl Steps {
+    /// The next pixel.
+    #[inline]
+    pub(in super::super) const fn pixel(&self) -> usize {
+        self.pixel
+    }
+
+    /// Goes past `count` positions, if they are all of this row.
+    #[inline]
+    pub(in super::super) const fn pass(&mut self, count: usize) -> bool {
+        if self.across - self.x < count {
+            return false;
+        }
+        self.pixel += count * self.stride;
+        self.x += count;
+        if self.x == self.across {
+            self.x = 0;
+            self.pixel = self.pixel + self.row - self.across * self.stride;
+            self.y += 1;
+        }
+        if self.y == self.down {
+            self.y = 0;
+            // the last row of positions may end behind the sample
+            self.pixel = self.pixel + self.sample - self.down * self.row;
+        }
+        true
+    }
 }
 
 impl Iterator for Steps {
@@ -95,22 +138,8 @@ impl Iterator for Steps {
 
     #[inline]
     fn next(&mut self) -> Option<usize> {
-        let ConvShape { stride, .. } = self.shape;
-        let ([_, width], [down, across]) = (self.shape.padded(), self.shape.output());
         let pixel = self.pixel;
-        self.pixel += stride;
-        self.x += 1;
-        if self.x == across {
-            self.x = 0;
-            self.pixel += (width - across) * stride;
-            self.y += 1;
-        }
-        if self.y == down {
-            self.y = 0;
-            // the last row of positions may end behind the sample
-            self.pixel = self.pixel + self.shape.pixels() - down * stride * width;
-        }
-        Some(pixel)
+        self.pass(1).then_some(pixel)
     }
 }
 
