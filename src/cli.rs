@@ -89,7 +89,7 @@ struct Shared {
     /// Threads; results do not depend on it [default: all cores]
     #[arg(long, value_name = "N")]
     threads: Option<usize>,
-    /// Loops to use: scalar, avx2, avx512, amx; results do not depend on it [default: the fastest there is]
+    /// Loops to use: scalar, neon, avx2, avx512, amx; results do not depend on it [default: the fastest there is]
     #[arg(long, value_name = "NAME")]
     kernel: Option<String>,
     /// Folder of data sets [default: data, or DALEAN_DATA]

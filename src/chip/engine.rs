@@ -156,6 +156,8 @@ struct Registers {
     derivatives: [Lines<u8>; 2],
     /// Gates by target stream, packed for an update: `[block][4 halves][stride / 4][16 units][4 samples]`.
     gates: [Lines<i8>; 2],
+    /// Drives by source stream as an update takes them: `[block][64 rows][stride]`.
+    turned: [Lines<u8>; 2],
     /// Accumulators of stream p, of the last layer.
     accumulators: Vec<i64>,
     /// Activity by target stream, of the last layer.

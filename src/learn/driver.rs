@@ -179,18 +179,15 @@ fn backward_words(
 ) -> (Vec<i16>, u64) {
     let shift = i64::from(level_bits) - i64::from(weight_max_log2) + 8 - i64::from(bits.get());
     let mut saturated = 0;
-    let words = sums
-        .iter()
-        .map(|&d| {
-            let scaled = match u32::try_from(shift) {
-                Ok(right) => rsh(d, right),
-                Err(_) => d << shift.unsigned_abs(),
-            };
-            let (word, changed) = sat(scaled, bits.get());
-            saturated += u64::from(changed);
-            word as i16
-        })
-        .collect();
+    let mut bounded = |scaled: i64| {
+        let (word, changed) = sat(scaled, bits.get());
+        saturated += u64::from(changed);
+        word as i16
+    };
+    let words = match u32::try_from(shift) {
+        Ok(right) => sums.iter().map(|&d| bounded(rsh(d, right))).collect(),
+        Err(_) => sums.iter().map(|&d| bounded(d << shift.unsigned_abs())).collect(),
+    };
     (words, saturated)
 }
 

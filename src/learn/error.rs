@@ -78,7 +78,15 @@ impl ErrorUnit {
                     .iter()
                     .zip(sums.iter().cycle())
                     .map(centred)
-                    .map(|c| bounded((2 * c + m).div_euclid(2 * m)))
+                    .map(|c| {
+                        let c = 2 * c + m;
+                        // a batch of a power of two, which most are, needs no division
+                        bounded(if m.count_ones() == 1 {
+                            c >> (m.trailing_zeros() + 1)
+                        } else {
+                            c.div_euclid(2 * m)
+                        })
+                    })
                     .collect()
             }
             Centre::Running => {

@@ -48,8 +48,14 @@ pub struct Delivery {
 #[derive(Debug, Clone)]
 enum Kind {
     Bus,
-    Broadcast { shift: u32 },
-    Dense { negate: Vec<bool>, shift: u32 },
+    Broadcast {
+        shift: u32,
+    },
+    /// Signs by output and unit.
+    Dense {
+        signs: Vec<i16>,
+        shift: u32,
+    },
     Own,
 }
 
@@ -96,9 +102,14 @@ impl Delivery {
                 (taps, Kind::Broadcast { shift: log2_ceil(outputs as u64) })
             }
             Route::RandomDense { shift } => {
-                let negate = place.words().take(units * outputs).map(|w| w >> 31 == 1).collect();
+                // drawn unit by unit
+                let mut signs = vec![0; units * outputs];
+                for (at, word) in place.words().take(units * outputs).enumerate() {
+                    let sign = if word >> 31 == 1 { -1 } else { 1 };
+                    signs[at % outputs * units + at / outputs] = sign;
+                }
                 let shift = shift.unwrap_or(log2_ceil(outputs as u64).div_ceil(2));
-                (Taps::identity(units), Kind::Dense { negate, shift })
+                (Taps::identity(units), Kind::Dense { signs, shift })
             }
         };
         Self { taps, kind, bits }
@@ -127,14 +138,19 @@ impl Delivery {
                     output.chunks_exact(outputs).map(|w| w.iter().map(|&w| i64::from(w)).sum());
                 (sums.map(|sum| bounded(sum, *shift)).collect(), saturated, 0)
             }
-            Kind::Dense { negate, shift } => {
-                let mut words = Vec::new();
+            Kind::Dense { signs, shift } => {
+                let units = signs.len() / outputs;
+                let mut words = Vec::with_capacity(output.len() / outputs * units);
+                let mut sums = vec![0i32; units];
                 for sample in output.chunks_exact(outputs) {
-                    for negate in negate.chunks_exact(outputs) {
-                        let signed = sample.iter().zip(negate);
-                        let sum = signed.map(|(&w, &n)| i64::from(if n { -w } else { w })).sum();
-                        words.push(bounded(sum, *shift));
+                    // one output after the other, so that units lie side by side: a word has at most 9 bits
+                    sums.fill(0);
+                    for (&word, signs) in sample.iter().zip(signs.chunks_exact(units)) {
+                        for (sum, &sign) in sums.iter_mut().zip(signs) {
+                            *sum += i32::from(word) * i32::from(sign);
+                        }
                     }
+                    words.extend(sums.iter().map(|&sum| bounded(i64::from(sum), *shift)));
                 }
                 let products = (words.len() * outputs) as u64;
                 (words, saturated, products)

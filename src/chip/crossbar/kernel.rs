@@ -32,13 +32,18 @@ mod chacha;
 mod conv;
 mod data;
 mod lanes;
+#[cfg(target_arch = "aarch64")]
+mod neon;
 #[cfg(target_arch = "x86_64")]
 mod peak;
 mod scalar;
 #[cfg(test)]
 mod tests;
 
+#[cfg(target_arch = "x86_64")]
 use self::data::Packed;
+#[cfg(target_arch = "aarch64")]
+pub use self::neon::Neon;
 #[cfg(target_arch = "x86_64")]
 pub use self::{amx::Amx, avx2::Avx2, avx512::Avx512};
 pub use self::{
@@ -84,6 +89,14 @@ trait Loops: Copy {
         derivatives: &mut [u8],
     ) -> u64 {
         scalar::look_up(accumulators, table, live, values, derivatives)
+    }
+
+    fn difference(self, currents: [&[i32]; 2], sums: &mut [i32]) {
+        scalar::difference(currents, sums);
+    }
+
+    fn latch(self, words: &[i16], width: usize, taps: &[u16], errors: &mut [i16]) {
+        scalar::latch(words, width, taps, errors);
     }
 
     fn gate(
@@ -201,6 +214,8 @@ pub struct Kernel {
 #[derive(Debug)]
 enum Ready {
     Scalar,
+    #[cfg(target_arch = "aarch64")]
+    Neon(Neon),
     #[cfg(target_arch = "x86_64")]
     Avx2(Avx2),
     #[cfg(target_arch = "x86_64")]
@@ -217,6 +232,8 @@ macro_rules! with {
                 let $loops = scalar::Scalar;
                 $call
             }
+            #[cfg(target_arch = "aarch64")]
+            &Ready::Neon($loops) => $call,
             #[cfg(target_arch = "x86_64")]
             &Ready::Avx2($loops) => $call,
             #[cfg(target_arch = "x86_64")]
@@ -235,6 +252,8 @@ impl Kernel {
     pub fn start(backend: Backend) -> Self {
         let loops = match backend {
             Backend::Scalar => Ready::Scalar,
+            #[cfg(target_arch = "aarch64")]
+            Backend::Neon(neon) => Ready::Neon(neon),
             #[cfg(target_arch = "x86_64")]
             Backend::Avx2(avx2) => Ready::Avx2(avx2),
             #[cfg(target_arch = "x86_64")]
@@ -316,6 +335,28 @@ impl Kernel {
         with!(self, loops => loops.look_up(accumulators, table, live, values, derivatives))
     }
 
+    /// `sums = E - I`, sum by sum. The plan proves that it fits.
+    ///
+    /// # Panics
+    /// When the sizes do not match.
+    pub fn difference(&self, currents: [&[i32]; 2], sums: &mut [i32]) {
+        assert!(currents.iter().all(|bank| bank.len() == sums.len()), "both banks have every sum");
+        with!(self, loops => loops.difference(currents, sums));
+    }
+
+    /// Latches one word a unit: `errors[b][j] = words[b][taps[j]]`, `width` words and 64 units a sample; units beyond
+    /// the last tap latch 0.
+    ///
+    /// # Panics
+    /// When the sizes do not match or a tap lies beyond the bus.
+    pub fn latch(&self, words: &[i16], width: usize, taps: &[u16], errors: &mut [i16]) {
+        assert!(width > 0 && words.len().is_multiple_of(width), "whole samples");
+        assert_eq!(words.len() / width * BLOCK_ROWS, errors.len(), "64 units a sample");
+        assert!(taps.len() <= BLOCK_ROWS, "at most 64 units");
+        assert!(taps.iter().all(|&tap| usize::from(tap) < width), "every tap is on the bus");
+        with!(self, loops => loops.latch(words, width, taps, errors));
+    }
+
     /// Gates of a block of 64 columns from latched error words and derivatives (both `[sample][64]`), packed for an
     /// update: `[4 halves][stride / 4][16][4]`. `negate` is stream n. Errors lie inside the rail of their width, where
     /// no gate saturates; the law counts those that would.
@@ -351,7 +392,8 @@ impl Kernel {
 
     /// Reads a whole array from its columns: `out[b][r] = sum of level[r][c] * gates[b][c]` over all columns.
     /// `plane` is one byte plane of the array; `gates` are signed bytes (-127..=127) that lie as drives do, by
-    /// column; `out` holds the padded rows of each sample. 65,535 products of a level and a gate fit 32 bits.
+    /// column, 0 beyond the last column; `out` holds the padded rows of each sample. 65,535 products of a level and a
+    /// gate fit 32 bits.
     ///
     /// # Panics
     /// When the sizes do not match.

@@ -64,9 +64,9 @@ fn unpack(packed: &[i8], samples: usize) -> Vec<u8> {
         for (quad, packed) in packed.as_chunks::<64>().0.iter().enumerate() {
             for s in 0..4.min(samples.saturating_sub(quad * 4)) {
                 let at = (block * samples + quad * 4 + s) * BLOCK_ROWS + from;
-                for (c, to) in out[at..at + HALF_COLUMNS].iter_mut().enumerate() {
-                    *to = packed[c * 4 + s].cast_unsigned();
-                }
+                let to: &mut [u8; HALF_COLUMNS] =
+                    out[at..].first_chunk_mut().expect("16 columns a half");
+                *to = std::array::from_fn(|c| packed[c * 4 + s].cast_unsigned());
             }
         }
     }

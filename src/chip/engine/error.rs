@@ -55,7 +55,7 @@ impl Engine {
         let kernel = Kernel::start(self.backend);
         let mut errors = vec![0; samples.len() * BLOCK_ROWS];
         for block in 0..blocks {
-            saturated_words += latch(taps, bits, block, words, &mut errors);
+            saturated_words += latch(&kernel, taps, bits, block, words, &mut errors);
             for &target in wiring.targets() {
                 let t = target.index();
                 let size = self.samples * BLOCK_ROWS;
@@ -114,20 +114,25 @@ pub(super) fn gates_of<'a>(
 }
 
 /// Error words of a block of 64 units, `[sample][64]`, and how many saturated.
-fn latch(taps: &Taps, bits: ErrorBits, block: usize, words: &[i16], errors: &mut [i16]) -> u64 {
+fn latch(
+    kernel: &Kernel,
+    taps: &Taps,
+    bits: ErrorBits,
+    block: usize,
+    words: &[i16],
+    errors: &mut [i16],
+) -> u64 {
     let units = taps.words.len() / taps.per_unit;
     let live = (units - block * BLOCK_ROWS).min(BLOCK_ROWS);
     let taps_here = &taps.words[block * BLOCK_ROWS * taps.per_unit..][..live * taps.per_unit];
+    if taps.per_unit == 1 {
+        kernel.latch(words, taps.width, taps_here, errors);
+        return 0;
+    }
     let mut saturated = 0;
     for (words, errors) in words.chunks_exact(taps.width).zip(errors.chunks_exact_mut(BLOCK_ROWS)) {
         let (errors, beyond) = errors.split_at_mut(live);
         beyond.fill(0);
-        if taps.per_unit == 1 {
-            for (error, &word) in errors.iter_mut().zip(taps_here) {
-                *error = words[usize::from(word)];
-            }
-            continue;
-        }
         for (error, tapped) in errors.iter_mut().zip(taps_here.chunks_exact(taps.per_unit)) {
             let sum = tapped.iter().map(|&word| i64::from(words[usize::from(word)])).sum();
             let (bounded, changed) = sat(rsh(sum, taps.shift), bits.get());

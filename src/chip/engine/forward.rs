@@ -12,7 +12,7 @@
 
 use super::Engine;
 use super::each::each;
-use super::read::{Histogram, Mode, Reader, Seen};
+use super::read::{Histogram, Mode, Part, Reader, Seen};
 use crate::chip::crossbar::kernel::{Kernel, LookUp, Scratch, TOGETHER};
 use crate::chip::crossbar::layout::{BLOCK_ROWS, PANEL_COLUMNS};
 use crate::chip::hardware::{Adc, Subtract};
@@ -185,18 +185,19 @@ fn put_out(
         }
         for start in (0..samples).step_by(TOGETHER) {
             let group = start..(start + TOGETHER).min(samples);
+            let part = Part { panel, live, samples: group.clone() };
             let at = start * BLOCK_ROWS + from;
             let (values, derivatives) = (&mut values[at..], &mut derivatives[at..]);
             let kept = accumulators.as_deref_mut().map(|all| &mut all[at..]);
             if reader.is_narrow() {
                 let sums = &mut sums[..group.len() * PANEL_COLUMNS];
-                reader.read_narrow(kernel, panel, live, group, &mut scratch, sums, &mut seen);
+                reader.read_narrow(kernel, &part, &mut scratch, sums, &mut seen);
                 seen.look_ups += kernel.look_up(sums, table, live, values, derivatives);
                 keep(kept, sums.iter().map(|&sum| i64::from(sum)));
             } else {
                 let mut sums = [0; Scratch::SUMS];
                 let sums = &mut sums[..group.len() * PANEL_COLUMNS];
-                reader.read_wide(kernel, panel, live, group, sums, &mut seen);
+                reader.read_wide(kernel, &part, sums, &mut seen);
                 let half = (table.entries.len() / 2) as i64;
                 for (sample, sums) in sums.chunks_exact(PANEL_COLUMNS).enumerate() {
                     for (column, &sum) in sums.iter().enumerate() {

@@ -70,6 +70,15 @@ impl Seen {
     }
 }
 
+/// A panel and some samples.
+#[derive(Clone)]
+pub(super) struct Part {
+    pub(super) panel: usize,
+    /// Columns of the panel that exist.
+    pub(super) live: usize,
+    pub(super) samples: Range<usize>,
+}
+
 /// The two banks of one target stream, and how they are read.
 pub(super) struct Reader<'a> {
     arrays: [&'a Crossbar; 2],
@@ -140,13 +149,12 @@ impl<'a> Reader<'a> {
     pub(super) fn read_narrow(
         &self,
         kernel: &Kernel,
-        panel: usize,
-        live: usize,
-        samples: Range<usize>,
+        part: &Part,
         scratch: &mut Scratch,
         sums: &mut [i32],
         seen: &mut Seen,
     ) {
+        let Part { panel, live, samples } = part.clone();
         let [excites, inhibits] = &self.reads;
         if let Some((converters, _)) = &self.converters {
             sums.fill(0);
@@ -189,21 +197,18 @@ impl<'a> Reader<'a> {
             }
         }
         let [e, i] = &scratch.currents[0];
-        for (sum, (e, i)) in sums.iter_mut().zip(e.iter().zip(i)) {
-            *sum = e - i;
-        }
+        kernel.difference([&e[..sums.len()], &i[..sums.len()]], sums);
     }
 
     /// Accumulators of a panel, `[sample][32]`, of any size.
     pub(super) fn read_wide(
         &self,
         kernel: &Kernel,
-        panel: usize,
-        live: usize,
-        samples: Range<usize>,
+        part: &Part,
         sums: &mut [i64],
         seen: &mut Seen,
     ) {
+        let Part { panel, live, samples } = part.clone();
         sums.fill(0);
         let mut currents = [[0; Scratch::SUMS]; 2];
         for at in 0..self.reads[0].len() {

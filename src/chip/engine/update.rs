@@ -11,7 +11,7 @@
 use std::borrow::Cow;
 use std::ops::Range;
 
-use aligned_vec::{AVec, avec};
+use aligned_vec::AVec;
 
 use super::each::each;
 use super::error::{gates_of, stride_of};
@@ -86,10 +86,21 @@ impl Engine {
         let wiring = self.layers[layer].spec.wiring;
         let stride = stride_of(samples.len());
         let sources = if layer == 0 { &[Stream::P][..] } else { wiring.sources() };
-        let turned: Vec<_> =
-            sources.iter().map(|&source| self.turned(layer, source, samples)).collect();
-        let turned: Vec<Vec<_>> = turned.iter().map(Turned::blocks).collect();
         // taken, so that cells can be written while they are read
+        let mut kept = std::mem::take(&mut self.registers[layer].turned);
+        let live: Vec<_> = sources
+            .iter()
+            .zip(&mut kept)
+            .map(|(&source, turned)| self.turn(layer, source, samples, turned))
+            .collect();
+        let turned: Vec<Vec<_>> = kept
+            .iter()
+            .zip(&live)
+            .map(|(turned, live)| {
+                let blocks = turned.chunks_exact(BLOCK_ROWS * stride);
+                blocks.zip(live).map(|(block, live)| live.then_some(block)).collect()
+            })
+            .collect();
         let registers = std::mem::take(&mut self.registers[layer].gates);
         let of = |target: Stream, polarity| {
             let gates = gates_of(&registers[target.index()], self.samples, samples);
@@ -142,45 +153,35 @@ impl Engine {
             let kernel = Kernel::start(backend);
             (array, strip.write(&kernel, &request(array, writes[array]), gates))
         });
-        drop(gates);
+        drop((gates, turned));
+        self.registers[layer].turned = kept;
         self.registers[layer].gates = registers;
         counts
     }
 
-    /// Drives of some samples as an update takes them.
-    fn turned(&self, layer: usize, source: Stream, samples: &Range<usize>) -> Turned {
-        let stride = stride_of(samples.len());
+    /// Turns the drives of some samples as an update takes them. Returns which blocks are driven at all.
+    fn turn(
+        &self,
+        layer: usize,
+        source: Stream,
+        samples: &Range<usize>,
+        turned: &mut AVec<u8>,
+    ) -> Vec<bool> {
+        let size = BLOCK_ROWS * stride_of(samples.len());
         let kernel = Kernel::start(self.backend);
-        let blocks = self.layers[layer].layout.blocks();
-        let size = self.samples * BLOCK_ROWS;
-        let mut words = avec![0; blocks * BLOCK_ROWS * stride];
-        let drives = self.drives(layer, source).chunks_exact(size);
-        let live = drives
-            .zip(words.chunks_exact_mut(BLOCK_ROWS * stride))
+        turned.resize(self.layers[layer].layout.blocks() * size, 0);
+        let drives = self.drives(layer, source).chunks_exact(self.samples * BLOCK_ROWS);
+        let blocks = drives.zip(turned.chunks_exact_mut(size));
+        blocks
             .map(|(codes, turned)| {
                 let codes = &codes[samples.start * BLOCK_ROWS..samples.end * BLOCK_ROWS];
                 let live = codes.iter().any(|&code| code != 0);
                 if live {
-                    kernel.turn(codes, stride, turned);
+                    kernel.turn(codes, size / BLOCK_ROWS, turned);
                 }
                 live
             })
-            .collect();
-        Turned { words, live, stride }
-    }
-}
-
-/// Drives by row, and which blocks have any.
-struct Turned {
-    words: AVec<u8>,
-    live: Vec<bool>,
-    stride: usize,
-}
-
-impl Turned {
-    fn blocks(&self) -> Vec<Option<&[u8]>> {
-        let blocks = self.words.chunks_exact(BLOCK_ROWS * self.stride);
-        blocks.zip(&self.live).map(|(block, &live)| live.then_some(block)).collect()
+            .collect()
     }
 }
 

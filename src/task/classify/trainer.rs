@@ -121,6 +121,7 @@ impl Trainer {
         let order = draw::shuffled(seed, u64::from(self.epoch), samples);
         let shifts = self.experiment.augment.map(|augment| shifts(augment, seed, self.epoch));
         let table = train.codes(self.experiment.hardware.drive_bits);
+        let same = table.iter().zip(0..=u8::MAX).all(|(&code, value)| code == value);
         let (mut correct, mut done) = (0, 0);
         let mut codes = Vec::new();
         let mut shifts = shifts;
@@ -137,8 +138,10 @@ impl Trainer {
                     }
                     _ => codes.extend_from_slice(values),
                 }
-                for code in &mut codes[start..] {
-                    *code = table[usize::from(*code)];
+                if !same {
+                    for code in &mut codes[start..] {
+                        *code = table[usize::from(*code)];
+                    }
                 }
             }
             self.driver.learn(&codes, |engine, first, errors| {

@@ -13,6 +13,7 @@
 
 use std::arch::asm;
 use std::arch::x86_64::{__cpuid, __cpuid_count, _xgetbv};
+use std::cell::Cell;
 use std::ops::Range;
 use std::sync::OnceLock;
 
@@ -34,7 +35,13 @@ mod product;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Amx(Avx512);
 
-/// Tiles of this thread have their shape, until dropped.
+thread_local! {
+    /// How many [`Tiles`] this thread has: the last one that goes gives up the shape.
+    static HOLDERS: Cell<usize> = const { Cell::new(0) };
+}
+
+/// Tiles of this thread have their shape, until dropped. It never leaves its thread: [`super::Kernel`] holds it, which
+/// cannot be sent.
 #[derive(Debug)]
 pub(super) struct Tiles(Avx512);
 
@@ -63,22 +70,30 @@ impl Amx {
         GRANTED.get_or_init(granted).then_some(Self(avx512))
     }
 
-    /// Gives the tiles of this thread their shape.
+    /// Gives the tiles of this thread their shape, if they do not have it yet.
     pub(super) fn configure(self) -> Tiles {
-        // SAFETY: the token exists, so the instruction does and its state is enabled; it reads the 64 bytes of the
-        // configuration, which is valid. Compiled code never uses tiles, so nothing of it is disturbed.
-        unsafe {
-            asm!("ldtilecfg [{}]", in(reg) &raw const CONFIGURATION, options(nostack, readonly));
+        let holders = HOLDERS.get();
+        if holders == 0 {
+            // SAFETY: the token exists, so the instruction does and its state is enabled; it reads the 64 bytes of
+            // the configuration, which is valid. Compiled code never uses tiles, so nothing of it is disturbed.
+            unsafe {
+                asm!("ldtilecfg [{}]", in(reg) &raw const CONFIGURATION, options(nostack, readonly));
+            }
         }
+        HOLDERS.set(holders + 1);
         Tiles(self.0)
     }
 }
 
 impl Drop for Tiles {
     fn drop(&mut self) {
-        // SAFETY: a `Tiles` is made only by `configure`, so the instruction exists; it gives up tile state, which
-        // compiled code never uses.
-        unsafe { asm!("tilerelease", options(nostack, nomem)) }
+        let left = HOLDERS.get() - 1;
+        HOLDERS.set(left);
+        if left == 0 {
+            // SAFETY: a `Tiles` is made only by `configure`, so the instruction exists; it gives up tile state, which
+            // compiled code never uses, and which no other `Tiles` of this thread needs.
+            unsafe { asm!("tilerelease", options(nostack, nomem)) }
+        }
     }
 }
 
@@ -313,6 +328,14 @@ impl Loops for &Tiles {
         derivatives: &mut [u8],
     ) -> u64 {
         self.0.look_up(accumulators, table, live, values, derivatives)
+    }
+
+    fn difference(self, currents: [&[i32]; 2], sums: &mut [i32]) {
+        self.0.difference(currents, sums);
+    }
+
+    fn latch(self, words: &[i16], width: usize, taps: &[u16], errors: &mut [i16]) {
+        self.0.latch(words, width, taps, errors);
     }
 
     fn gate(

@@ -140,6 +140,14 @@ impl Loops for Avx512 {
         compiled!(units::look_up(accumulators, table, live, values, derivatives))
     }
 
+    fn difference(self, currents: [&[i32]; 2], sums: &mut [i32]) {
+        compiled!(units::difference(currents, sums));
+    }
+
+    fn latch(self, words: &[i16], width: usize, taps: &[u16], errors: &mut [i16]) {
+        compiled!(units::latch(words, width, taps, errors));
+    }
+
     fn gate(
         self,
         errors: &[i16],

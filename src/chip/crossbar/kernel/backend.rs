@@ -1,6 +1,8 @@
 //! Which loops run, chosen once at start.
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
+#[cfg(target_arch = "aarch64")]
+use super::neon::Neon;
 #[cfg(target_arch = "x86_64")]
 use super::{amx::Amx, avx2::Avx2, avx512::Avx512};
 
@@ -9,6 +11,9 @@ use super::{amx::Amx, avx2::Avx2, avx512::Avx512};
 pub enum Backend {
     /// Plain loops: the definition.
     Scalar,
+    /// 128-bit loops, with 8-bit dot products where the processor has them.
+    #[cfg(target_arch = "aarch64")]
+    Neon(Neon),
     /// 256-bit loops.
     #[cfg(target_arch = "x86_64")]
     Avx2(Avx2),
@@ -40,13 +45,15 @@ pub enum UnknownBackend {
 }
 
 /// Names of all back ends of all machines, slowest first.
-pub(super) const NAMES: [&str; 4] = ["scalar", "avx2", "avx512", "amx"];
+pub(super) const NAMES: [&str; 5] = ["scalar", "neon", "avx2", "avx512", "amx"];
 
 impl Backend {
     /// The back ends this machine has, slowest first.
     #[must_use]
     pub fn available() -> Vec<Self> {
         let all = [Self::Scalar].into_iter();
+        #[cfg(target_arch = "aarch64")]
+        let all = all.chain(Neon::detect().map(Self::Neon));
         #[cfg(target_arch = "x86_64")]
         let all = all
             .chain(Avx2::detect().map(Self::Avx2))
@@ -66,6 +73,8 @@ impl Backend {
     pub const fn name(self) -> &'static str {
         match self {
             Self::Scalar => "scalar",
+            #[cfg(target_arch = "aarch64")]
+            Self::Neon(_) => "neon",
             #[cfg(target_arch = "x86_64")]
             Self::Avx2(_) => "avx2",
             #[cfg(target_arch = "x86_64")]

@@ -120,6 +120,7 @@ impl Default for Scratch {
 }
 
 /// Codes and saturation counts of a panel for [`TOGETHER`] samples, in the order in which 512-bit vectors are packed.
+#[cfg(target_arch = "x86_64")]
 #[derive(Debug)]
 #[repr(align(64))]
 pub(super) struct Packed {

@@ -146,56 +146,47 @@ pub(super) fn program(
         Dither::Word(words) => (scale(write, 16), None, Some(words)),
     };
     let mut counts = [[0u32; HALF_COLUMNS]; 4];
-    for group in 0..16 {
-        let (from, to) = (group * 64, group * 64 + 64);
-        let sums = &sums[from..to];
+    for (group, pruned) in pruned.iter_mut().enumerate() {
+        let from = group * 64;
         let mut drawn = [[1u32; HALF_COLUMNS]; 4];
         if let Some(bytes) = bytes {
-            for (c, bytes) in bytes[from..to].as_chunks::<4>().0.iter().enumerate() {
-                (0..4).for_each(|r| drawn[r][c] = u32::from(bytes[r]));
-            }
+            rows_of_bytes(bytes, from, &mut drawn);
         }
         if let Some(words) = words {
-            for (c, words) in words[from..to].as_chunks::<4>().0.iter().enumerate() {
-                (0..4).for_each(|r| drawn[r][c] = u32::from(words[r]));
-            }
+            rows_of_words(words, from, &mut drawn);
         }
-        let low = &mut low_of(cells.low, from);
-        let mut levels = [[0i32; HALF_COLUMNS]; 4];
-        let mut left = [[0i32; HALF_COLUMNS]; 4];
-        for c in 0..HALF_COLUMNS {
-            for r in 0..4 {
-                let at = from + c * 4 + r;
-                levels[r][c] = i32::from(low[c * 4 + r]) | i32::from(high[at]) << 8;
-                left[r][c] = i32::from(residual[at]);
-            }
-        }
-        let mut gone = [[0i32; HALF_COLUMNS]; 4];
+        let [mut levels, mut above, mut left] = [[[0u32; HALF_COLUMNS]; 4]; 3];
+        rows_of_bytes(cells.low, from, &mut levels);
+        rows_of_bytes(high, from, &mut above);
+        rows_of_words(residual, from, &mut left);
+        let mut gone = [[0u32; HALF_COLUMNS]; 4];
         if absorbs {
-            for c in 0..HALF_COLUMNS {
-                (0..4).for_each(|r| gone[r][c] = (pruned[group] >> (c * 4 + r) & 1) as i32);
+            for (r, gone) in gone.iter_mut().enumerate() {
+                for (c, gone) in gone.iter_mut().enumerate() {
+                    *gone = u32::from(*pruned >> (c * 4 + r) & 1 == 1);
+                }
             }
         }
         for r in 0..4 {
+            for c in 0..HALF_COLUMNS {
+                levels[r][c] |= above[r][c] << 8;
+            }
             row(
                 scale,
-                sums[r * HALF_COLUMNS..].first_chunk().expect("16 sums a row"),
+                sums[from + r * HALF_COLUMNS..].first_chunk().expect("16 sums a row"),
                 &drawn[r],
                 [&mut levels[r], &mut left[r], &mut gone[r]],
                 &mut counts,
             );
         }
-        for c in 0..HALF_COLUMNS {
-            for r in 0..4 {
-                let at = from + c * 4 + r;
-                cells.low[at] = (levels[r][c] & 0xff) as u8;
-                high[at] = (levels[r][c] >> 8) as u8;
-                residual[at] = left[r][c] as u16;
-            }
-        }
+        bytes_of_rows(&levels, 0, cells.low, from);
+        bytes_of_rows(&levels, 8, high, from);
+        words_of_rows(&left, residual, from);
         if absorbs {
-            for c in 0..HALF_COLUMNS {
-                (0..4).for_each(|r| pruned[group] |= u64::from(gone[r][c] != 0) << (c * 4 + r));
+            for (r, gone) in gone.iter().enumerate() {
+                for (c, &gone) in gone.iter().enumerate() {
+                    *pruned |= u64::from(gone) << (c * 4 + r);
+                }
             }
         }
     }
@@ -204,9 +195,47 @@ pub(super) fn program(
     WriteCounts { requested, bounded, attempted, effective }
 }
 
+/// Four rows of 16 columns out of bytes in the order of levels: a column's four rows are one word.
 #[inline(always)]
-fn low_of(low: &Half<u8>, from: usize) -> [u8; 64] {
-    *low[from..].first_chunk().expect("64 levels a group")
+fn rows_of_bytes(bytes: &Half<u8>, from: usize, rows: &mut [[u32; HALF_COLUMNS]; 4]) {
+    for (c, four) in bytes[from..from + 64].as_chunks::<4>().0.iter().enumerate() {
+        let four = u32::from_le_bytes(*four);
+        for (r, row) in rows.iter_mut().enumerate() {
+            row[c] = four >> (8 * r) & 0xff;
+        }
+    }
+}
+
+/// The reverse of [`rows_of_bytes`], of bits `shift .. shift + 8`.
+#[inline(always)]
+fn bytes_of_rows(rows: &[[u32; HALF_COLUMNS]; 4], shift: u32, bytes: &mut Half<u8>, from: usize) {
+    for (c, four) in bytes[from..from + 64].as_chunks_mut::<4>().0.iter_mut().enumerate() {
+        let mut word = 0;
+        for (r, row) in rows.iter().enumerate() {
+            word |= (row[c] >> shift & 0xff) << (8 * r);
+        }
+        *four = word.to_le_bytes();
+    }
+}
+
+/// Four rows of 16 columns out of 16-bit words in the order of levels.
+#[inline(always)]
+fn rows_of_words(words: &Half<u16>, from: usize, rows: &mut [[u32; HALF_COLUMNS]; 4]) {
+    for (c, four) in words[from..from + 64].as_chunks::<4>().0.iter().enumerate() {
+        for (row, &word) in rows.iter_mut().zip(four) {
+            row[c] = u32::from(word);
+        }
+    }
+}
+
+/// The reverse of [`rows_of_words`].
+#[inline(always)]
+fn words_of_rows(rows: &[[u32; HALF_COLUMNS]; 4], words: &mut Half<u16>, from: usize) {
+    for (c, four) in words[from..from + 64].as_chunks_mut::<4>().0.iter_mut().enumerate() {
+        for (row, word) in rows.iter().zip(four) {
+            *word = row[c] as u16;
+        }
+    }
 }
 
 /// One row of 16 cells: levels, remainders and pruned flags, and counts by lane.
@@ -215,7 +244,7 @@ fn row(
     scale: Scale,
     sums: &[i32; HALF_COLUMNS],
     words: &[u32; HALF_COLUMNS],
-    [levels, left, gone]: [&mut [i32; HALF_COLUMNS]; 3],
+    [levels, left, gone]: [&mut [u32; HALF_COLUMNS]; 3],
     counts: &mut [[u32; HALF_COLUMNS]; 4],
 ) {
     let most_left = (1 << scale.fraction) - 1;
@@ -223,18 +252,19 @@ fn row(
         let v = (sums[c] * scale.mantissa).clamp(-scale.reach, scale.reach) << scale.up;
         let word = (words[c] >> scale.less).cast_signed();
         let rounded = (((v + scale.before) >> scale.right) + word) >> scale.last;
-        let total = left[c] + rounded;
+        let total = left[c].cast_signed() + rounded;
         let wanted = total >> scale.fraction;
         let pulses = wanted.clamp(-scale.bound, scale.bound);
-        let before = levels[c];
+        let before = levels[c].cast_signed();
         let reached = before + pulses;
         let held = reached.clamp(scale.floor, scale.ceiling);
         let level = if gone[c] != 0 { before } else { held };
         let rest = (total - (pulses << scale.fraction)).clamp(0, most_left);
         let rest = if reached < scale.floor { 0 } else { rest };
-        left[c] = if reached > scale.ceiling { most_left } else { rest };
-        gone[c] |= i32::from(pulses != 0) & i32::from(level == scale.floor);
-        levels[c] = level;
+        let rest = if reached > scale.ceiling { most_left } else { rest };
+        left[c] = rest.cast_unsigned();
+        gone[c] |= u32::from(pulses != 0) & u32::from(level == scale.floor);
+        levels[c] = level.cast_unsigned();
         counts[0][c] += u32::from(wanted != 0);
         counts[1][c] += u32::from(wanted != pulses);
         counts[2][c] += pulses.unsigned_abs();

@@ -117,6 +117,23 @@ pub(super) fn look_up(
     saturated
 }
 
+#[inline(always)]
+pub(super) fn difference([e, i]: [&[i32]; 2], sums: &mut [i32]) {
+    for (sum, (e, i)) in sums.iter_mut().zip(e.iter().zip(i)) {
+        *sum = e - i;
+    }
+}
+
+pub(super) fn latch(words: &[i16], width: usize, taps: &[u16], errors: &mut [i16]) {
+    for (words, errors) in words.chunks_exact(width).zip(errors.chunks_exact_mut(BLOCK_ROWS)) {
+        let (errors, beyond) = errors.split_at_mut(taps.len());
+        beyond.fill(0);
+        for (error, &tap) in errors.iter_mut().zip(taps) {
+            *error = words[usize::from(tap)];
+        }
+    }
+}
+
 pub(super) fn gate(
     errors: &[i16],
     derivatives: &[u8],

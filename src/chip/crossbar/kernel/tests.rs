@@ -96,7 +96,7 @@ fn check_look_up(samples: usize, live: usize, bits: u32, shift: u32, seed: u64) 
     let table = LookUp { entries, shift };
     let run = |kernel: &Kernel| {
         let (mut values, mut slopes) = (vec![1; samples * 64], vec![2; samples * 64]);
-        let at = if live % 2 == 0 { 0 } else { 32 };
+        let at = if live.is_multiple_of(2) { 0 } else { 32 };
         let saturated = kernel.look_up(&sums, &table, live, &mut values[at..], &mut slopes[at..]);
         (values, slopes, saturated)
     };
@@ -128,6 +128,20 @@ fn check_gate(samples: usize, stride: usize, bits: i64, seed: u64) {
         for (name, kernel) in others() {
             assert_eq!(run(&kernel), want, "{name} {samples} {stride} {bits:?}");
         }
+    }
+}
+
+fn check_latch(samples: usize, width: usize, units: usize, seed: u64) {
+    let raw = bytes(seed | 1, samples * width * 2);
+    let words: Vec<_> = raw.as_chunks().0.iter().map(|word| i16::from_le_bytes(*word)).collect();
+    let step = if seed.is_multiple_of(2) { 1 } else { 7 };
+    let taps: Vec<_> = (0..units).map(|unit| ((unit + 3) * step % width) as u16).collect();
+    let mut want = vec![3; samples * 64];
+    law().latch(&words, width, &taps, &mut want);
+    for (name, kernel) in others() {
+        let mut out = vec![5; samples * 64];
+        kernel.latch(&words, width, &taps, &mut out);
+        assert_eq!(out, want, "{name} {samples} {width} {units}");
     }
 }
 
@@ -276,6 +290,22 @@ fn every_tail_of_a_batch_reads_the_same() {
         check_turn(batch, batch.next_multiple_of(64), 3);
     }
     check_read(2, 3, 1..1, 1);
+}
+
+#[test]
+fn a_kernel_that_ends_leaves_others_of_its_thread_at_work() {
+    for backend in Backend::available() {
+        let (first, second) = (Kernel::start(backend), Kernel::start(backend));
+        let (cells, codes) = (bytes(1, BLOCK_CELLS), bytes(2, 32 * BLOCK_ROWS));
+        let read = |kernel: &Kernel| {
+            let mut out = vec![0; 32 * 32];
+            kernel.read(&cells, Drives::new(&codes, 32), 0..32, &mut out);
+            out
+        };
+        let want = read(&second);
+        drop(first);
+        assert_eq!(read(&second), want, "{}", backend.name());
+    }
 }
 
 #[test]
@@ -432,8 +462,11 @@ fn a_name_says_whether_it_is_unknown_or_absent() {
         assert_eq!(Backend::named(backend.name()), Ok(backend));
         assert!(NAMES.contains(&backend.name()));
     }
-    let unknown = Backend::named("neon").unwrap_err().to_string();
-    assert_eq!(unknown, "there is no kernel `neon`; say one of scalar, avx2, avx512, amx");
+    let unknown = Backend::named("fast").unwrap_err().to_string();
+    assert_eq!(unknown, "there is no kernel `fast`; say one of scalar, neon, avx2, avx512, amx");
+    let elsewhere = if cfg!(target_arch = "aarch64") { "avx2" } else { "neon" };
+    let absent = Backend::named(elsewhere).unwrap_err();
+    assert!(matches!(absent, UnknownBackend::Absent { name, .. } if name == elsewhere));
     let absent = UnknownBackend::Absent { name: "avx512".into(), there: vec!["scalar", "avx2"] };
     assert_eq!(
         absent.to_string(),
@@ -488,6 +521,7 @@ proptest! {
         let stride = samples.next_multiple_of(4) + 4 * beyond;
         check_gate(samples, stride, bits, seed);
         check_turn(samples, stride, seed);
+        check_latch(samples, 1 + beyond * 9, 1 + samples % 64, seed);
     }
 
     #[test]
@@ -498,8 +532,10 @@ proptest! {
     #[test]
     fn dither_is_the_law(
         seed: u64, layer: u16, pathway: u8, sub: u32, count in 0u64..1 << 36,
-        rows in 1usize..5000, column in 0usize..5000, block in 0usize..80,
+        rows in 1usize..5000, exact: bool, column in 0usize..5000, block in 0usize..80,
     ) {
+        // every other array ends where a block of words does
+        let rows = if exact { rows.next_multiple_of(32) } else { rows };
         let place = Place { seed, site: Site::WriteDither, layer, pathway, sub, count };
         let (mut want, mut wide) = ([0; HALF_CELLS], [0; HALF_CELLS]);
         let draws = Draws::new(place, rows);

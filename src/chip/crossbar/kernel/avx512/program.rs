@@ -122,28 +122,13 @@ fn usual_cells<const SCALE: u8, const FULL: bool>(
     words: &Half<u8>,
 ) -> WriteCounts {
     let scale = scale::<BYTE>(write, write.shift);
-    let (rows_01, rows_23) = (quarters(ROWS_01), quarters(ROWS_23));
-    let merged = quarters(MERGED);
-    let upper = _mm512_set1_epi16(0xff00_u16.cast_signed());
     let Tally { most, least, floor, ceiling, flip, .. } = tally(write, window);
     let one = _mm512_set1_epi8(1);
-    let (mut requested, mut bounded, mut attempted, mut effective) = (
-        _mm512_setzero_si512(),
-        _mm512_setzero_si512(),
-        _mm512_setzero_si512(),
-        _mm512_setzero_si512(),
-    );
+    let zero = _mm512_setzero_si512();
+    let (mut requested, mut attempted, mut effective, mut held) = (zero, zero, zero, zero);
     let groups = sums.as_chunks::<64>().0.iter().zip(low.as_chunks_mut::<64>().0);
     for ((sums, low), words) in groups.zip(words.as_chunks::<64>().0) {
-        let [s0, s1, s2, s3] = sums.as_chunks::<16>().0 else { unreachable!("four rows") };
-        let [q0, q1, q2, q3] =
-            [s0, s1, s2, s3].map(|sums| quotient::<BYTE, SCALE>(load_sums(sums), scale));
-        let words = load(words);
-        let a = _mm512_adds_epi16(_mm512_packs_epi32(q0, q1), _mm512_shuffle_epi8(words, rows_01));
-        let b = _mm512_adds_epi16(_mm512_packs_epi32(q2, q3), _mm512_shuffle_epi8(words, rows_23));
-        // a >> 8 | b & 0xff00
-        let both = _mm512_ternarylogic_epi32::<0xf8>(_mm512_srli_epi16::<8>(a), b, upper);
-        let wanted = _mm512_shuffle_epi8(both, merged);
+        let wanted = usual_wanted::<SCALE>(sums, words, scale);
         let pulses = _mm512_max_epi8(_mm512_min_epi8(wanted, most), least);
         let before = load(low);
         let mut level = _mm512_adds_epi8(_mm512_xor_si512(before, flip), pulses);
@@ -152,19 +137,43 @@ fn usual_cells<const SCALE: u8, const FULL: bool>(
         }
         let level = _mm512_xor_si512(level, flip);
         store(low, level);
-        let any = _mm512_test_epi8_mask(wanted, wanted);
-        requested = _mm512_mask_add_epi8(requested, any, requested, one);
-        let held = _mm512_cmpneq_epi8_mask(wanted, pulses);
-        bounded = _mm512_mask_add_epi8(bounded, held, bounded, one);
-        attempted = _mm512_add_epi8(attempted, _mm512_abs_epi8(pulses));
+        let size = _mm512_abs_epi8(pulses);
+        requested = _mm512_add_epi8(requested, _mm512_min_epu8(size, one));
+        attempted = _mm512_add_epi8(attempted, size);
         effective = _mm512_add_epi64(effective, _mm512_sad_epu8(level, before));
+        // held | (wanted ^ pulses)
+        held = _mm512_ternarylogic_epi32::<0xf6>(held, wanted, pulses);
     }
-    let [requested, bounded, attempted] = [requested, bounded, attempted].map(|bytes| {
-        let sums = _mm512_sad_epu8(bytes, _mm512_setzero_si512());
-        _mm512_reduce_add_epi64(sums).cast_unsigned()
-    });
+    // few writes meet their bound: only then is it asked which cells did
+    let mut bounded = 0;
+    if _mm512_test_epi8_mask(held, held) != 0 {
+        for (sums, words) in sums.as_chunks::<64>().0.iter().zip(words.as_chunks::<64>().0) {
+            let wanted = usual_wanted::<SCALE>(sums, words, scale);
+            let pulses = _mm512_max_epi8(_mm512_min_epi8(wanted, most), least);
+            bounded += _mm512_cmpneq_epi8_mask(wanted, pulses).count_ones();
+        }
+    }
+    let [requested, attempted] = [requested, attempted]
+        .map(|bytes| _mm512_reduce_add_epi64(_mm512_sad_epu8(bytes, zero)).cast_unsigned());
     let effective = _mm512_reduce_add_epi64(effective).cast_unsigned();
-    WriteCounts { requested, bounded, attempted, effective }
+    WriteCounts { requested, bounded: bounded.into(), attempted, effective }
+}
+
+/// Increments of 64 cells before the bound, in the order of levels.
+#[inline]
+#[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi,popcnt")]
+fn usual_wanted<const SCALE: u8>(sums: &[i32; 64], words: &[u8; 64], scale: Scale) -> __m512i {
+    let (rows_01, rows_23) = (quarters(ROWS_01), quarters(ROWS_23));
+    let (merged, upper) = (quarters(MERGED), _mm512_set1_epi16(0xff00_u16.cast_signed()));
+    let [s0, s1, s2, s3] = sums.as_chunks::<16>().0 else { unreachable!("four rows") };
+    let [q0, q1, q2, q3] =
+        [s0, s1, s2, s3].map(|sums| quotient::<BYTE, SCALE>(load_sums(sums), scale));
+    let words = load(words);
+    let a = _mm512_adds_epi16(_mm512_packs_epi32(q0, q1), _mm512_shuffle_epi8(words, rows_01));
+    let b = _mm512_adds_epi16(_mm512_packs_epi32(q2, q3), _mm512_shuffle_epi8(words, rows_23));
+    // a >> 8 | b & 0xff00
+    let both = _mm512_ternarylogic_epi32::<0xf8>(_mm512_srli_epi16::<8>(a), b, upper);
+    _mm512_shuffle_epi8(both, merged)
 }
 
 #[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi,popcnt")]

@@ -14,7 +14,7 @@ use std::arch::x86_64::*;
 
 use super::load_sums;
 use super::turn::interleave;
-use crate::chip::crossbar::kernel::{Conversion, LookUp, Packed, Scratch};
+use crate::chip::crossbar::kernel::{Conversion, LookUp, Packed, Scratch, scalar};
 use crate::chip::crossbar::layout::{BLOCK_ROWS, PANEL_COLUMNS};
 use crate::num::fixed::ErrorBits;
 
@@ -185,6 +185,50 @@ pub(super) fn look_up(
 fn store_bytes(bytes: &mut [u8; 16], v: __m128i) {
     // SAFETY: the reference covers the 16 bytes that an unaligned store writes.
     unsafe { _mm_storeu_si128(bytes.as_mut_ptr().cast(), v) }
+}
+
+#[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi,popcnt")]
+pub(super) fn difference(currents: [&[i32]; 2], sums: &mut [i32]) {
+    scalar::difference(currents, sums);
+}
+
+/// Words of a sample fit one vector: a permutation taps them. Of wider buses, neighbours are copied, and other words
+/// tapped one after the other.
+#[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi,popcnt")]
+pub(super) fn latch(words: &[i16], width: usize, taps: &[u16], errors: &mut [i16]) {
+    if width > 32 {
+        let neighbours = taps.windows(2).all(|pair| pair[0] + 1 == pair[1]);
+        let Some(&first) = taps.first().filter(|_| neighbours) else {
+            return scalar::latch(words, width, taps, errors);
+        };
+        let rows = errors.as_chunks_mut::<64>().0.iter_mut();
+        for (words, errors) in words.chunks_exact(width).zip(rows) {
+            errors[..taps.len()].copy_from_slice(&words[usize::from(first)..][..taps.len()]);
+            errors[taps.len()..].fill(0);
+        }
+        return;
+    }
+    let mut all = [0; 64];
+    all.iter_mut().zip(taps).for_each(|(all, tap)| *all = tap.cast_signed());
+    let taps_of = [0, 1].map(|half| load_words(&all.as_chunks::<32>().0[half]));
+    let live = u64::MAX >> (64 - taps.len().max(1));
+    let live = [live as u32, (live >> 32) as u32];
+    let rows = errors.as_chunks_mut::<64>().0.iter_mut();
+    for (words, errors) in words.chunks_exact(width).zip(rows) {
+        // SAFETY: the mask has `width` bits, and the slice as many words: no other is read.
+        let bus = unsafe { _mm512_maskz_loadu_epi16(u32::MAX >> (32 - width), words.as_ptr()) };
+        for (half, errors) in errors.as_chunks_mut::<32>().0.iter_mut().enumerate() {
+            let tapped = _mm512_maskz_permutexvar_epi16(live[half], taps_of[half], bus);
+            store_words(errors, tapped);
+        }
+    }
+}
+
+#[inline]
+#[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi,popcnt")]
+fn store_words(words: &mut [i16; 32], v: __m512i) {
+    // SAFETY: the reference covers the 32 words, 64 bytes, that an unaligned store writes.
+    unsafe { _mm512_storeu_si512(words.as_mut_ptr().cast(), v) }
 }
 
 /// Gates of 64 columns of one sample.
