@@ -1,7 +1,7 @@
 //! `bench`: how fast this machine is at what the simulator does, as figures and as ratios.
 //!
 //! Times of one machine say little about another; ratios say more. Everything that a ratio is made of runs in turn in
-//! one race ([`time`]), on random data. Sections: `peak`, `read`, `convert`, `update`, `step`.
+//! one race ([`time`]), on random data. Sections: `peak`, `read`, `conv`, `convert`, `update`, `step`.
 
 use std::ops::Range;
 use std::path::PathBuf;
@@ -15,6 +15,7 @@ use crate::chip::crossbar::layout::Layout;
 use crate::lab::data::DataRoot;
 
 mod chance;
+mod conv;
 mod convert;
 mod float;
 mod machine;
@@ -54,6 +55,8 @@ enum Section {
     Peak,
     /// Reads of arrays
     Read,
+    /// Reads and sums of convolutions
+    Conv,
     /// Reads with converters
     Convert,
     /// Writes of arrays
@@ -67,6 +70,7 @@ impl Section {
         match self {
             Self::Peak => "peak",
             Self::Read => "read",
+            Self::Conv => "conv",
             Self::Convert => "convert",
             Self::Update => "update",
             Self::Step => "step",
@@ -77,6 +81,7 @@ impl Section {
         match self {
             Self::Peak => peak::measure(plan),
             Self::Read => read::measure(plan),
+            Self::Conv => conv::measure(plan),
             Self::Convert => convert::measure(plan),
             Self::Update => update::measure(plan),
             Self::Step => step::measure(plan),

@@ -29,6 +29,7 @@ mod avx2;
 mod avx512;
 mod backend;
 mod chacha;
+mod conv;
 mod data;
 mod lanes;
 #[cfg(target_arch = "aarch64")]
@@ -48,6 +49,7 @@ pub use self::{amx::Amx, avx2::Avx2, avx512::Avx512};
 pub use self::{
     backend::{Backend, UnknownBackend},
     chacha::Draws,
+    conv::{ConvPlan, ConvScratch, ConvShape, ConvTurned, Image, Pixels},
     data::{
         Banks, Cells, Conversion, Dither, Drives, Half, LookUp, Scratch, TOGETHER, Write,
         WriteCounts,
@@ -117,6 +119,19 @@ trait Loops: Copy {
         scalar::read_columns(plane, layout, gates, out);
     }
 
+    /// Rows of positions put together, where a back end does not read an image as it lies.
+    fn read_conv(
+        self,
+        cells: &[u8],
+        image: Image<'_>,
+        (blocks, positions): (Range<usize>, Range<usize>),
+        scratch: &mut ConvScratch,
+        out: &mut [i32],
+    ) {
+        conv::assembled(self, cells, image, (blocks, positions), scratch, out);
+    }
+
+    /// As many samples as gates say, of rows that lie `stride` apart.
     fn accumulate(self, turned: &[u8], stride: usize, gates: &[i8], sums: &mut Half<i32>);
 
     /// Both at once, where that is faster than one after the other.
@@ -228,6 +243,8 @@ macro_rules! with {
         }
     };
 }
+
+use with;
 
 impl Kernel {
     /// Makes a back end ready on this thread, until the value is dropped.

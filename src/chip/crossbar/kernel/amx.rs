@@ -21,12 +21,13 @@ use self::fused::TileBank;
 use self::product::{Walk, half_block, levels_by_drives, levels_by_gates, pair};
 use super::avx512::{self, Avx512};
 use super::{
-    Banks, Cells, Conversion, Dither, Draws, Drives, Half, LookUp, Loops, Packed, Scratch,
-    TOGETHER, Write, WriteCounts, apart, peak,
+    Banks, Cells, ConvScratch, Conversion, Dither, Draws, Drives, Half, Image, LookUp, Loops,
+    Packed, Scratch, TOGETHER, Write, WriteCounts, apart, peak,
 };
 use crate::chip::crossbar::layout::{BLOCK_CELLS, BLOCK_ROWS, HALF_CELLS, Layout, PANEL_COLUMNS};
 use crate::num::fixed::ErrorBits;
 
+mod conv;
 mod fused;
 mod product;
 
@@ -170,6 +171,22 @@ impl Loops for &Tiles {
         }
     }
 
+    fn read_conv(
+        self,
+        cells: &[u8],
+        image: Image<'_>,
+        (blocks, positions): (Range<usize>, Range<usize>),
+        scratch: &mut ConvScratch,
+        out: &mut [i32],
+    ) {
+        let offsets = image.plan().offsets().map(|offsets| &offsets[blocks.clone()]);
+        let done = offsets
+            .is_some_and(|offsets| conv::read(self, cells, image, offsets, positions.clone(), out));
+        if !done {
+            super::conv::assembled(self, cells, image, (blocks, positions), scratch, out);
+        }
+    }
+
     /// Converts each bank of a tile while the next one is multiplied.
     fn read_converted(
         self,
@@ -285,8 +302,8 @@ impl Loops for &Tiles {
     }
 
     fn accumulate(self, turned: &[u8], stride: usize, gates: &[i8], sums: &mut Half<i32>) {
-        if stride.is_multiple_of(64) {
-            half_block(self, stride / 64, turned, avx512::as_bytes(gates), sums);
+        if gates.len().is_multiple_of(HALF_CELLS) {
+            half_block(self, stride, turned, avx512::as_bytes(gates), sums);
         } else {
             self.0.accumulate(turned, stride, gates, sums);
         }

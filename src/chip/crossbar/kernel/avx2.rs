@@ -271,7 +271,8 @@ fn read(cells: &[u8], drives: Drives<'_>, samples: Range<usize>, out: &mut [i32]
 
 #[target_feature(enable = "avx2,popcnt")]
 fn accumulate(turned: &[u8], stride: usize, gates: &[i8], sums: &mut Half<i32>) {
-    let walk = Walk { runs: 1, quads: stride / 4, run: 0, words: 0, stride, out: HALF_COLUMNS };
+    let walk =
+        Walk { runs: 1, quads: gates.len() / 64, run: 0, words: 0, stride, out: HALF_COLUMNS };
     // SAFETY: i8 and u8 have the same size and every bit pattern is valid for both.
     let gates = unsafe { std::slice::from_raw_parts(gates.as_ptr().cast::<u8>(), gates.len()) };
     dots_batch::<GATES>(walk, BLOCK_ROWS, turned, gates, sums);

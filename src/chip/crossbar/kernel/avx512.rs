@@ -16,13 +16,14 @@ use std::arch::x86_64::*;
 use std::ops::Range;
 
 use super::{
-    Cells, Conversion, Dither, Draws, Drives, Half, LookUp, Loops, Packed, Scratch, Write,
-    WriteCounts, peak,
+    Cells, ConvScratch, Conversion, Dither, Draws, Drives, Half, Image, LookUp, Loops, Packed,
+    Scratch, Write, WriteCounts, peak,
 };
 use crate::chip::crossbar::layout::{BLOCK_CELLS, BLOCK_ROWS, HALF_CELLS, HALF_COLUMNS, Layout};
 use crate::num::fixed::ErrorBits;
 
 mod columns;
+mod conv;
 mod dither;
 mod few;
 mod program;
@@ -100,6 +101,23 @@ impl Avx512 {
 impl Loops for Avx512 {
     fn read(self, cells: &[u8], drives: Drives<'_>, samples: Range<usize>, out: &mut [i32]) {
         compiled!(read(cells, drives, samples, out));
+    }
+
+    fn read_conv(
+        self,
+        cells: &[u8],
+        image: Image<'_>,
+        (blocks, positions): (Range<usize>, Range<usize>),
+        scratch: &mut ConvScratch,
+        out: &mut [i32],
+    ) {
+        let [_, across] = image.plan().shape().output();
+        match image.plan().offsets() {
+            Some(offsets) if blocks.len() == offsets.len() && across > 4 => {
+                compiled!(conv::read(cells, image, offsets, positions, out));
+            }
+            _ => super::conv::assembled(self, cells, image, (blocks, positions), scratch, out),
+        }
     }
 
     fn convert(
@@ -383,8 +401,15 @@ fn read(cells: &[u8], drives: Drives<'_>, samples: Range<usize>, out: &mut [i32]
 
 #[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi,popcnt")]
 fn accumulate(turned: &[u8], stride: usize, gates: &[i8], sums: &mut Half<i32>) {
-    let walk =
-        Walk { runs: 1, quads: stride / 4, run: 0, half: 0, words: 0, stride, out: HALF_COLUMNS };
+    let walk = Walk {
+        runs: 1,
+        quads: gates.len() / 64,
+        run: 0,
+        half: 0,
+        words: 0,
+        stride,
+        out: HALF_COLUMNS,
+    };
     let gates = as_bytes(gates);
     for row in (0..BLOCK_ROWS).step_by(16) {
         let sums = &mut sums[row * HALF_COLUMNS..][..16 * HALF_COLUMNS];

@@ -359,8 +359,8 @@ fn accumulate<M: Multiply>(
     sums.as_chunks_mut().0.fill(starts);
     // SAFETY: i8 and u8 have the same size and every bit pattern is valid for both.
     let gates = unsafe { std::slice::from_raw_parts(gates.as_ptr().cast::<u8>(), gates.len()) };
-    let quads = stride / 4;
-    let walk = Walk { runs: 1, quads, run: 0, words: 0, stride: quads, out: HALF_COLUMNS };
+    let (quads, stride) = (gates.len() / 64, stride / 4);
+    let walk = Walk { runs: 1, quads, run: 0, words: 0, stride, out: HALF_COLUMNS };
     let (streams, vectors) = (turned.as_chunks().0, gates.as_chunks().0);
     dots_batch::<M, GATES>(products, walk, BLOCK_ROWS, streams, vectors, sums);
 }

@@ -19,7 +19,10 @@
 
 use std::ops::Range;
 
-use super::{Cells, Conversion, Dither, Draws, Drives, Half, LookUp, Loops, Write, WriteCounts};
+use super::{
+    Cells, ConvScratch, Conversion, Dither, Draws, Drives, Half, Image, LookUp, Loops, Write,
+    WriteCounts, conv,
+};
 use crate::chip::crossbar::layout::{
     BLOCK_CELLS, BLOCK_ROWS, HALF_CELLS, HALF_COLUMNS, Layout, PANEL_COLUMNS, in_half,
 };
@@ -30,6 +33,17 @@ use crate::num::fixed::{ErrorBits, rsh, sat};
 pub(super) struct Scalar;
 
 impl Loops for Scalar {
+    fn read_conv(
+        self,
+        cells: &[u8],
+        image: Image<'_>,
+        range: (Range<usize>, Range<usize>),
+        _: &mut ConvScratch,
+        out: &mut [i32],
+    ) {
+        conv::read(cells, image, range, out);
+    }
+
     fn read(self, cells: &[u8], drives: Drives<'_>, samples: Range<usize>, out: &mut [i32]) {
         for (sample, out) in samples.zip(out.chunks_exact_mut(PANEL_COLUMNS)) {
             out.fill(0);
@@ -49,7 +63,7 @@ impl Loops for Scalar {
 
     fn accumulate(self, turned: &[u8], stride: usize, gates: &[i8], sums: &mut Half<i32>) {
         sums.fill(0);
-        for (x, sums) in turned.chunks_exact(stride).zip(sums.chunks_exact_mut(HALF_COLUMNS)) {
+        for (x, sums) in turned.chunks(stride).zip(sums.chunks_exact_mut(HALF_COLUMNS)) {
             for (x, u) in x.chunks_exact(4).zip(gates.chunks_exact(64)) {
                 for (sum, u) in sums.iter_mut().zip(u.chunks_exact(4)) {
                     for (x, u) in x.iter().zip(u) {

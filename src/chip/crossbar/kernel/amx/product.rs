@@ -5,7 +5,7 @@ use std::arch::asm;
 
 use super::Tiles;
 use crate::chip::crossbar::kernel::Half;
-use crate::chip::crossbar::layout::{BLOCK_ROWS, HALF_COLUMNS};
+use crate::chip::crossbar::layout::{BLOCK_ROWS, HALF_CELLS};
 
 /// Where the bytes of a product of two by two tiles lie.
 #[derive(Clone, Copy)]
@@ -127,21 +127,20 @@ pub(super) fn pair(_: &Tiles, walk: Walk, a: &[u8], b: &[u8], c: &mut [i32]) {
     }
 }
 
-/// Four by one tiles: 64 rows of A, 16 columns of B, `steps` times 64 samples.
+/// Four by one tiles: 64 rows of A that lie `stride` bytes apart, 16 columns of B, as many times 64 samples as B has.
 pub(super) fn half_block(
     _: &Tiles,
-    steps: usize,
+    stride: usize,
     turned: &[u8],
     gates: &[u8],
     sums: &mut Half<i32>,
 ) {
-    let stride = steps * 64;
+    let steps = gates.len() / HALF_CELLS;
     assert!(steps > 0, "there is something to multiply");
-    assert!(turned.len() >= BLOCK_ROWS * stride, "every row of A is there");
-    assert!(gates.len() >= HALF_COLUMNS * stride, "every B is there");
+    assert!(turned.len() >= (BLOCK_ROWS - 1) * stride + steps * 64, "every row of A is there");
     // SAFETY: a `Tiles` says that tiles of this thread have 16 rows of 64 bytes. Tile rows read at
     // turned + step * 64 + row * stride (row < 64) and gates + step * 1024 + 64 * row (row < 16) lie inside the slices
-    // by the assertions; the 64 rows of 64 bytes written are all of `sums`. All tiles used are named.
+    // by the assertion and the division; the 64 rows of 64 bytes written are all of `sums`. All tiles used are named.
     unsafe {
         asm!(
             "tilezero tmm0",

@@ -1,0 +1,103 @@
+//! Drives of some positions, put together as a dense array takes them.
+//!
+//! ```text
+//! image -> [block of 64 rows][position][64]
+//! ```
+//!
+//! Where channels lie side by side, the taps of one row of the kernel do too: `side` copies a position. Copies are of 16
+//! bytes; what one writes too much, the next one or the padding overwrites.
+#![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
+
+use std::ops::Range;
+
+use super::{ConvPlan, ConvScratch, Image, Pixels};
+use crate::chip::crossbar::kernel::Drives;
+use crate::chip::crossbar::layout::BLOCK_ROWS;
+
+/// Bytes of a copy.
+const COPY: usize = 16;
+
+impl ConvScratch {
+    /// Puts together the drives of some blocks of rows at some positions. A layer with several panels does this once
+    /// and reads every panel from it.
+    ///
+    /// # Panics
+    /// When there are no such blocks or positions.
+    pub fn assemble(
+        &mut self,
+        image: Image<'_>,
+        blocks: Range<usize>,
+        positions: Range<usize>,
+    ) -> Drives<'_> {
+        let plan = image.plan();
+        assert!(!blocks.is_empty() && blocks.end <= plan.blocks(), "the blocks are there");
+        assert!(!positions.is_empty() && positions.end <= plan.positions(), "positions are there");
+        let count = positions.len();
+        let bytes = blocks.len() * count * BLOCK_ROWS;
+        if self.codes.len() < bytes {
+            self.codes.resize(bytes, 0);
+        }
+        let codes = &mut self.codes[..bytes];
+        if let Some(offsets) = plan.offsets() {
+            for (offset, codes) in
+                offsets[blocks].iter().zip(codes.chunks_exact_mut(count * BLOCK_ROWS))
+            {
+                let (codes, _) = codes.as_chunks_mut::<BLOCK_ROWS>();
+                for (pixel, codes) in plan.shape().steps(positions.start).zip(codes) {
+                    let at = offset + pixel * BLOCK_ROWS;
+                    codes.copy_from_slice(&image.codes()[at..at + BLOCK_ROWS]);
+                }
+            }
+        } else {
+            self.line.resize(plan.blocks() * BLOCK_ROWS + COPY, 0);
+            for (i, pixel) in plan.shape().steps(positions.start).take(count).enumerate() {
+                rows_of(plan, image.codes(), pixel, &mut self.line);
+                for (to, block) in blocks.clone().enumerate() {
+                    codes[(to * count + i) * BLOCK_ROWS..][..BLOCK_ROWS]
+                        .copy_from_slice(&self.line[block * BLOCK_ROWS..][..BLOCK_ROWS]);
+                }
+            }
+        }
+        Drives::new(codes, count)
+    }
+}
+
+/// The drives of all rows at the position whose first tap is `pixel`.
+fn rows_of(plan: &ConvPlan, codes: &[u8], pixel: usize, line: &mut [u8]) {
+    let shape = plan.shape();
+    let [_, width] = shape.padded();
+    for ky in 0..shape.side {
+        let (from, to) = (pixel + ky * width, ky * shape.side * shape.channels);
+        match plan.form() {
+            Pixels::Packed => {
+                let from = from * shape.channels;
+                copy(&codes[from..], &mut line[to..], shape.side * shape.channels);
+            }
+            Pixels::Blocks => {
+                for kx in 0..shape.side {
+                    for (block, first) in (0..shape.channels).step_by(BLOCK_ROWS).enumerate() {
+                        let at = block * plan.samples() * shape.pixels() + from + kx;
+                        let run = (shape.channels - first).min(BLOCK_ROWS);
+                        let to = to + kx * shape.channels + first;
+                        copy(&codes[at * BLOCK_ROWS..], &mut line[to..], run);
+                    }
+                }
+            }
+        }
+    }
+    line[shape.rows()..].fill(0);
+}
+
+/// Copies at least `run` bytes, and fewer than 16 more.
+#[inline]
+fn copy(from: &[u8], to: &mut [u8], run: usize) {
+    let rounded = run.next_multiple_of(COPY);
+    match (from.get(..rounded), to.get_mut(..rounded)) {
+        (Some(from), Some(to)) => {
+            for (from, to) in from.as_chunks::<COPY>().0.iter().zip(to.as_chunks_mut::<COPY>().0) {
+                *to = *from;
+            }
+        }
+        _ => to[..run].copy_from_slice(&from[..run]),
+    }
+}
