@@ -23,6 +23,7 @@ pub struct Draws {
     rows: usize,
     start: [i32; 16],
     /// After the quarter rounds of columns 1, 2 and 3; words 0, 4, 8 and 12 as they start.
+    #[cfg(target_arch = "x86_64")]
     mixed: [i32; 16],
 }
 
@@ -48,11 +49,13 @@ impl Draws {
         [start[4], start[5]] = seed;
         [start[12], start[13]] = count;
         [start[14], start[15]] = stream;
-        let mut mixed = start;
-        quarter(&mut mixed, 1);
-        quarter(&mut mixed, 2);
-        quarter(&mut mixed, 3);
-        Self { place, rows, start, mixed }
+        Self {
+            place,
+            rows,
+            start,
+            #[cfg(target_arch = "x86_64")]
+            mixed: mixed(start),
+        }
     }
 
     /// Address of the words.
@@ -73,6 +76,7 @@ impl Draws {
     }
 
     /// The state before the first round's quarter round of column 0, but for word 12.
+    #[cfg(target_arch = "x86_64")]
     pub(super) const fn mixed(&self) -> &[i32; 16] {
         &self.mixed
     }
@@ -90,7 +94,17 @@ impl Draws {
     }
 }
 
+/// The state after the quarter rounds of columns 1, 2 and 3.
+#[cfg(target_arch = "x86_64")]
+const fn mixed(mut state: [i32; 16]) -> [i32; 16] {
+    quarter(&mut state, 1);
+    quarter(&mut state, 2);
+    quarter(&mut state, 3);
+    state
+}
+
 /// The quarter round of a column.
+#[cfg(target_arch = "x86_64")]
 const fn quarter(s: &mut [i32; 16], column: usize) {
     let [a, b, c, d] = [column, column + 4, column + 8, column + 12];
     let mut turn = 0;

@@ -106,6 +106,7 @@ pub(in super::super) struct Steps {
 
 impl Steps {
     /// The next pixel.
+    #[cfg(target_arch = "x86_64")]
     #[inline]
     pub(in super::super) const fn pixel(&self) -> usize {
         self.pixel

@@ -2,7 +2,7 @@
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
 use super::*;
-use crate::num::draw::Site;
+use crate::num::draw::{Place, Site};
 
 fn bytes(count: u64, len: usize) -> Vec<u8> {
     let mut bytes = vec![0; len];
