@@ -55,7 +55,8 @@ fault() {
 }
 
 scalar=src/chip/crossbar/kernel/scalar.rs
-forward=src/chip/engine/forward.rs
+error=src/chip/engine/error.rs
+read=src/chip/engine/read.rs
 update=src/chip/engine/update.rs
 
 fault "1 inhibition is not negated" $scalar \
@@ -67,24 +68,27 @@ fault "1 remainder lost" $scalar \
     'residual[at] = u16::try_from(left)' 'residual[at] = u16::try_from(left & !1)' laws::law_1
 fault "1 converter truncates" src/chip/periphery.rs \
     'let steps = rsh(current, self.shift);' 'let steps = current >> self.shift;' laws::law_1
-fault "1 stream n not negated" $update \
-    'let sign = if target == Stream::N { -1 } else { 1 };' 'let sign = 1;' laws::law_1
+fault "1 stream n not negated" $error \
+    'let negate = target == Stream::N;' 'let negate = false;' laws::law_1
 fault "1 write count stands still" $update \
-    'this.writes.iter_mut().for_each(|writes| *writes += 1);' '' laws::law_1
-fault "1 slices trade weight" $forward \
-    'let shift = adc.shift + slice * self.dac_bits;' \
-    'let shift = adc.shift + slice * (self.dac_bits - 1);' laws::law_1
-fault "1 np hears what pp hears" $forward \
-    'let read = &self.reads[bank][at];' 'let read = &self.reads[0][at];' laws::law_1
+    'self.layers[layer].writes.iter_mut().for_each(|writes| *writes += 1);' '' laws::law_1
+fault "1 slices trade weight" $read \
+    'let shift = adc.shift + e.slice as u32 * self.dac_bits;' \
+    'let shift = adc.shift + e.slice as u32 * (self.dac_bits - 1);' laws::law_1
+fault "1 wide slices trade weight" $read \
+    'let shift = slice as u32 * self.dac_bits;' \
+    'let shift = slice as u32 * (self.dac_bits - 1);' laws::law_1
+fault "1 np hears what pp hears" $read \
+    '&self.reads[bank][at]' '&self.reads[0][at]' laws::law_1
 fault "1 32-bit sums cut too late" src/chip/layer.rs \
     'pub const CHUNK_BLOCKS: usize = 512;' \
     'pub const CHUNK_BLOCKS: usize = 1024;' laws::bounds
-fault "2 a half dark block is skipped" src/chip/crossbar.rs \
-    'if drives.iter().all(|&code| code == 0) {' \
-    'if drives[..32 * stride].iter().all(|&code| code == 0) {' laws::law_2
-fault "2 a sum of nothing is all it sees" src/chip/crossbar.rs \
-    'if sums.iter().all(|&sum| sum == 0) {' \
-    'if sums.iter().all(|&sum| sum <= 0) {' laws::law_2
+fault "2 a half dark block is skipped" $update \
+    'let live = codes.iter().any(|&code| code != 0);' \
+    'let live = codes[..32].iter().any(|&code| code != 0);' laws::law_2
+fault "2 a sum of nothing is all it sees" $scalar \
+    'quotient(sum, shift, bits) != 0' \
+    'quotient(sum, shift, bits) > 0' laws::law_2
 fault "2 one back end bounds one side" src/chip/crossbar/kernel/avx2/program.rs \
     'let pulses_b = _mm256_max_epi16(_mm256_min_epi16(b, most), least);' \
     'let pulses_b = _mm256_min_epi16(b, most);' laws::law_
@@ -94,10 +98,9 @@ fault "3 write counts are not restored" src/lab/store/checkpoint.rs \
     '*writes = positive(&name, number)?;' 'positive(&name, number)?;' laws::runs
 fault "3 a draw depends on the tile" $update \
     'layer: index,' 'layer: index + (hardware.tile_rows & 1) as u16,' laws::runs
-fault "5 a tile loses its last row" $forward \
-    'sample[rows.end..blocks.end * BLOCK_ROWS].fill(0);' \
-    'sample[rows.end - 1..blocks.end * BLOCK_ROWS].fill(0);' laws::product
-fault "5 transposed phases add" $forward \
-    'let sign = i64::from(phase) * if bank == 0 { 1 } else { -1 };' \
-    'let sign = if bank == 0 { 1 } else { -1 };' laws::product
+fault "5 a tile loses its last row" $read \
+    'codes[to..].fill(0);' 'codes[to - 1..].fill(0);' laws::product
+fault "5 transposed banks add" src/chip/engine/columns.rs \
+    'backward.extend(rows.map(|(e, i)| e - i));' \
+    'backward.extend(rows.map(|(e, i)| e + i));' laws::product
 exit $status
