@@ -5,6 +5,10 @@ use crate::num::fixed::{
     AdcBits, DriveBits, ErrorBits, IncrementMax, LevelBits, LutBits, OutOfRange, ResidualBits,
 };
 
+pub mod timing;
+
+pub use timing::{PulseCode, Timing};
+
 /// The programming window of a cell: `floor < ceiling <= level_max`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Window {
@@ -161,6 +165,8 @@ pub struct Hardware {
     pub dither_pattern: DitherPattern,
     /// Fractional bits of the digital remainder behind a cell.
     pub residual_bits: ResidualBits,
+    /// Cycles of what a tile does; `None`: no cycles are counted.
+    pub timing: Option<Timing>,
 }
 
 impl Hardware {

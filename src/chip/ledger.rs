@@ -4,6 +4,10 @@
 //! ledger each. See docs/MODEL.md, 4.
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
+pub mod cycles;
+
+pub use cycles::{Cycles, Part, Stage};
+
 /// What can happen. The order is part of the state hash: append only.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(usize)]
@@ -46,11 +50,17 @@ pub enum Event {
     SaturatedErrors,
     /// A gate hit its rail.
     SaturatedGates,
+    /// A row of a tile was pulsed: its drivers and the lines of all its columns moved.
+    RowPulses,
+    /// A cell was read to see what a pulse had done.
+    VerifyReads,
+    /// A bit went into or came out of a digital memory beside the tiles.
+    SramBits,
 }
 
 impl Event {
     /// All events, in order.
-    pub const ALL: [Self; 19] = [
+    pub const ALL: [Self; 22] = [
         Self::DacSlices,
         Self::CellReads,
         Self::Holds,
@@ -70,13 +80,25 @@ impl Event {
         Self::SaturatedLookUps,
         Self::SaturatedErrors,
         Self::SaturatedGates,
+        Self::RowPulses,
+        Self::VerifyReads,
+        Self::SramBits,
     ];
 
-    /// Whether the count depends on how arrays are cut into tiles. It then follows from the plan, and the state
-    /// hash leaves it out: re-tiling with ideal converters changes no state.
+    /// Whether the count belongs to the state that is hashed. What depends on how arrays are cut into tiles, on
+    /// timing or on memories beside them does not: re-tiling with ideal converters changes no state.
     #[must_use]
-    pub const fn follows_tiling(self) -> bool {
-        matches!(self, Self::DacSlices | Self::Holds | Self::Conversions | Self::ShiftAdds)
+    pub const fn is_state(self) -> bool {
+        !matches!(
+            self,
+            Self::DacSlices
+                | Self::Holds
+                | Self::Conversions
+                | Self::ShiftAdds
+                | Self::RowPulses
+                | Self::VerifyReads
+                | Self::SramBits
+        )
     }
 
     /// Name in files.
@@ -102,6 +124,9 @@ impl Event {
             Self::SaturatedLookUps => "saturated_look_ups",
             Self::SaturatedErrors => "saturated_errors",
             Self::SaturatedGates => "saturated_gates",
+            Self::RowPulses => "row_pulses",
+            Self::VerifyReads => "verify_reads",
+            Self::SramBits => "sram_bits",
         }
     }
 }

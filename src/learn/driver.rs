@@ -225,6 +225,7 @@ mod tests {
             dither_bits: DitherBits::Zero,
             dither_pattern: DitherPattern::PerCell,
             residual_bits: ResidualBits::new(0).unwrap(),
+            timing: None,
         };
         let spec = LayerSpec {
             inputs: 2,

@@ -168,6 +168,7 @@ mod tests {
             dither_bits: DitherBits::Eight,
             dither_pattern: DitherPattern::PerCell,
             residual_bits: ResidualBits::new(0).unwrap(),
+            timing: None,
         }
     }
 

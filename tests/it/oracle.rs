@@ -107,6 +107,7 @@ fn hardware(s: &Value) -> Hardware {
             _ => DitherPattern::Separable,
         },
         residual_bits: ResidualBits::new(int(&s["residual_bits"])).unwrap(),
+        timing: None,
     }
 }
 

@@ -223,6 +223,7 @@ fn resolve_hardware(file: &mut HardwareFile, prefix: &str) -> Result<Hardware, C
         dither_bits,
         dither_pattern,
         residual_bits,
+        timing: None,
     })
 }
 

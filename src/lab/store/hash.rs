@@ -52,7 +52,7 @@ pub fn state(driver: &Driver) -> String {
         layer.writes.iter().for_each(|&writes| number(count(writes)));
     }
     for phase in Phase::ALL {
-        let events = Event::ALL.into_iter().filter(|event| !event.follows_tiling());
+        let events = Event::ALL.into_iter().filter(|event| event.is_state());
         events.for_each(|event| number(count(engine.ledger(phase).total(event))));
     }
     hash.finalize().to_hex().to_string()

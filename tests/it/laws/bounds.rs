@@ -29,6 +29,7 @@ fn hardware(level_bits: i64, residual_bits: i64) -> Hardware {
         dither_bits: DitherBits::Zero,
         dither_pattern: DitherPattern::PerCell,
         residual_bits: ResidualBits::new(residual_bits).unwrap(),
+        timing: None,
     }
 }
 

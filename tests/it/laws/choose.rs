@@ -129,6 +129,7 @@ pub(crate) fn hardware(widest: usize) -> impl Strategy<Value = Hardware> {
                 dither_bits,
                 dither_pattern,
                 residual_bits: ResidualBits::new(residual_bits).unwrap(),
+                timing: None,
             }
         },
     )

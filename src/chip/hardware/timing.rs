@@ -1,0 +1,192 @@
+//! How long a tile takes for what it does, in cycles of its clock.
+//!
+//! ```text
+//! FWD, samples and holds overlapped   T_A + (NS - 1) max(T_A, conv) + conv + T_tree + NG      conv = S T_C
+//! FWD, not overlapped                 NS (T_A + conv) + T_tree + NG                           NG = ceil(C / U)
+//! until the next FWD                  max(NS period, NG)            period = max(T_A, conv), or T_A + conv
+//! ERR                                 CE + H + NG
+//! UPD add                             rows NG
+//! a pulse of a row                    T_W passes, and T_A + conv more when it is verified
+//! ```
+//!
+//! Every accepted command adds one cycle. On a chip whose clock is that of optical symbols, whatever is digital takes
+//! `beat` cycles where these formulas say one. See docs/TILE.md and docs/MODEL.md, 4.5.
+#![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
+
+/// How the pulses of a row are given.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum PulseCode {
+    /// One pulse a level: a row takes as many as its most active cell asks for.
+    Unary,
+    /// One pulse whose amplitude says how many levels.
+    Amplitude,
+}
+
+/// Cycles of a tile. All are at least 1 where the formula divides or counts by them.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Timing {
+    /// Kilohertz of the clock that counts cycles. Turns cycles into seconds; no schedule reads it.
+    pub clock_khz: u64,
+    /// Cycles of a digital action (look-up group, bus word, tree level, accumulation, row turn-around): 1, or the
+    /// symbols of a digital clock on a chip whose clock is optical.
+    pub beat: u64,
+    /// `T_A`: cycles to settle and sample.
+    pub settle: u64,
+    /// `T_C`: cycles of a conversion.
+    pub convert: u64,
+    /// `S`: columns that share a converter.
+    pub share: u64,
+    /// Whether a slice settles while the one before is converted.
+    pub overlapped: bool,
+    /// `U`: columns looked up, multiplied or accumulated at a time.
+    pub lanes: u64,
+    /// `H`: hops of the error bus.
+    pub hops: u64,
+    /// `T_W`: cycles of a pulse.
+    pub pulse: u64,
+    /// How pulses are given.
+    pub pulse_code: PulseCode,
+    /// Whether every pulse is followed by a read of what it did.
+    pub verify: bool,
+    /// `W`: cells that can be pulsed at a time; `None` is a whole row of both banks.
+    pub active_max: Option<u64>,
+}
+
+impl Timing {
+    /// `conv`: cycles until all columns of a bank are converted.
+    #[must_use]
+    pub const fn conversion(&self) -> u64 {
+        self.share * self.convert
+    }
+
+    /// Cycles from one slice to the next.
+    #[must_use]
+    pub const fn period(&self) -> u64 {
+        if !self.overlapped {
+            self.settle + self.conversion()
+        } else if self.settle > self.conversion() {
+            self.settle
+        } else {
+            self.conversion()
+        }
+    }
+
+    /// `NG`: turns in which the lanes see all of so many columns.
+    #[must_use]
+    pub const fn groups(&self, columns: u64) -> u64 {
+        columns.div_ceil(self.lanes)
+    }
+
+    /// Busy cycles of a read in so many slices, of this many columns, whose tiles are added in `levels` steps.
+    #[must_use]
+    pub const fn read(&self, slices: u64, columns: u64, levels: u64) -> u64 {
+        let tail = self.conversion() + self.beat * (levels + self.groups(columns));
+        self.settle + (slices - 1) * self.period() + tail
+    }
+
+    /// Busy cycles until the front end takes the next read.
+    #[must_use]
+    pub const fn read_again(&self, slices: u64, columns: u64) -> u64 {
+        let (front, lanes) = (slices * self.period(), self.beat * self.groups(columns));
+        if front > lanes { front } else { lanes }
+    }
+
+    /// Busy cycles of `ERR` with so many words.
+    #[must_use]
+    pub const fn error(&self, words: u64, columns: u64) -> u64 {
+        self.beat * (words + self.hops + self.groups(columns))
+    }
+
+    /// Busy cycles of `UPD(add)`.
+    #[must_use]
+    pub const fn accumulate(&self, rows: u64, columns: u64) -> u64 {
+        self.beat * rows * self.groups(columns)
+    }
+
+    /// Cycles of the error unit that takes the mean over a batch off every word: `B CE + CE`.
+    #[must_use]
+    pub const fn centre(&self, samples: u64, words: u64) -> u64 {
+        self.beat * (samples * words + words)
+    }
+
+    /// Cycles of one pass of a pulse.
+    #[must_use]
+    pub const fn pass(&self) -> u64 {
+        self.pulse + if self.verify { self.settle + self.conversion() } else { 0 }
+    }
+
+    /// Cycles of a row that takes so many passes: compute, pulses, turn around.
+    #[must_use]
+    pub const fn row(&self, passes: u64) -> u64 {
+        2 * self.beat + passes * self.pass()
+    }
+
+    /// Cycles an accepted command adds.
+    #[must_use]
+    pub const fn accept(&self) -> u64 {
+        self.beat
+    }
+
+    /// Passes of the pulses of one polarity, given the most pulses of a cell, when nothing limits how many cells
+    /// pulse at a time.
+    #[must_use]
+    pub const fn passes(&self, peak: u64) -> u64 {
+        match self.pulse_code {
+            PulseCode::Unary => peak,
+            PulseCode::Amplitude => (peak > 0) as u64,
+        }
+    }
+}
+
+/// Steps in which a tree adds so many tiles: `ceil(log2(tiles))`.
+#[must_use]
+pub const fn tree_levels(tiles: u64) -> u64 {
+    (u64::BITS - (tiles - 1).leading_zeros()) as u64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const TIMING: Timing = Timing {
+        clock_khz: 1_000_000,
+        beat: 1,
+        settle: 10,
+        convert: 2,
+        share: 8,
+        overlapped: true,
+        lanes: 4,
+        hops: 3,
+        pulse: 5,
+        pulse_code: PulseCode::Unary,
+        verify: false,
+        active_max: None,
+    };
+
+    #[test]
+    fn a_read_is_what_the_formula_says() {
+        // conv 16 > settle 10: 10 + 3 x 16 + 16 + 2 + ceil(18 / 4)
+        assert_eq!(TIMING.read(4, 18, 2), 10 + 48 + 16 + 2 + 5);
+        assert_eq!(TIMING.read_again(4, 18), 64);
+        let apart = Timing { overlapped: false, ..TIMING };
+        assert_eq!((apart.read(4, 18, 2), apart.read_again(4, 18)), (4 * 26 + 2 + 5, 4 * 26));
+        let analog = Timing { settle: 20, ..TIMING };
+        assert_eq!((analog.read(4, 18, 2), analog.read_again(4, 18)), (20 + 60 + 16 + 7, 80));
+        // one lane for 100 columns is slower than one slice
+        let slow = Timing { lanes: 1, ..TIMING };
+        assert_eq!((slow.read_again(1, 16), slow.read_again(1, 17)), (16, 17));
+    }
+
+    #[test]
+    fn a_verified_pulse_is_read() {
+        let verified = Timing { verify: true, ..TIMING };
+        assert_eq!((TIMING.row(3), verified.row(3)), (2 + 15, 2 + 3 * (5 + 26)));
+        let amplitude = Timing { pulse_code: PulseCode::Amplitude, ..TIMING };
+        assert_eq!([0, 1, 7].map(|peak| amplitude.passes(peak)), [0, 1, 1]);
+    }
+
+    #[test]
+    fn a_tree_of_one_tile_has_no_levels() {
+        assert_eq!([1, 2, 3, 4, 5, 8, 9].map(tree_levels), [0, 1, 2, 2, 3, 3, 4]);
+    }
+}

@@ -1,0 +1,214 @@
+//! How long it took: cycles, beside the counts of what happened.
+//!
+//! Three views of the same time. *Elapsed*: by stage of an update, what a clock on the wall would show; stages do not
+//! overlap, so they add up. *Busy*: by layer and operation, from the acceptance of a command until it is done; layers
+//! work side by side, so these do not add up to elapsed. *Used*: by layer and part of its tiles; used / elapsed is a
+//! part's utilisation. See docs/MODEL.md, 4.5.
+#![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
+
+use super::During;
+
+/// What the chip as a whole is doing.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+#[repr(usize)]
+pub enum Stage {
+    /// `LOADW`: levels of a fresh network, row by row.
+    Load,
+    /// `FWD(rows)`, layers in a pipeline.
+    Forward,
+    /// The error unit takes the mean over the batch.
+    Centre,
+    /// `ERR`: words on the bus, gates.
+    Error,
+    /// `FWD(columns)`.
+    Columns,
+    /// `UPD(add)`.
+    Accumulate,
+    /// `UPD(now)` and `UPD(write)`.
+    Program,
+}
+
+impl Stage {
+    /// All stages, in order.
+    pub const ALL: [Self; 7] = [
+        Self::Load,
+        Self::Forward,
+        Self::Centre,
+        Self::Error,
+        Self::Columns,
+        Self::Accumulate,
+        Self::Program,
+    ];
+
+    /// Name in files.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Load => "load",
+            Self::Forward => "forward",
+            Self::Centre => "centre",
+            Self::Error => "error",
+            Self::Columns => "columns",
+            Self::Accumulate => "accumulate",
+            Self::Program => "program",
+        }
+    }
+}
+
+/// A part of a layer's tiles that can be what everything waits for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[repr(usize)]
+pub enum Part {
+    /// Arrays settle.
+    Arrays,
+    /// Converters convert.
+    Converters,
+    /// The adder tree adds tiles.
+    Tree,
+    /// Look-up lanes, and the subtraction of a transposed read.
+    Lanes,
+    /// The error bus brings words.
+    Bus,
+    /// Lanes multiply words with slopes.
+    Multipliers,
+    /// Lanes add products to the sums of cells.
+    Accumulators,
+    /// Rows are computed, pulsed, verified and turned around.
+    Writers,
+}
+
+impl Part {
+    /// All parts, in order.
+    pub const ALL: [Self; 8] = [
+        Self::Arrays,
+        Self::Converters,
+        Self::Tree,
+        Self::Lanes,
+        Self::Bus,
+        Self::Multipliers,
+        Self::Accumulators,
+        Self::Writers,
+    ];
+
+    /// Name in files.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Arrays => "arrays",
+            Self::Converters => "converters",
+            Self::Tree => "tree",
+            Self::Lanes => "lanes",
+            Self::Bus => "bus",
+            Self::Multipliers => "multipliers",
+            Self::Accumulators => "accumulators",
+            Self::Writers => "writers",
+        }
+    }
+}
+
+/// Cycles of a network.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Cycles {
+    elapsed: [u64; Stage::ALL.len()],
+    busy: Vec<[u64; During::ALL.len()]>,
+    used: Vec<[u64; Part::ALL.len()]>,
+}
+
+impl Cycles {
+    /// No cycle yet.
+    #[must_use]
+    pub fn new(layers: usize) -> Self {
+        Self {
+            elapsed: [0; Stage::ALL.len()],
+            busy: vec![[0; During::ALL.len()]; layers],
+            used: vec![[0; Part::ALL.len()]; layers],
+        }
+    }
+
+    /// Time passes in a stage.
+    pub const fn pass(&mut self, stage: Stage, cycles: u64) {
+        self.elapsed[stage as usize] += cycles;
+    }
+
+    /// A layer is busy with an operation.
+    pub fn occupy(&mut self, layer: usize, during: During, cycles: u64) {
+        self.busy[layer][during as usize] += cycles;
+    }
+
+    /// A part of a layer works.
+    pub fn engage(&mut self, layer: usize, part: Part, cycles: u64) {
+        self.used[layer][part as usize] += cycles;
+    }
+
+    /// Cycles of a stage.
+    #[must_use]
+    pub const fn stage(&self, stage: Stage) -> u64 {
+        self.elapsed[stage as usize]
+    }
+
+    /// Cycles from start to end.
+    #[must_use]
+    pub fn elapsed(&self) -> u64 {
+        self.elapsed.iter().sum()
+    }
+
+    /// Cycles a layer was busy with an operation.
+    #[must_use]
+    pub fn busy(&self, layer: usize, during: During) -> u64 {
+        self.busy[layer][during as usize]
+    }
+
+    /// Cycles a part of a layer worked.
+    #[must_use]
+    pub fn used(&self, layer: usize, part: Part) -> u64 {
+        self.used[layer][part as usize]
+    }
+
+    /// Number of layers.
+    #[must_use]
+    pub const fn layers(&self) -> usize {
+        self.busy.len()
+    }
+
+    /// All numbers in a fixed order, to store them.
+    #[must_use]
+    pub fn numbers(&self) -> Vec<u64> {
+        let layers = self.busy.iter().flatten().chain(self.used.iter().flatten());
+        self.elapsed.iter().chain(layers).copied().collect()
+    }
+
+    /// Puts stored numbers back; `None` when they are not as many.
+    #[must_use]
+    pub fn from_numbers(layers: usize, numbers: &[u64]) -> Option<Self> {
+        let mut cycles = Self::new(layers);
+        if numbers.len() != cycles.numbers().len() {
+            return None;
+        }
+        let busy = cycles.busy.iter_mut().flatten();
+        let slots = cycles.elapsed.iter_mut().chain(busy).chain(cycles.used.iter_mut().flatten());
+        slots.zip(numbers).for_each(|(slot, &number)| *slot = number);
+        Some(cycles)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_order_of_stages_and_parts_is_their_number() {
+        assert!(Stage::ALL.iter().enumerate().all(|(i, &s)| s as usize == i));
+        assert!(Part::ALL.iter().enumerate().all(|(i, &p)| p as usize == i));
+    }
+
+    #[test]
+    fn stored_cycles_come_back() {
+        let mut cycles = Cycles::new(2);
+        cycles.pass(Stage::Error, 3);
+        cycles.occupy(1, During::Update, 5);
+        cycles.engage(0, Part::Writers, 7);
+        assert_eq!(Cycles::from_numbers(2, &cycles.numbers()), Some(cycles.clone()));
+        assert_eq!(Cycles::from_numbers(1, &cycles.numbers()), None);
+        assert_eq!((cycles.elapsed(), cycles.stage(Stage::Error)), (3, 3));
+    }
+}
