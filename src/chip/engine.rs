@@ -31,6 +31,7 @@ mod each;
 mod error;
 mod forward;
 mod read;
+pub mod tick;
 mod update;
 
 pub use calibrate::Calibration;
