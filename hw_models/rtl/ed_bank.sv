@@ -68,7 +68,7 @@ module ed_bank #(
     input wire logic [11:0]                floor,
     input wire logic [11:0]                ceiling
 );
-    // Flat vectors, the first in the low bits: cell (r, c) is number COLUMNS * r + c, row r of slot s number ROWS * s + r.
+    // Flat vectors, the first in the low bits: cell (r, c) is number COLUMNS * r + c, row r of slot s is ROWS * s + r.
     localparam int CELLS = ROWS * COLUMNS;
     localparam int EVENTS = 15;
 

@@ -168,9 +168,8 @@ module ed_tile #(
     logic [32*TREE_MAX-1:0]         tree_slot;
     logic [32*TREE_MAX*COLUMNS-1:0] tree;
     logic [32*COLUMNS-1:0]          acc, out;
-    logic [8*SLOTS*COLUMNS-1:0]     value, slope;
+    logic [8*SLOTS*COLUMNS-1:0]     value, slope, gate;
     logic [9*COLUMNS-1:0]           error;
-    logic [8*COLUMNS-1:0]           gate;
     logic [32*6-1:0]                events;
     logic [6:0]  peak_set, peak_reset;
 
@@ -407,7 +406,7 @@ module ed_tile #(
     end
 
     always_comb begin : multipliers
-        gate_next = gate;
+        gate_next = '0;
         multiply_columns = '0;
         gate_clipped = '0;
         raised = 64'sd0;
@@ -427,7 +426,6 @@ module ed_tile #(
 
     always_ff @(posedge clock) begin : error_unit
         error <= reset ? '0 : error_next;
-        gate <= reset ? '0 : gate_next;
         if (reset) begin
             err_busy <= 1'b0;
             err_count <= 32'd0;
@@ -441,10 +439,20 @@ module ed_tile #(
         end
     end
 
+    always_ff @(posedge clock) begin : gates
+        if (reset) gate <= '0;
+        else if (multiply)
+            for (int s = 0; s < SLOTS; s++)
+                for (int c = 0; c < COLUMNS; c++)
+                    if (err_slot == s && multiply_columns[c])
+                        gate[8*(COLUMNS*s + c) +: 8] <= gate_next[8*c +: 8];
+    end
+
     // --- update: row by row, either sums or pulses: SET, then RESET, then a cycle to turn the row around ---
 
     logic upd_add, upd_compute, upd_turn, pulse_end, pulses_end, last_row;
     logic [COLUMNS-1:0] add_columns;
+    logic [8*COLUMNS-1:0] upd_gate;
     logic [6:0] set_e, set_i, reset_e, reset_i, set_most, reset_most;
 
     assign upd_add = upd_busy && upd_kind == KIND_ADD;
@@ -457,6 +465,12 @@ module ed_tile #(
     assign reset_most = reset_e > reset_i ? reset_e : reset_i;
     assign dither_row = upd_row;
     assign dither_wanted = upd_compute;
+
+    always_comb begin : select_slot
+        upd_gate = '0;
+        for (int s = 0; s < SLOTS; s++)
+            if (upd_slot == s) upd_gate = gate[8*COLUMNS*s +: 8*COLUMNS];
+    end
 
     always_comb begin : add_group
         for (int c = 0; c < COLUMNS; c++) add_columns[c] = upd_add && used[c] && group_of[32*c +: 32] == upd_group;
@@ -478,8 +492,8 @@ module ed_tile #(
         end else if (accept_update) begin
             upd_busy <= 1'b1;
             upd_kind <= cmd_op == NOW ? KIND_NOW : cmd_op == ADD ? KIND_ADD : KIND_WRITE;
-            upd_slot <= cmd_slot;
-            upd_shift <= cmd_shift;
+            upd_slot <= cmd_op == WRITE ? 32'd0 : cmd_slot; // a command leaves 0 where it has no field
+            upd_shift <= cmd_op == ADD ? 6'd0 : cmd_shift;
         end else if (upd_add) begin
             upd_group <= upd_group == groups - 32'd1 ? 32'd0 : upd_group + 32'd1;
             if (upd_group == groups - 32'd1) begin
@@ -521,7 +535,7 @@ module ed_tile #(
         .digital(adc == DIGITAL), .adc_shift(adc_shift), .adc_code_max(adc_code_max),
         .clipped_outside(current_clipped), .code(code_e), .add(upd_add), .group_columns(add_columns),
         .compute(upd_compute), .from_sums(upd_kind == KIND_WRITE), .update_row(upd_row), .update_slot(upd_slot),
-        .update_shift(upd_shift), .gate(gate), .mantissa(mantissa), .dither_bits(dither_bits), .dither(dither_e),
+        .update_shift(upd_shift), .gate(upd_gate), .mantissa(mantissa), .dither_bits(dither_bits), .dither(dither_e),
         .increment_max(increment_max), .peak_set(set_e), .peak_reset(reset_e), .pulse_end(pulse_end),
         .upward(upd_phase == SET), .pulse_number(upd_pulse), .turn(upd_turn), .absorbing(absorbing), .floor(floor),
         .ceiling(ceiling));
@@ -535,7 +549,7 @@ module ed_tile #(
         .digital(adc == DIGITAL), .adc_shift(adc_shift), .adc_code_max(adc_code_max),
         .clipped_outside({COLUMNS{1'b0}}), .code(code_i), .add(upd_add), .group_columns(add_columns),
         .compute(upd_compute), .from_sums(upd_kind == KIND_WRITE), .update_row(upd_row), .update_slot(upd_slot),
-        .update_shift(upd_shift), .gate(gate), .mantissa(mantissa), .dither_bits(dither_bits), .dither(dither_i),
+        .update_shift(upd_shift), .gate(upd_gate), .mantissa(mantissa), .dither_bits(dither_bits), .dither(dither_i),
         .increment_max(increment_max), .peak_set(set_i), .peak_reset(reset_i), .pulse_end(pulse_end),
         .upward(upd_phase == SET), .pulse_number(upd_pulse), .turn(upd_turn), .absorbing(absorbing), .floor(floor),
         .ceiling(ceiling));

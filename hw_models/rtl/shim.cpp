@@ -1,5 +1,5 @@
 // The C interface of the verilated tile, for tests/rtl. verilate.sh includes this file after the model, with
-// ED_TILE(function) as the name of a function and ED_TILE_MODEL, ED_TILE_ROOT as the model's classes.
+// ED_TILE_NAME as the one name that is seen from outside and ED_TILE_MODEL, ED_TILE_ROOT as the model's classes.
 //
 // A cycle is: inputs, outputs, edge, registers. Registers come as 64-bit numbers in the order of docs/TILE.md,
 // section 2: a row of its table after the other, in a row register after register, of a register bank e before i.
@@ -77,7 +77,7 @@ void each_register(const ED_TILE_ROOT& root, Visit&& visit) {
     TILE(value, SLOTS * COLUMNS, 8, false);
     TILE(slope, SLOTS * COLUMNS, 8, false);
     TILE(error, COLUMNS, 9, true);
-    TILE(gate, COLUMNS, 8, true);
+    TILE(gate, SLOTS * COLUMNS, 8, true);
     BANKS(sum, ROWS * COLUMNS, 32, true);
     BANKS(pulse, COLUMNS, 8, true);
     TILE(peak_set, 1, 7, false);
@@ -112,26 +112,26 @@ void each_register(const ED_TILE_ROOT& root, Visit&& visit) {
 #undef TILE
 }
 
-}  // namespace
-
-extern "C" {
-
-// A tile after its reset. Give it back to `free`.
-Tile* ED_TILE(new)() {
-    Tile* tile = new Tile;
-    tile->top.clock = 0;
+// A cycle of reset; configuration and table stay.
+void reset(Tile* tile) {
     tile->top.reset = 1;
-    tile->top.eval();
     tile->edge();
     tile->top.reset = 0;
+}
+
+// A tile after its reset. Give it back to `destroy`.
+Tile* create() {
+    Tile* tile = new Tile;
+    tile->top.clock = 0;
     tile->top.eval();
+    reset(tile);
     return tile;
 }
 
-void ED_TILE(free)(Tile* tile) { delete tile; }
+void destroy(Tile* tile) { delete tile; }
 
 // Writes a configuration register, in a cycle of its own.
-void ED_TILE(configure)(Tile* tile, uint32_t address, uint32_t value) {
+void configure(Tile* tile, uint32_t address, uint32_t value) {
     tile->top.cmd_valid = 0;
     tile->top.config_write = 1;
     tile->top.config_address = address;
@@ -141,7 +141,7 @@ void ED_TILE(configure)(Tile* tile, uint32_t address, uint32_t value) {
 }
 
 // Writes an entry of the look-up table, in a cycle of its own.
-void ED_TILE(table)(Tile* tile, uint32_t address, uint32_t value, uint32_t slope) {
+void write_table(Tile* tile, uint32_t address, uint32_t value, uint32_t slope) {
     tile->top.cmd_valid = 0;
     tile->top.lut_write = 1;
     tile->top.lut_address = address;
@@ -151,8 +151,8 @@ void ED_TILE(table)(Tile* tile, uint32_t address, uint32_t value, uint32_t slope
     tile->top.lut_write = 0;
 }
 
-// Puts inputs on the ports, and settles what depends on them.
-void ED_TILE(inputs)(Tile* tile, const Inputs* inputs) {
+// Puts inputs on the ports, settles what depends on them, and reads the outputs.
+void set_inputs(Tile* tile, const Inputs* inputs, Outputs* outputs) {
     auto& top = tile->top;
     top.cmd_valid = inputs->valid;
     top.cmd_op = inputs->op;
@@ -167,18 +167,15 @@ void ED_TILE(inputs)(Tile* tile, const Inputs* inputs) {
     put(top.dither_e, 16, inputs->dither[0]);
     put(top.dither_i, 16, inputs->dither[1]);
     top.eval();
-}
-
-void ED_TILE(outputs)(const Tile* tile, Outputs* outputs) {
-    *outputs = {tile->top.cmd_ready, tile->top.bus_index, tile->top.dither_row, tile->top.dither_wanted};
+    *outputs = {top.cmd_ready, top.bus_index, top.dither_row, top.dither_wanted};
 }
 
 // One edge of the clock.
-void ED_TILE(edge)(Tile* tile) { tile->edge(); }
+void edge(Tile* tile) { tile->edge(); }
 
-// Names and lengths of the registers, one a line.
-const char* ED_TILE(layout)(const Tile* tile) {
-    static std::string text;
+// Names and lengths of the registers, one a line; the text lives until the thread asks again.
+const char* layout(const Tile* tile) {
+    static thread_local std::string text;
     text.clear();
     each_register(*tile->top.rootp, [](const char* name, const auto&, int count, int, bool) {
         text += std::string(name) + " " + std::to_string(count) + "\n";
@@ -187,7 +184,7 @@ const char* ED_TILE(layout)(const Tile* tile) {
 }
 
 // Every register, into as many numbers as the layout says.
-void ED_TILE(registers)(const Tile* tile, int64_t* numbers) {
+void read_registers(const Tile* tile, int64_t* numbers) {
     each_register(*tile->top.rootp, [&](const char*, const auto& signal, int count, int width, bool is_signed) {
         for (int i = 0; i < count; i++) {
             const uint64_t raw = bits(signal, i * width, width);
@@ -197,4 +194,23 @@ void ED_TILE(registers)(const Tile* tile, int64_t* numbers) {
     });
 }
 
-}  // extern "C"
+struct Functions {
+    Tile* (*create)();
+    void (*destroy)(Tile*);
+    void (*reset)(Tile*);
+    void (*configure)(Tile*, uint32_t, uint32_t);
+    void (*write_table)(Tile*, uint32_t, uint32_t, uint32_t);
+    void (*set_inputs)(Tile*, const Inputs*, Outputs*);
+    void (*edge)(Tile*);
+    const char* (*layout)(const Tile*);
+    void (*read_registers)(const Tile*, int64_t*);
+};
+
+}  // namespace
+
+// What tests/rtl calls; the order is that of `Functions` there.
+extern "C" const Functions* ED_TILE_NAME() {
+    static const Functions functions = {create,     destroy, reset,  configure,     write_table,
+                                        set_inputs, edge,    layout, read_registers};
+    return &functions;
+}

@@ -3,8 +3,8 @@
 #
 #   verilate.sh SOURCE SIZE FOLDER      SOURCE: ed_tile.sv; its other modules are sought beside it, then beside this script
 #
-# The model has SIZE rows and columns, 4 slots, 64 table entries and 4 tree stages; its C names begin with
-# ed_tile_SIZExSIZE_. Loops stay loops (--unroll-count 1), which keeps the C++ small enough to compile in seconds.
+# The model has SIZE rows and columns, 4 slots, 64 table entries and 4 tree stages; its C interface is the function
+# ed_tile_SIZExSIZE. Loops stay loops (--unroll-count 1), which keeps the C++ small enough to compile in seconds.
 set -euo pipefail
 source="$1" size="$2" folder="$3"
 here="$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)"
@@ -19,7 +19,7 @@ verilator --cc -O3 --unroll-count 1 --x-assign 0 --x-initial 0 -Wno-fatal --pref
 cd "$folder"
 parts=("V$name"*.cpp)
 {
-    echo "#define ED_TILE(function) ${name}_##function"
+    echo "#define ED_TILE_NAME $name"
     echo "#define ED_TILE_MODEL V$name"
     echo "#define ED_TILE_ROOT V${name}___024root"
     echo "constexpr int ROWS = $size, COLUMNS = $size, SLOTS = 4, TREE_MAX = 4;"
