@@ -21,7 +21,7 @@ use super::crossbar::kernel::{Backend, LookUp};
 use super::crossbar::layout::BLOCK_ROWS;
 use super::hardware::Hardware;
 use super::layer::Layer;
-use super::ledger::{During, Event, Ledger};
+use super::ledger::{Cycles, During, Event, Ledger};
 use super::population::{Stream, Wiring};
 
 mod calibrate;
@@ -31,8 +31,11 @@ mod each;
 mod error;
 mod forward;
 mod read;
+mod schedule;
 pub mod tick;
 mod update;
+
+use schedule::Schedule;
 
 pub use calibrate::Calibration;
 
@@ -90,6 +93,8 @@ pub enum Operation<'a> {
         samples: Range<usize>,
         /// `width` words a sample, for stream p; stream n latches them negated.
         words: &'a [i16],
+        /// Whether they are the words of the `ERR` before, which both layers hear at once.
+        shared: bool,
     },
     /// `UPD` for some samples.
     Update {
@@ -216,6 +221,8 @@ pub struct Engine {
     samples: usize,
     phase: Phase,
     ledgers: [Ledger; 3],
+    /// Counts cycles, on hardware that has a timing.
+    schedule: Option<Schedule>,
     trace: Option<Vec<(&'static str, u16, usize)>>,
 }
 
@@ -228,7 +235,10 @@ impl Engine {
     pub fn new(hardware: Hardware, backend: Backend, seed: u64, layers: Vec<Layer>) -> Self {
         let joined = layers.windows(2).all(|pair| pair[0].spec.units == pair[1].spec.inputs);
         assert!(joined && !layers.is_empty(), "layers follow one another");
-        let ledger = Ledger::new(layers.len());
+        let count = layers.len();
+        let schedule = hardware.timing.map(|timing| Schedule::new(&hardware, timing, &layers));
+        let ledger =
+            if schedule.is_some() { Ledger::with_cycles(count) } else { Ledger::new(count) };
         let last = layers.len() - 1;
         let codes = |layer: usize| (layer < last).then_some(hardware.drive_bits);
         let tables = layers.iter().zip(0..).map(|(l, at)| l.look_up(codes(at))).collect();
@@ -246,6 +256,7 @@ impl Engine {
             samples: 0,
             phase: Phase::Training,
             ledgers: [ledger.clone(), ledger.clone(), ledger],
+            schedule,
             trace: None,
         }
     }
@@ -261,8 +272,27 @@ impl Engine {
     }
 
     /// Charges what follows to `phase`.
-    pub const fn set_phase(&mut self, phase: Phase) {
+    pub fn set_phase(&mut self, phase: Phase) {
+        self.settle();
         self.phase = phase;
+    }
+
+    /// Ends what overlaps in time: the cycles of all operations so far are in the ledger.
+    pub fn settle(&mut self) {
+        self.time(Schedule::settle);
+    }
+
+    /// The error unit takes the mean of so many words over a batch.
+    pub fn centre(&mut self, samples: usize, words: usize) {
+        self.time(|schedule, cycles| schedule.centre(cycles, samples, words));
+    }
+
+    /// Counts cycles, if there is a timing.
+    fn time(&mut self, count: impl FnOnce(&mut Schedule, &mut Cycles)) {
+        let cycles = self.ledgers[self.phase as usize].cycles_mut();
+        if let (Some(schedule), Some(cycles)) = (&mut self.schedule, cycles) {
+            count(schedule, cycles);
+        }
     }
 
     /// Starts or stops recording (operation, layer, samples).
@@ -371,12 +401,17 @@ impl Engine {
                 self.row_sums[layer] = None;
                 let (during, count) = (During::LoadWeights, levels.len() as u64);
                 self.charge(layer, pathway, during, Event::CellLoads, count);
+                self.time(|schedule, cycles| schedule.load(cycles, layer));
             }
-            Operation::LoadDrives { codes } => self.load_drives(codes),
+            Operation::LoadDrives { codes } => {
+                self.settle();
+                self.load_drives(codes);
+            }
             Operation::Forward { layer, side: Side::Rows } => self.forward(layer),
             Operation::Forward { layer, side: Side::Columns } => self.forward_columns(layer),
-            Operation::Error { layer, ref samples, words } => {
+            Operation::Error { layer, ref samples, words, shared } => {
                 self.error(layer, samples.clone(), words);
+                self.time(|schedule, cycles| schedule.error(cycles, layer, samples, shared));
             }
             Operation::Update { layer, write, ref samples, shift } => {
                 self.update(layer, write, samples.clone(), shift);
