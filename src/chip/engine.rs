@@ -30,14 +30,17 @@ mod currents;
 mod each;
 mod error;
 mod forward;
+mod passes;
 mod read;
 mod schedule;
+mod tape;
 pub mod tick;
 mod update;
 
 use schedule::Schedule;
 
 pub use calibrate::Calibration;
+pub use tape::Recorded;
 
 /// Which side of a crossbar is driven.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -223,7 +226,8 @@ pub struct Engine {
     ledgers: [Ledger; 3],
     /// Counts cycles, on hardware that has a timing.
     schedule: Option<Schedule>,
-    trace: Option<Vec<(&'static str, u16, usize)>>,
+    /// What was executed since drives were last loaded, while recording.
+    tape: Option<Vec<Recorded>>,
 }
 
 impl Engine {
@@ -257,7 +261,7 @@ impl Engine {
             phase: Phase::Training,
             ledgers: [ledger.clone(), ledger.clone(), ledger],
             schedule,
-            trace: None,
+            tape: None,
         }
     }
 
@@ -269,6 +273,18 @@ impl Engine {
     /// Sets the small factor of the rate, 1..=15.
     pub const fn set_mantissa(&mut self, mantissa: u32) {
         self.mantissa = mantissa;
+    }
+
+    /// Small factor of the rate.
+    #[must_use]
+    pub const fn mantissa(&self) -> u32 {
+        self.mantissa
+    }
+
+    /// Whether writes only potentiate.
+    #[must_use]
+    pub const fn potentiation_only(&self) -> bool {
+        self.potentiation_only
     }
 
     /// Charges what follows to `phase`.
@@ -284,6 +300,9 @@ impl Engine {
 
     /// The error unit takes the mean of so many words over a batch.
     pub fn centre(&mut self, samples: usize, words: usize) {
+        if let Some(tape) = &mut self.tape {
+            tape.push(Recorded::Centre { samples, words });
+        }
         self.time(|schedule, cycles| schedule.centre(cycles, samples, words));
     }
 
@@ -295,15 +314,9 @@ impl Engine {
         }
     }
 
-    /// Starts or stops recording (operation, layer, samples).
-    pub fn set_trace(&mut self, on: bool) {
-        self.trace = on.then(Vec::new);
-    }
-
-    /// What was recorded: operation, layer, samples.
-    #[must_use]
-    pub fn trace(&self) -> &[(&'static str, u16, usize)] {
-        self.trace.as_deref().unwrap_or_default()
+    /// Starts recording operations, or stops and gives what was executed since drives were last loaded.
+    pub fn record(&mut self, on: bool) -> Vec<Recorded> {
+        std::mem::replace(&mut self.tape, on.then(Vec::new)).unwrap_or_default()
     }
 
     /// The chip.
@@ -391,8 +404,11 @@ impl Engine {
     /// # Panics
     /// When the numbers do not have the shape the operation says: tasks and rules are our own code.
     pub fn execute(&mut self, operation: &Operation<'_>) {
-        if self.trace.is_some() {
-            self.record(operation);
+        if let Some(tape) = &mut self.tape {
+            if matches!(operation, Operation::LoadDrives { .. }) {
+                tape.clear();
+            }
+            tape.push(Recorded::new(operation));
         }
         match *operation {
             Operation::LoadWeights { layer, array, row, levels } => {
@@ -417,19 +433,6 @@ impl Engine {
                 self.update(layer, write, samples.clone(), shift);
             }
         }
-    }
-
-    fn record(&mut self, operation: &Operation<'_>) {
-        let (layer, samples) = match operation {
-            Operation::LoadWeights { layer, .. } => (*layer, 1),
-            Operation::LoadDrives { codes } => (0, codes.len() / self.layers[0].spec.inputs),
-            Operation::Forward { layer, .. } => (*layer, self.samples),
-            Operation::Error { layer, samples, .. } | Operation::Update { layer, samples, .. } => {
-                (*layer, samples.len())
-            }
-        };
-        let entry = (operation.name(), self.layers[layer].index, samples);
-        self.trace.as_mut().expect("only called while recording").push(entry);
     }
 
     fn load_drives(&mut self, codes: &[u8]) {

@@ -8,8 +8,8 @@
 
 use std::ops::Range;
 
-use super::super::{Operation, Phase, Side, Write};
-use super::tile::{BankEvents, Command, TileEvents};
+use super::super::{Operation, Phase, Recorded, Side, Write};
+use super::tile::{BankEvents, Command, Tile, TileEvents};
 use crate::chip::hardware::{Hardware, Timing};
 use crate::chip::layer::Layer;
 use crate::chip::ledger::{Cycles, During, Event, Ledger, Part, Stage};
@@ -17,9 +17,12 @@ use crate::chip::population::Stream;
 
 mod layer;
 mod segment;
+mod watch;
 
 use layer::TickLayer;
 use segment::Segment;
+use watch::Watch;
+pub use watch::{Span, TileAt};
 
 /// A network, its cycles and its counts.
 #[derive(Debug)]
@@ -29,6 +32,9 @@ pub struct Network {
     samples: usize,
     phase: Phase,
     ledgers: [Ledger; 3],
+    /// Cycles played so far.
+    clock: u64,
+    watch: Watch,
 }
 
 /// A command for one layer, of one sample where it has one.
@@ -57,6 +63,8 @@ impl Network {
             samples: 0,
             phase: Phase::Training,
             ledgers: [ledger.clone(), ledger.clone(), ledger],
+            clock: 0,
+            watch: Watch::default(),
         }
     }
 
@@ -113,14 +121,67 @@ impl Network {
         &self.layers[layer].backward
     }
 
+    /// Cycles played so far.
+    #[must_use]
+    pub const fn clock(&self) -> u64 {
+        self.clock
+    }
+
+    /// Starts keeping what every layer did when.
+    pub fn keep_spans(&mut self) {
+        self.watch.keep_spans();
+    }
+
+    /// What was kept since the last call.
+    pub fn take_spans(&mut self) -> Vec<Span> {
+        self.watch.take_spans()
+    }
+
+    /// Shows a tile at the end of every cycle. Nothing happens when there is no such tile: see [`Network::grid`].
+    pub fn watch_tile(&mut self, at: TileAt, look: impl FnMut(u64, &Tile) + 'static) {
+        self.watch.tile(at, Box::new(look));
+    }
+
+    /// Target streams, tiles down and tiles across of a layer.
+    #[must_use]
+    pub fn grid(&self, layer: usize) -> [usize; 3] {
+        self.layers[layer].grid()
+    }
+
     fn cycles(&mut self) -> &mut Cycles {
         self.ledgers[self.phase as usize].cycles_mut().expect("made with cycles")
     }
 
+    /// A cycle of the whole chip begins.
+    fn begin(&mut self, stage: Stage) {
+        self.cycles().pass(stage, 1);
+    }
+
+    /// It has ended.
+    fn end(&mut self) {
+        self.clock += 1;
+        self.watch.look(self.clock, &self.layers);
+    }
+
     /// The error unit takes the mean over a batch.
     pub fn centre(&mut self, samples: usize, words: usize) {
+        let start = self.clock;
         for _ in 0..self.timing.beat * (samples * words + words) as u64 {
-            self.cycles().pass(Stage::Centre, 1);
+            self.begin(Stage::Centre);
+            self.end();
+        }
+        self.watch.span(Span { layer: None, name: "mean", sample: None, start, end: self.clock });
+    }
+
+    /// Plays what an engine has recorded.
+    pub fn play_tape(&mut self, tape: &[Recorded]) {
+        let error_unit = |recorded: &Recorded| matches!(recorded, Recorded::Centre { .. });
+        for stretch in tape.split_inclusive(error_unit) {
+            let operations: Vec<_> = stretch.iter().filter_map(Recorded::operation).collect();
+            self.run(&operations);
+            if let Some(&Recorded::Centre { samples, words }) = stretch.last() {
+                self.centre(samples, words);
+            }
         }
     }
 
@@ -136,8 +197,9 @@ impl Network {
                     let code = self.layers[layer].load_row(array, row, levels);
                     self.charge(layer, code, During::LoadWeights, Event::CellLoads, levels.len() as u64);
                     for _ in 0..self.timing.beat {
-                        self.cycles().pass(Stage::Load, 1);
+                        self.begin(Stage::Load);
                         self.cycles().occupy(layer, During::LoadWeights, 1);
+                        self.end();
                     }
                 }
                 Segment::Reads { layers, samples } => self.reads(layers, samples),
@@ -171,14 +233,18 @@ impl Network {
         let (mut issued, mut done) = (vec![0; count], vec![0; count]);
         // cycles for which the next command has been offered
         let mut offered = vec![0; count];
+        let mut started = vec![vec![]; count];
         let beat = self.timing.beat;
         while done[layers.end - 1] < samples {
-            self.cycles().pass(Stage::Forward, 1);
+            self.begin(Stage::Forward);
             for layer in layers.clone() {
                 let command = Command::Forward { slot: issued[layer] };
                 let there = layer == layers.start || done[layer - 1] > issued[layer];
                 let offer = issued[layer] < samples && there && self.layers[layer].ready(&command);
                 offered[layer] = if offer { offered[layer] + 1 } else { 0 };
+                if offered[layer] == 1 {
+                    started[layer].push(self.clock);
+                }
                 let given = (offered[layer] == beat).then_some(command);
                 self.account(layer, During::ForwardRows, offer);
                 self.layers[layer].cycle(given.as_ref(), &[]);
@@ -187,10 +253,15 @@ impl Network {
                     offered[layer] = 0;
                 }
             }
+            self.end();
             for layer in layers.clone() {
                 if self.layers[layer].looked_up() {
-                    self.hand_on(layer, done[layer]);
+                    let sample = done[layer];
+                    self.hand_on(layer, sample);
                     done[layer] += 1;
+                    let (start, end) = (started[layer][sample], self.clock);
+                    let (layer, sample) = (Some(layer), Some(sample));
+                    self.watch.span(Span { layer, name: "FWD(rows)", sample, start, end });
                 }
             }
         }
@@ -288,8 +359,9 @@ impl Network {
 
     /// Commands of different layers, accepted together; until the last of them is done.
     fn play(&mut self, orders: &[Order<'_>], stage: Stage) {
+        let start = self.clock;
         for offered in 1..=self.timing.beat {
-            self.cycles().pass(stage, 1);
+            self.begin(stage);
             for order in orders {
                 let given = (offered == self.timing.beat).then_some(order.command);
                 let layer = &mut self.layers[order.layer];
@@ -297,13 +369,26 @@ impl Network {
                 layer.cycle(given.as_ref(), order.words);
                 self.cycles().occupy(order.layer, order.during, 1);
             }
+            self.end();
         }
+        let mut ends = vec![None; orders.len()];
         while orders.iter().any(|order| !self.layers[order.layer].idle()) {
-            self.cycles().pass(stage, 1);
+            self.begin(stage);
             for order in orders {
                 self.account(order.layer, order.during, false);
                 self.layers[order.layer].cycle(None, order.words);
             }
+            self.end();
+            for (order, end) in orders.iter().zip(&mut ends) {
+                if end.is_none() && self.layers[order.layer].idle() {
+                    *end = Some(self.clock);
+                }
+            }
+        }
+        for (order, end) in orders.iter().zip(ends) {
+            let (name, sample) = order.command.name();
+            let end = end.unwrap_or(self.clock);
+            self.watch.span(Span { layer: Some(order.layer), name, sample, start, end });
         }
         for order in orders {
             let now = matches!(order.command, Command::Now { .. });

@@ -220,6 +220,23 @@ pub enum Command<'a> {
     },
 }
 
+impl Command<'_> {
+    /// As the instruction is written, and the sample it is for.
+    #[must_use]
+    pub const fn name(&self) -> (&'static str, Option<usize>) {
+        match *self {
+            Self::LoadWeights { .. } => ("LOADW(row)", None),
+            Self::LoadDrives { slot, .. } => ("LOADX(row)", Some(slot)),
+            Self::Forward { slot } => ("FWD(rows)", Some(slot)),
+            Self::Columns { slot } => ("FWD(columns)", Some(slot)),
+            Self::Error { slot } => ("ERR(words)", Some(slot)),
+            Self::Now { slot, .. } => ("UPD(now)", Some(slot)),
+            Self::Add { slot } => ("UPD(add)", Some(slot)),
+            Self::Write { .. } => ("UPD(write)", None),
+        }
+    }
+}
+
 /// Counters of one bank, in the order of docs/TILE.md, 6.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct BankEvents {

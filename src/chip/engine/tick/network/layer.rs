@@ -143,6 +143,18 @@ impl TickLayer {
         (target.index() * self.grid[0] + down) * self.grid[1] + across
     }
 
+    /// Targets, tiles down, tiles across.
+    pub(super) fn grid(&self) -> [usize; 3] {
+        [self.wiring.targets().len(), self.grid[0], self.grid[1]]
+    }
+
+    /// The tile at a place of the grid, if there is one.
+    pub(super) fn tile_at(&self, at: &super::TileAt) -> Option<&Tile> {
+        let [targets, downs, acrosses] = self.grid();
+        let inside = at.target < targets && at.down < downs && at.across < acrosses;
+        inside.then(|| &self.tiles[(at.target * downs + at.down) * acrosses + at.across])
+    }
+
     /// Target and bank of an array.
     fn bank(&self, array: usize) -> (Stream, usize) {
         let target = self.wiring.pathways()[array].target;
