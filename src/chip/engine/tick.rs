@@ -5,8 +5,10 @@
 //! Slow on purpose: nothing here is clever.
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
+mod network;
 mod tile;
 
+pub use network::{Network, Span, TileAt};
 pub use tile::{
     BankEvents, Command, Launch, More, Tile, TileAdc, TileConfig, TileEvents, TileSize,
 };

@@ -15,10 +15,12 @@ use aligned_vec::AVec;
 
 use super::each::each;
 use super::error::{gates_of, stride_of};
+use super::passes::Passes;
 use super::{Engine, Write};
 use crate::chip::crossbar::kernel::{self, Kernel, WriteCounts};
 use crate::chip::crossbar::layout::{BLOCK_ROWS, PANEL_COLUMNS};
 use crate::chip::crossbar::{Crossbar, StripMut, WriteRequest};
+use crate::chip::hardware::{PulseCode, Timing};
 use crate::chip::ledger::{During, Event};
 use crate::chip::population::{Polarity, Stream};
 use crate::num::draw::{Place, Site};
@@ -31,25 +33,50 @@ impl Engine {
                 assert_eq!(*pending, samples.start, "samples are added in order");
                 *pending = samples.end;
                 self.charge_accumulate(layer, samples.len());
+                // the sum of a cell is read and stored again
+                self.charge_cells(layer, Event::SramBits, 2 * SUM_BITS * samples.len() as u64);
+                self.time(|schedule, cycles| schedule.add(cycles, layer, &samples));
             }
             Write::Program => {
                 let added = std::mem::take(pending);
                 self.program(layer, 0..added, shift);
+                // read and cleared
+                self.charge_cells(layer, Event::SramBits, 2 * SUM_BITS);
+                self.charge_time(layer, write, &samples);
             }
             Write::Now => {
                 assert!(*pending == 0 && samples.len() == 1, "now takes one sample");
                 self.charge_accumulate(layer, 1);
-                self.program(layer, samples, shift);
+                self.program(layer, samples.clone(), shift);
+                self.charge_time(layer, write, &samples);
             }
         }
     }
 
-    fn charge_accumulate(&mut self, layer: usize, samples: usize) {
-        let this = &self.layers[layer];
-        let cells = this.layout.cells() as u64 * samples as u64;
-        for pathway in this.spec.wiring.pathways() {
-            self.charge(layer, pathway.code, During::Update, Event::Accumulates, cells);
+    /// Charges a write's time and what depends on it.
+    fn charge_time(&mut self, layer: usize, write: Write, samples: &Range<usize>) {
+        let Some(timing) = self.hardware.timing else { return };
+        let pulses = self.take_pulses(layer);
+        let passes = Passes::new(&self.hardware, timing, &self.layers[layer], pulses.as_ref());
+        let wiring = self.layers[layer].spec.wiring;
+        for &target in wiring.targets() {
+            let code = Self::code_of(wiring, target);
+            let count = passes.by_target[target.index()];
+            self.charge(layer, code, During::Update, Event::RowPulses, count);
         }
+        self.time(|schedule, cycles| schedule.program(cycles, layer, write, samples, passes.busy));
+    }
+
+    /// Charges something of every cell of every array.
+    fn charge_cells(&mut self, layer: usize, event: Event, each: u64) {
+        let cells = self.layers[layer].layout.cells() as u64;
+        for pathway in self.layers[layer].spec.wiring.pathways() {
+            self.charge(layer, pathway.code, During::Update, event, cells * each);
+        }
+    }
+
+    fn charge_accumulate(&mut self, layer: usize, samples: usize) {
+        self.charge_cells(layer, Event::Accumulates, samples as u64);
     }
 
     /// Programs the sums over `samples` and counts one write of each array.
@@ -65,16 +92,16 @@ impl Engine {
                     (Event::Bounded, counts.bounded),
                     (Event::PulsesAttempted, counts.attempted),
                     (Event::PulsesEffective, counts.effective),
+                    (Event::VerifyReads, verified(self.hardware.timing, counts)),
                 ] {
                     self.charge(layer, code, During::Update, event, count);
                 }
             }
         }
         self.layers[layer].writes.iter_mut().for_each(|writes| *writes += 1);
-        let cells = self.layers[layer].layout.cells() as u64;
-        for pathway in wiring.pathways() {
-            self.charge(layer, pathway.code, During::Update, Event::DeltaComputations, cells);
-        }
+        self.charge_cells(layer, Event::DeltaComputations, 1);
+        let remainder = 2 * u64::from(self.hardware.residual_bits.get());
+        self.charge_cells(layer, Event::SramBits, remainder);
     }
 
     fn program_some(
@@ -183,6 +210,18 @@ impl Engine {
                 live
             })
             .collect()
+    }
+}
+
+/// Bits of the sum of a cell in digital memory.
+const SUM_BITS: u64 = 32;
+
+/// Cells read after pulses to see what those did: one a pulse that was given.
+fn verified(timing: Option<Timing>, counts: WriteCounts) -> u64 {
+    match timing {
+        Some(Timing { verify: true, pulse_code: PulseCode::Unary, .. }) => counts.attempted,
+        Some(Timing { verify: true, pulse_code: PulseCode::Amplitude, .. }) => counts.requested,
+        _ => 0,
     }
 }
 

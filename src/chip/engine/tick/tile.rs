@@ -8,8 +8,9 @@
 //! verified, limited and amplitude-coded pulses, reads from the columns, and digital actions of more than one cycle.
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
-use super::super::super::hardware::PulseCode;
+use crate::chip::hardware::PulseCode;
 
+mod network;
 mod read;
 mod registers;
 mod write;
@@ -120,6 +121,8 @@ pub struct More {
     pub beat: u64,
     /// Whether only potentiating gates count: positive ones in bank e, negative ones in bank i.
     pub potentiation_only: bool,
+    /// Added to the shift of a write.
+    pub shift_extra: u32,
     /// Fractional bits of the remainder behind a cell.
     pub residual_bits: u32,
     /// Whether each pulse is followed by a read.
@@ -139,6 +142,7 @@ impl Default for More {
             tap_shift: 0,
             beat: 1,
             potentiation_only: false,
+            shift_extra: 0,
             residual_bits: 0,
             verify: false,
             active_max: None,
@@ -187,8 +191,11 @@ pub enum Command<'a> {
         /// Which sample.
         slot: usize,
     },
-    /// `FWD(columns)`, of the gates that are latched.
-    Columns,
+    /// `FWD(columns)`, driven by gates.
+    Columns {
+        /// Which sample.
+        slot: usize,
+    },
     /// `ERR`.
     Error {
         /// Which sample.
@@ -211,6 +218,23 @@ pub enum Command<'a> {
         /// k.
         shift: u32,
     },
+}
+
+impl Command<'_> {
+    /// As the instruction is written, and the sample it is for.
+    #[must_use]
+    pub const fn name(&self) -> (&'static str, Option<usize>) {
+        match *self {
+            Self::LoadWeights { .. } => ("LOADW(row)", None),
+            Self::LoadDrives { slot, .. } => ("LOADX(row)", Some(slot)),
+            Self::Forward { slot } => ("FWD(rows)", Some(slot)),
+            Self::Columns { slot } => ("FWD(columns)", Some(slot)),
+            Self::Error { slot } => ("ERR(words)", Some(slot)),
+            Self::Now { slot, .. } => ("UPD(now)", Some(slot)),
+            Self::Add { slot } => ("UPD(add)", Some(slot)),
+            Self::Write { .. } => ("UPD(write)", None),
+        }
+    }
 }
 
 /// Counters of one bank, in the order of docs/TILE.md, 6.
@@ -395,6 +419,7 @@ pub struct Tile {
     error: Vec<i64>,
     /// Sums of taps while words arrive.
     heard: Vec<i64>,
+    /// `[slot][column]`.
     gate: Vec<i64>,
     sum: [Vec<i64>; 2],
     pulse: [Vec<i64>; 2],
@@ -408,6 +433,8 @@ pub struct Tile {
     bank_events: [BankEvents; 2],
     events: TileEvents,
     launched: Option<(Launch, Way)>,
+    /// Whether the lanes have seen the last group of a sample in this cycle.
+    looked_up: bool,
 }
 
 impl Tile {
@@ -441,7 +468,7 @@ impl Tile {
             backward: vec![0; size.rows],
             error: vec![0; size.columns],
             heard: vec![0; size.columns],
-            gate: vec![0; size.columns],
+            gate: vec![0; size.slots * size.columns],
             sum: two(cells),
             pulse: two(size.columns),
             peak_set: 0,
@@ -454,6 +481,7 @@ impl Tile {
             bank_events: Default::default(),
             events: TileEvents::default(),
             launched: None,
+            looked_up: false,
             size,
             config,
             table,
@@ -512,6 +540,7 @@ impl Tile {
     pub fn cycle(&mut self, command: Option<&Command<'_>>, bus_word: i16, dither: [&[u16]; 2]) {
         let accepted = command.filter(|command| self.ready(command));
         self.launched = None;
+        self.looked_up = false;
         self.lanes();
         self.tree();
         self.converters();
@@ -541,7 +570,7 @@ impl Tile {
                 }
             }
             Command::Forward { slot } => self.front = read(slot, Way::Rows),
-            Command::Columns => self.front = read(0, Way::Columns),
+            Command::Columns { slot } => self.front = read(slot, Way::Columns),
             Command::Error { slot } => {
                 self.heard.fill(0);
                 self.err = Err { busy: true, slot, ..Err::default() };

@@ -18,7 +18,7 @@ impl Tile {
     }
 
     /// Slices of a read: both phases, from the columns.
-    const fn read_slices(&self, way: Way) -> u32 {
+    pub(super) const fn read_slices(&self, way: Way) -> u32 {
         match way {
             Way::Rows => self.config.slices,
             Way::Columns => 2 * self.config.slices,
@@ -113,7 +113,7 @@ impl Tile {
     fn column_part(&self, column: usize) -> i64 {
         let (phase, slice) =
             (self.front.slice / self.config.slices, self.front.slice % self.config.slices);
-        let gate = self.gate[column];
+        let gate = self.gate[self.front.slot * self.size.columns + column];
         let driven = if phase == 0 { gate.max(0) } else { (-gate).max(0) };
         let part = driven >> (slice * self.config.dac_bits);
         if slice + 1 == self.config.slices {
@@ -268,6 +268,7 @@ impl Tile {
         if self.lane.group == self.groups(lines) {
             self.lane.busy = false;
             self.lane.group = 0;
+            self.looked_up = true;
         }
     }
 

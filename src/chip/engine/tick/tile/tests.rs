@@ -140,7 +140,7 @@ fn pulses_take_as_many_passes_as_the_most_active_cell() {
 fn limited_and_verified_pulses_take_the_passes_they_need() {
     let more = More { verify: true, active_max: Some(2), ..More::default() };
     let mut tile = tile(TileConfig { more, ..config() });
-    tile.gate = vec![0, 100, 100, 0, 100];
+    tile.gate[..5].copy_from_slice(&[0, 100, 100, 0, 100]);
     tile.config.mantissa = 1;
     // rows drive 0, 60, 120 (e) and 1, 61, 121 (i): 6,000 >> 11 rounds to 3, 12,000 to 6
     let cycles = run(&mut tile, &Command::Now { slot: 0, shift: 11 });
@@ -153,7 +153,7 @@ fn limited_and_verified_pulses_take_the_passes_they_need() {
 fn an_amplitude_moves_many_levels_in_one_pulse() {
     let more = More { pulse_code: PulseCode::Amplitude, ..More::default() };
     let mut tile = tile(TileConfig { more, ..config() });
-    tile.gate = vec![0, 100, 100, 0, 100];
+    tile.gate[..5].copy_from_slice(&[0, 100, 100, 0, 100]);
     let before = tile.level[0][2 * 5 + 1];
     let cycles = run(&mut tile, &Command::Now { slot: 0, shift: 11 });
     assert_eq!(cycles, 3 * 2 + 2 * 2 * 3);

@@ -56,9 +56,10 @@ impl Tile {
             }
             self.error[column] = if self.config.negate { -word } else { word };
         }
-        let slope = self.slope[self.err.slot * self.size.columns + column];
+        let at = self.err.slot * self.size.columns + column;
+        let slope = self.slope[at];
         let (u, saturated) = sat(rsh(self.error[column] * i64::from(slope), bits), 8);
-        self.gate[column] = u;
+        self.gate[at] = u;
         self.events.multiplies += 1;
         self.events.saturated_gates += u64::from(saturated);
     }
@@ -99,7 +100,7 @@ impl Tile {
     /// The product of a row's drive and a column's gate as a bank takes it.
     fn outer(&self, bank: usize, column: usize) -> i64 {
         let drive = i64::from(self.drive[bank][self.upd.slot * self.size.rows + self.upd.row]);
-        let gate = self.gate[column];
+        let gate = self.gate[self.upd.slot * self.size.columns + column];
         let only = self.config.more.potentiation_only;
         match bank {
             0 if only => drive * gate.max(0),
@@ -198,7 +199,8 @@ impl Tile {
     /// `SR(total, k)`, `F` bits finer.
     fn rounded(&self, total: i64, word: u16, fraction: u32) -> i64 {
         let dither = self.config.dither_bits;
-        let shift = i64::from(self.upd.shift) - i64::from(fraction) - i64::from(dither);
+        let shift = i64::from(self.upd.shift + self.config.more.shift_extra);
+        let shift = shift - i64::from(fraction) - i64::from(dither);
         let q = match u32::try_from(shift) {
             Ok(right) => rsh(total, right),
             Err(_) => total << shift.unsigned_abs(),
