@@ -563,9 +563,9 @@ impl Program {
         Offer::Drives { row, slot, codes: [self.code(), self.code()] }
     }
 
-    /// Any command.
+    /// Any command; loads also of rows that are not in use.
     fn any(&mut self) -> Offer {
-        let row = self.words.below(self.config.rows);
+        let row = self.words.below(self.dither[0].len());
         match self.words.below(7) {
             0 => self.weights(row),
             1 => {

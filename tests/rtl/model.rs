@@ -150,10 +150,11 @@ impl Rtl {
         let mut inputs = Inputs {
             valid: command.is_some().into(),
             op: 0,
-            row: 0,
-            slot: 0,
-            shift: 0,
-            code: [0; 2],
+            // what a command has no field for carries something all the same
+            row: 1,
+            slot: 2,
+            shift: 5,
+            code: [0xa5, 0x5a],
             bus_word: bus_word.into(),
             level: [std::ptr::null(); 2],
             dither: [std::ptr::null(); 2],
@@ -166,6 +167,8 @@ impl Rtl {
             Some(Command::LoadWeights { row, levels }) => {
                 inputs.row = narrow(*row);
                 for bank in 0..2 {
+                    // so do the columns that are not in use
+                    self.ports[bank].fill(0xabc);
                     self.ports[bank][..levels[bank].len()].copy_from_slice(levels[bank]);
                 }
             }
