@@ -17,6 +17,7 @@ use std::ops::Range;
 
 use aligned_vec::{AVec, CACHELINE_ALIGN};
 
+use super::crossbar::Collect;
 use super::crossbar::kernel::{Backend, LookUp};
 use super::crossbar::layout::BLOCK_ROWS;
 use super::hardware::Hardware;
@@ -31,6 +32,7 @@ mod each;
 mod error;
 mod forward;
 mod passes;
+mod pulses;
 mod read;
 mod schedule;
 mod tape;
@@ -40,6 +42,7 @@ mod update;
 use schedule::Schedule;
 
 pub use calibrate::Calibration;
+pub use pulses::{Pulses, TilePeaks, active};
 pub use tape::Recorded;
 
 /// Which side of a crossbar is driven.
@@ -175,6 +178,8 @@ struct Registers {
     backward: Vec<i64>,
     /// Samples added and not yet programmed, and their shift.
     pending: usize,
+    /// Pulses of the last write, while they are collected.
+    pulses: Option<Pulses>,
 }
 
 /// Numbers that start on a line of the processor's cache.
@@ -212,6 +217,8 @@ pub struct Engine {
     seed: u64,
     /// Only potentiating pulses: excitatory arrays take positive gates, inhibitory ones negative gates.
     potentiation_only: bool,
+    /// What is told of the pulses of a write.
+    collect: Collect,
     /// Rate mantissa.
     mantissa: u32,
     layers: Vec<Layer>,
@@ -251,6 +258,7 @@ impl Engine {
             backend,
             seed,
             potentiation_only: false,
+            collect: passes::collect(&hardware),
             mantissa: 1,
             registers: vec![Registers::default(); layers.len()],
             currents: vec![[[0; 2]; 2]; layers.len()],

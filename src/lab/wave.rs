@@ -66,7 +66,7 @@ pub fn record(
         session
     };
     let mut after = session()?;
-    after.record();
+    after.keep_tape();
     after.updates(look.update)?;
     let tape = after.take_tape();
     let samples = samples_of(&tape, before.trainer().driver().engine().layers()[0].spec.inputs);

@@ -116,7 +116,7 @@ impl Session {
     }
 
     /// Starts recording operations; what was read before the last samples were loaded is forgotten.
-    pub fn record(&mut self) {
+    pub fn keep_tape(&mut self) {
         let _ = self.trainer.driver_mut().engine_mut().record(true);
     }
 

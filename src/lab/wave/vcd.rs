@@ -1,6 +1,6 @@
 //! Registers of a tile as a value change dump. Only what changed in a cycle is written.
 
-use vcd::{IdCode, TimescaleUnit, Value, Vector, VarType};
+use vcd::{IdCode, TimescaleUnit, Value, VarType};
 
 use super::NUMBERS_MAX;
 
@@ -55,8 +55,7 @@ impl Writer {
                     if register.width == 1 {
                         self.out.change_scalar(*code, bit(0))?;
                     } else {
-                        let bits: Vector = (0..register.width).rev().map(bit).collect();
-                        self.out.change_vector(*code, &bits)?;
+                        self.out.change_vector(*code, (0..register.width).rev().map(bit))?;
                     }
                 }
             }
@@ -96,9 +95,7 @@ impl Writer {
 
     /// The text so far.
     pub(super) fn finish(&mut self) -> Vec<u8> {
-        let fresh = vcd::Writer::new(Vec::new());
-        let out = std::mem::replace(&mut self.out, fresh);
-        out.into_inner()
+        std::mem::take(self.out.writer())
     }
 }
 

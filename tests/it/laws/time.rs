@@ -38,7 +38,9 @@ pub(crate) fn law(net: &Net, choices: &[Choice], seed: u64) -> Result<(), String
         operations.iter().for_each(|operation| engine.execute(operation));
         engine.settle();
         tick.run(&operations);
-        let outputs = stretch.iter().any(|op| matches!(op, Op::Forward(layer) if *layer + 1 == net.specs.len()));
+        let last = |op: &&Op| matches!(op, Op::Forward(layer) if *layer + 1 == net.specs.len());
+        let loaded = |op: &&Op| matches!(op, Op::Drives(_));
+        let outputs = stretch.iter().rev().take_while(|op| !loaded(op)).any(|op| last(&op));
         compare(&engine, &tick, outputs).map_err(|what| format!("after {stretch:?}: {what}"))?;
     }
     Ok(())
