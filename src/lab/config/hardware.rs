@@ -1,7 +1,8 @@
 //! Hardware models: the built-in ones, and files.
 
 use super::file::HardwareFile;
-use super::{ConfigError, check};
+use super::quantity::Constants;
+use super::{ConfigError, chip};
 use crate::chip::hardware::Hardware;
 
 /// The built-in models, by name, as their files are.
@@ -22,6 +23,8 @@ pub struct Model {
     pub text: String,
     /// The chip.
     pub hardware: Hardware,
+    /// What its events, its parts and its idling cost.
+    pub constants: Constants,
     /// What is not simulated.
     pub not_simulated: Vec<(String, String)>,
 }
@@ -101,7 +104,7 @@ fn provenance(file: &HardwareFile) -> Vec<(&'static str, Option<&str>, Option<&s
             }
         )*};
     }
-    table!(cell tile drive lut error write);
+    table!(cell tile drive lut error write timing);
     if let Some(super::file::AdcFile::Finite(table)) = &file.adc {
         all.push(("adc", table.source.as_deref(), table.kind.as_deref()));
     }
@@ -115,11 +118,14 @@ fn provenance(file: &HardwareFile) -> Vec<(&'static str, Option<&str>, Option<&s
 pub fn load_model(name: &str) -> Result<Model, ConfigError> {
     let text = model_text(name)?;
     let file = model_file(name, &text)?;
-    let hardware = check::hardware(&file, "")?;
+    let mut resolved = file.clone();
+    let hardware = chip::resolve(&mut resolved, "")?;
+    let constants = Constants::new(&file, "")?;
     Ok(Model {
         name: file.name.clone().unwrap_or_default(),
         summary: file.summary.clone().unwrap_or_default(),
         hardware,
+        constants,
         not_simulated: file.not_simulated.unwrap_or_default().into_iter().collect(),
         text,
     })
