@@ -6,11 +6,14 @@ use super::{ConfigError, chip};
 use crate::chip::hardware::Hardware;
 
 /// The built-in models, by name, as their files are.
-const BUILTIN: [(&str, &str); 3] = [
-    ("ideal", include_str!("../../../hw_models/ideal.toml")),
-    ("prime", include_str!("../../../hw_models/prime.toml")),
-    ("isaac", include_str!("../../../hw_models/isaac.toml")),
-];
+macro_rules! models {
+    ($($name:literal)*) => {
+        [$(($name, include_str!(concat!("../../../hw_models/", $name, ".toml"))),)*]
+    };
+}
+const BUILTIN: [(&str, &str); 13] = models!(
+    "ideal" "prime" "isaac" "reram" "pcm14" "ecram" "fefet" "sram" "neurram" "hermes" "mrr" "photonic_pcm" "mzi"
+);
 
 /// A checked hardware model.
 #[derive(Debug, Clone)]
@@ -139,7 +142,10 @@ mod tests {
     fn the_built_in_models_are_valid_and_named_like_their_files() {
         let models = builtin_models();
         assert!(models.iter().map(|model| model.name.as_str()).eq(model_names()));
-        assert!(models.iter().all(|model| !model.summary.is_empty()));
+        for model in models {
+            assert!(!model.summary.is_empty() && model.hardware.timing.is_some(), "{}", model.name);
+            assert_eq!(model.constants.complaints(), [""; 0], "{}", model.name);
+        }
     }
 
     #[test]
