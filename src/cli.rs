@@ -22,6 +22,7 @@ mod data;
 mod hw;
 mod progress;
 mod run;
+mod trace;
 
 /// What stops a command.
 #[derive(Debug)]
@@ -74,6 +75,8 @@ enum Command {
     /// Show and check hardware models
     #[command(subcommand)]
     Hw(hw::HwCommand),
+    /// Write one update as waves: registers of a tile (VCD), operations of all tiles (Perfetto)
+    Trace(trace::TraceArgs),
     /// Measure how fast this machine is: kernels, and whole updates
     Bench(bench::BenchArgs),
     /// Print completions for a shell
@@ -180,6 +183,7 @@ pub fn main() -> ExitCode {
         Command::Verify(args) => run::verify(&args),
         Command::Data(command) => data::execute(&command),
         Command::Hw(command) => hw::execute(&command),
+        Command::Trace(args) => trace::execute(&args),
         Command::Bench(args) => bench::execute(&args),
         Command::Completions { shell } => {
             let mut script = Vec::new();

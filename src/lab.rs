@@ -6,3 +6,4 @@ pub mod price;
 pub mod report;
 pub mod run;
 pub mod store;
+pub mod wave;

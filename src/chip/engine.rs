@@ -17,11 +17,12 @@ use std::ops::Range;
 
 use aligned_vec::{AVec, CACHELINE_ALIGN};
 
+use super::crossbar::Collect;
 use super::crossbar::kernel::{Backend, LookUp};
 use super::crossbar::layout::BLOCK_ROWS;
 use super::hardware::Hardware;
 use super::layer::Layer;
-use super::ledger::{During, Event, Ledger};
+use super::ledger::{Cycles, During, Event, Ledger};
 use super::population::{Stream, Wiring};
 
 mod calibrate;
@@ -30,10 +31,19 @@ mod currents;
 mod each;
 mod error;
 mod forward;
+mod passes;
+mod pulses;
 mod read;
+mod schedule;
+mod tape;
+pub mod tick;
 mod update;
 
+use schedule::Schedule;
+
 pub use calibrate::Calibration;
+pub use pulses::{Pulses, TilePeaks, active};
+pub use tape::Recorded;
 
 /// Which side of a crossbar is driven.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -89,6 +99,8 @@ pub enum Operation<'a> {
         samples: Range<usize>,
         /// `width` words a sample, for stream p; stream n latches them negated.
         words: &'a [i16],
+        /// Whether they are the words of the `ERR` before, which both layers hear at once.
+        shared: bool,
     },
     /// `UPD` for some samples.
     Update {
@@ -166,6 +178,8 @@ struct Registers {
     backward: Vec<i64>,
     /// Samples added and not yet programmed, and their shift.
     pending: usize,
+    /// Pulses of the last write, while they are collected.
+    pulses: Option<Pulses>,
 }
 
 /// Numbers that start on a line of the processor's cache.
@@ -203,6 +217,8 @@ pub struct Engine {
     seed: u64,
     /// Only potentiating pulses: excitatory arrays take positive gates, inhibitory ones negative gates.
     potentiation_only: bool,
+    /// What is told of the pulses of a write.
+    collect: Collect,
     /// Rate mantissa.
     mantissa: u32,
     layers: Vec<Layer>,
@@ -215,7 +231,10 @@ pub struct Engine {
     samples: usize,
     phase: Phase,
     ledgers: [Ledger; 3],
-    trace: Option<Vec<(&'static str, u16, usize)>>,
+    /// Counts cycles, on hardware that has a timing.
+    schedule: Option<Schedule>,
+    /// What was executed since drives were last loaded, while recording.
+    tape: Option<Vec<Recorded>>,
 }
 
 impl Engine {
@@ -227,7 +246,10 @@ impl Engine {
     pub fn new(hardware: Hardware, backend: Backend, seed: u64, layers: Vec<Layer>) -> Self {
         let joined = layers.windows(2).all(|pair| pair[0].spec.units == pair[1].spec.inputs);
         assert!(joined && !layers.is_empty(), "layers follow one another");
-        let ledger = Ledger::new(layers.len());
+        let count = layers.len();
+        let schedule = hardware.timing.map(|timing| Schedule::new(&hardware, timing, &layers));
+        let ledger =
+            if schedule.is_some() { Ledger::with_cycles(count) } else { Ledger::new(count) };
         let last = layers.len() - 1;
         let codes = |layer: usize| (layer < last).then_some(hardware.drive_bits);
         let tables = layers.iter().zip(0..).map(|(l, at)| l.look_up(codes(at))).collect();
@@ -236,6 +258,7 @@ impl Engine {
             backend,
             seed,
             potentiation_only: false,
+            collect: passes::collect(&hardware),
             mantissa: 1,
             registers: vec![Registers::default(); layers.len()],
             currents: vec![[[0; 2]; 2]; layers.len()],
@@ -245,7 +268,8 @@ impl Engine {
             samples: 0,
             phase: Phase::Training,
             ledgers: [ledger.clone(), ledger.clone(), ledger],
-            trace: None,
+            schedule,
+            tape: None,
         }
     }
 
@@ -259,20 +283,48 @@ impl Engine {
         self.mantissa = mantissa;
     }
 
+    /// Small factor of the rate.
+    #[must_use]
+    pub const fn mantissa(&self) -> u32 {
+        self.mantissa
+    }
+
+    /// Whether writes only potentiate.
+    #[must_use]
+    pub const fn potentiation_only(&self) -> bool {
+        self.potentiation_only
+    }
+
     /// Charges what follows to `phase`.
-    pub const fn set_phase(&mut self, phase: Phase) {
+    pub fn set_phase(&mut self, phase: Phase) {
+        self.settle();
         self.phase = phase;
     }
 
-    /// Starts or stops recording (operation, layer, samples).
-    pub fn set_trace(&mut self, on: bool) {
-        self.trace = on.then(Vec::new);
+    /// Ends what overlaps in time: the cycles of all operations so far are in the ledger.
+    pub fn settle(&mut self) {
+        self.time(Schedule::settle);
     }
 
-    /// What was recorded: operation, layer, samples.
-    #[must_use]
-    pub fn trace(&self) -> &[(&'static str, u16, usize)] {
-        self.trace.as_deref().unwrap_or_default()
+    /// The error unit takes the mean of so many words over a batch.
+    pub fn centre(&mut self, samples: usize, words: usize) {
+        if let Some(tape) = &mut self.tape {
+            tape.push(Recorded::Centre { samples, words });
+        }
+        self.time(|schedule, cycles| schedule.centre(cycles, samples, words));
+    }
+
+    /// Counts cycles, if there is a timing.
+    fn time(&mut self, count: impl FnOnce(&mut Schedule, &mut Cycles)) {
+        let cycles = self.ledgers[self.phase as usize].cycles_mut();
+        if let (Some(schedule), Some(cycles)) = (&mut self.schedule, cycles) {
+            count(schedule, cycles);
+        }
+    }
+
+    /// Starts recording operations, or stops and gives what was executed since drives were last loaded.
+    pub fn record(&mut self, on: bool) -> Vec<Recorded> {
+        std::mem::replace(&mut self.tape, on.then(Vec::new)).unwrap_or_default()
     }
 
     /// The chip.
@@ -360,8 +412,11 @@ impl Engine {
     /// # Panics
     /// When the numbers do not have the shape the operation says: tasks and rules are our own code.
     pub fn execute(&mut self, operation: &Operation<'_>) {
-        if self.trace.is_some() {
-            self.record(operation);
+        if let Some(tape) = &mut self.tape {
+            if matches!(operation, Operation::LoadDrives { .. }) {
+                tape.clear();
+            }
+            tape.push(Recorded::new(operation));
         }
         match *operation {
             Operation::LoadWeights { layer, array, row, levels } => {
@@ -370,30 +425,22 @@ impl Engine {
                 self.row_sums[layer] = None;
                 let (during, count) = (During::LoadWeights, levels.len() as u64);
                 self.charge(layer, pathway, during, Event::CellLoads, count);
+                self.time(|schedule, cycles| schedule.load(cycles, layer));
             }
-            Operation::LoadDrives { codes } => self.load_drives(codes),
+            Operation::LoadDrives { codes } => {
+                self.settle();
+                self.load_drives(codes);
+            }
             Operation::Forward { layer, side: Side::Rows } => self.forward(layer),
             Operation::Forward { layer, side: Side::Columns } => self.forward_columns(layer),
-            Operation::Error { layer, ref samples, words } => {
+            Operation::Error { layer, ref samples, words, shared } => {
                 self.error(layer, samples.clone(), words);
+                self.time(|schedule, cycles| schedule.error(cycles, layer, samples, shared));
             }
             Operation::Update { layer, write, ref samples, shift } => {
                 self.update(layer, write, samples.clone(), shift);
             }
         }
-    }
-
-    fn record(&mut self, operation: &Operation<'_>) {
-        let (layer, samples) = match operation {
-            Operation::LoadWeights { layer, .. } => (*layer, 1),
-            Operation::LoadDrives { codes } => (0, codes.len() / self.layers[0].spec.inputs),
-            Operation::Forward { layer, .. } => (*layer, self.samples),
-            Operation::Error { layer, samples, .. } | Operation::Update { layer, samples, .. } => {
-                (*layer, samples.len())
-            }
-        };
-        let entry = (operation.name(), self.layers[layer].index, samples);
-        self.trace.as_mut().expect("only called while recording").push(entry);
     }
 
     fn load_drives(&mut self, codes: &[u8]) {

@@ -174,13 +174,31 @@ const OPERATIONS: usize = During::ALL.len();
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Ledger {
     counts: Vec<[[[u64; EVENTS]; OPERATIONS]; PATHWAYS]>,
+    cycles: Option<Cycles>,
 }
 
 impl Ledger {
     /// A ledger of zeros.
     #[must_use]
     pub fn new(layers: usize) -> Self {
-        Self { counts: vec![[[[0; EVENTS]; OPERATIONS]; PATHWAYS]; layers] }
+        Self { counts: vec![[[[0; EVENTS]; OPERATIONS]; PATHWAYS]; layers], cycles: None }
+    }
+
+    /// A ledger of zeros that counts cycles too.
+    #[must_use]
+    pub fn with_cycles(layers: usize) -> Self {
+        Self { cycles: Some(Cycles::new(layers)), ..Self::new(layers) }
+    }
+
+    /// Cycles, on hardware that has a timing.
+    #[must_use]
+    pub const fn cycles(&self) -> Option<&Cycles> {
+        self.cycles.as_ref()
+    }
+
+    /// Cycles, to count them or to restore a state.
+    pub const fn cycles_mut(&mut self) -> Option<&mut Cycles> {
+        self.cycles.as_mut()
     }
 
     /// Adds `count` events.

@@ -84,6 +84,34 @@ pub enum RunError {
         /// Folder of the run.
         path: String,
     },
+    /// There is nothing to count cycles with.
+    #[error(
+        "hardware model {model} has no [timing], so nothing can be said of cycles; give it one (see hw_models/ideal.toml) \
+         or choose another with --hw"
+    )]
+    NoTiming {
+        /// Name of the model.
+        model: String,
+    },
+    /// The training is shorter.
+    #[error("the training has no update {update} in its first epoch; it has {updates}")]
+    NoUpdate {
+        /// Asked for, from 1.
+        update: u64,
+        /// There are.
+        updates: u64,
+    },
+    /// There is no such tile.
+    #[error("there is no such tile: {}", .grid.map_or_else(
+        || format!("layers are 0..{layers}"),
+        |[t, d, a]| format!("that layer has {t} target streams, {d} rows and {a} columns of tiles, numbered from 0"),
+    ))]
+    NoTile {
+        /// Layers of the network.
+        layers: usize,
+        /// Streams, rows and columns of tiles of the layer, if there is one.
+        grid: Option<[usize; 3]>,
+    },
     /// Too little data.
     #[error("the {part} part of the data has no examples; {hint}")]
     Empty {

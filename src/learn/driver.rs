@@ -120,19 +120,29 @@ impl Driver {
         let (words, saturated) = self.unit.words(errors, outputs);
         self.charge(layers - 1, Event::SaturatedErrors, saturated);
         let samples = self.engine.samples();
+        if self.unit.waits_for_batch() {
+            self.engine.centre(samples, outputs);
+        }
+        let mut heard = false;
         for step in self.learning.rule.steps(self.learning.mode, layers, samples) {
             match step {
                 Step::Error { layer, samples, words: Words::Routed } => {
                     let delivery = &self.learning.deliveries[layer];
+                    let common = delivery.is_common();
                     let (routed, saturated, products) = delivery.words(&words, outputs);
                     self.charge(layer, Event::SaturatedErrors, saturated);
                     self.charge(layer, Event::Multiplies, products);
-                    self.engine.execute(&Operation::Error { layer, samples, words: &routed });
+                    let shared = heard && common;
+                    heard = common;
+                    let words = &routed;
+                    self.engine.execute(&Operation::Error { layer, samples, words, shared });
                 }
                 Step::Error { layer, samples, words: Words::Above } => {
                     let (words, saturated) = self.backward(layer + 1);
                     self.charge(layer, Event::SaturatedErrors, saturated);
-                    self.engine.execute(&Operation::Error { layer, samples, words: &words });
+                    let (words, shared) = (&words, false);
+                    self.engine.execute(&Operation::Error { layer, samples, words, shared });
+                    heard = false;
                 }
                 Step::ReadColumns { layer } => {
                     self.engine.execute(&Operation::Forward { layer, side: Side::Columns });
@@ -143,6 +153,7 @@ impl Driver {
                 }
             }
         }
+        self.engine.settle();
     }
 
     /// Error words for the layer below `layer`: its row sums in units of an error word.

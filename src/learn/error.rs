@@ -40,6 +40,12 @@ impl ErrorUnit {
         Self { centre, bits, means }
     }
 
+    /// Whether every word waits for the errors of the whole batch.
+    #[must_use]
+    pub fn waits_for_batch(&self) -> bool {
+        self.centre == Centre::Batch
+    }
+
     /// Running means, 8 fractional bits; empty unless the centre runs.
     #[must_use]
     pub fn means(&self) -> &[i64] {

@@ -121,6 +121,12 @@ impl Delivery {
         &self.taps
     }
 
+    /// Whether the words are those of the output, as they are: one bus brings them to all such layers at once.
+    #[must_use]
+    pub const fn is_common(&self) -> bool {
+        matches!(self.kind, Kind::Bus)
+    }
+
     /// The words put on this layer's bus for output words `[sample][output]`; how many saturated and how many
     /// products the error unit computed.
     #[must_use]

@@ -91,10 +91,8 @@ fn writes(mode: UpdateMode, layers: usize, samples: usize) -> Vec<Step> {
     let mut steps = Vec::new();
     match mode {
         UpdateMode::Accumulate => {
-            for layer in 0..layers {
-                steps.push(update(layer, Write::Add, 0..samples));
-                steps.push(update(layer, Write::Program, 0..0));
-            }
+            steps.extend((0..layers).map(|layer| update(layer, Write::Add, 0..samples)));
+            steps.extend((0..layers).map(|layer| update(layer, Write::Program, 0..0)));
         }
         UpdateMode::Replay | UpdateMode::Online => {
             for sample in 0..samples {
@@ -120,8 +118,8 @@ mod tests {
                     Step::Error { layer: 0, samples: 0..5, words: Words::Routed },
                     Step::Error { layer: 1, samples: 0..5, words: Words::Routed },
                     Step::Update { layer: 0, write: Write::Add, samples: 0..5 },
-                    Step::Update { layer: 0, write: Write::Program, samples: 0..0 },
                     Step::Update { layer: 1, write: Write::Add, samples: 0..5 },
+                    Step::Update { layer: 0, write: Write::Program, samples: 0..0 },
                     Step::Update { layer: 1, write: Write::Program, samples: 0..0 },
                 ]
             );

@@ -5,6 +5,7 @@
 //!     bounds are reached and never passed
 //! 2   every back end gives the same, and skipping what is zero changes nothing
 //! 3   one state, whatever the threads, the back end, an interruption or (with ideal converters) the tiles
+//! 4   the closed forms of time are what a network of tiles takes, cycle by cycle
 //! 5   an ideal crossbar is an integer matrix; a lossless converter is an ideal one
 //! ```
 //!
@@ -24,6 +25,7 @@ mod play;
 mod product;
 mod runs;
 mod shadow;
+mod time;
 
 /// `cases` unless `PROPTEST_CASES` says otherwise.
 fn config(cases: u32) -> ProptestConfig {
@@ -62,5 +64,16 @@ proptest! {
     fn law_2_skipping_changes_nothing(net in wide_net(), choices in choose::choices()) {
         let ops = play::script(&net, &choices);
         play::law(&net, &ops, &Backend::available(), None).map_err(TestCaseError::fail)?;
+    }
+}
+
+proptest! {
+    #![proptest_config(config(96))]
+
+    #[test]
+    fn law_4_closed_forms_are_cycle_by_cycle(
+        net in choose::timed_net(), choices in choose::choices(), seed: u64,
+    ) {
+        time::law(&net, &choices, seed).map_err(TestCaseError::fail)?;
     }
 }

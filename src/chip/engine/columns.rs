@@ -34,6 +34,7 @@ impl Engine {
         }
         self.registers[layer].backward = backward;
         self.charge_columns(layer);
+        self.time(|schedule, cycles| schedule.columns(cycles, layer, samples));
     }
 
     fn charge_columns(&mut self, layer: usize) {

@@ -85,6 +85,7 @@ impl Engine {
             let during = During::Error;
             self.charge(layer, code, during, Event::BusWords, width * count);
             self.charge(layer, code, during, Event::Multiplies, units as u64 * count);
+            self.charge(layer, code, during, Event::SramBits, units as u64 * count * 8);
             let saturated = saturated_gates[target.index()];
             self.charge(layer, code, during, Event::SaturatedGates, saturated);
         }

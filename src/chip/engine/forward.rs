@@ -106,6 +106,7 @@ impl Engine {
             self.load_constant(layer + 1);
             self.note_currents(layer);
             self.charge_forward(layer);
+            self.time(|schedule, cycles| schedule.read(cycles, layer, samples));
             return self.charge_seen(layer, total);
         }
         vec![Histogram::new(); wiring.targets().len()]
@@ -139,6 +140,7 @@ impl Engine {
         let (rows, columns) = (this.layout.rows as u64, this.layout.columns as u64);
         let slices = u64::from(self.hardware.slices());
         let samples = self.samples as u64;
+        let dac_bits = u64::from(self.hardware.dac_bits);
         let wiring = this.spec.wiring;
         let at_difference =
             matches!(self.hardware.adc, Adc::Finite { subtract: Subtract::Current, .. });
@@ -147,7 +149,9 @@ impl Engine {
                 let code = wiring.pathways()[at].code;
                 let held = samples * columns * down * slices;
                 let converted = if at_difference && bank == 1 { 0 } else { held };
-                self.charge_read(layer, code, Event::DacSlices, samples * rows * across * slices);
+                let driven = samples * rows * across * slices;
+                self.charge_read(layer, code, Event::DacSlices, driven);
+                self.charge_read(layer, code, Event::SramBits, driven * dac_bits);
                 self.charge_read(layer, code, Event::CellReads, samples * rows * columns * slices);
                 self.charge_read(layer, code, Event::Holds, held);
                 self.charge_read(layer, code, Event::Conversions, converted);
@@ -155,6 +159,8 @@ impl Engine {
             }
             let code = Self::code_of(wiring, target);
             self.charge_read(layer, code, Event::LookUps, samples * columns);
+            // an entry of the table, then activity and derivative
+            self.charge_read(layer, code, Event::SramBits, samples * columns * 32);
         }
     }
 }

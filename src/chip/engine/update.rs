@@ -15,10 +15,13 @@ use aligned_vec::AVec;
 
 use super::each::each;
 use super::error::{gates_of, stride_of};
+use super::passes::Passes;
+use super::pulses::Pulses;
 use super::{Engine, Write};
 use crate::chip::crossbar::kernel::{self, Kernel, WriteCounts};
 use crate::chip::crossbar::layout::{BLOCK_ROWS, PANEL_COLUMNS};
 use crate::chip::crossbar::{Crossbar, StripMut, WriteRequest};
+use crate::chip::hardware::{PulseCode, Timing};
 use crate::chip::ledger::{During, Event};
 use crate::chip::population::{Polarity, Stream};
 use crate::num::draw::{Place, Site};
@@ -31,31 +34,57 @@ impl Engine {
                 assert_eq!(*pending, samples.start, "samples are added in order");
                 *pending = samples.end;
                 self.charge_accumulate(layer, samples.len());
+                // the sum of a cell is read and stored again
+                self.charge_cells(layer, Event::SramBits, 2 * SUM_BITS * samples.len() as u64);
+                self.time(|schedule, cycles| schedule.add(cycles, layer, &samples));
             }
             Write::Program => {
                 let added = std::mem::take(pending);
                 self.program(layer, 0..added, shift);
+                // read and cleared
+                self.charge_cells(layer, Event::SramBits, 2 * SUM_BITS);
+                self.charge_time(layer, write, &samples);
             }
             Write::Now => {
                 assert!(*pending == 0 && samples.len() == 1, "now takes one sample");
                 self.charge_accumulate(layer, 1);
-                self.program(layer, samples, shift);
+                self.program(layer, samples.clone(), shift);
+                self.charge_time(layer, write, &samples);
             }
         }
     }
 
-    fn charge_accumulate(&mut self, layer: usize, samples: usize) {
-        let this = &self.layers[layer];
-        let cells = this.layout.cells() as u64 * samples as u64;
-        for pathway in this.spec.wiring.pathways() {
-            self.charge(layer, pathway.code, During::Update, Event::Accumulates, cells);
+    /// Charges a write's time and what depends on it.
+    fn charge_time(&mut self, layer: usize, write: Write, samples: &Range<usize>) {
+        let Some(timing) = self.hardware.timing else { return };
+        let pulses = self.take_pulses(layer);
+        let passes = Passes::new(&self.hardware, timing, &self.layers[layer], pulses.as_ref());
+        let wiring = self.layers[layer].spec.wiring;
+        for &target in wiring.targets() {
+            let code = Self::code_of(wiring, target);
+            let count = passes.by_target[target.index()];
+            self.charge(layer, code, During::Update, Event::RowPulses, count);
         }
+        self.time(|schedule, cycles| schedule.program(cycles, layer, write, samples, passes.busy));
+    }
+
+    /// Charges something of every cell of every array.
+    fn charge_cells(&mut self, layer: usize, event: Event, each: u64) {
+        let cells = self.layers[layer].layout.cells() as u64;
+        for pathway in self.layers[layer].spec.wiring.pathways() {
+            self.charge(layer, pathway.code, During::Update, event, cells * each);
+        }
+    }
+
+    fn charge_accumulate(&mut self, layer: usize, samples: usize) {
+        self.charge_cells(layer, Event::Accumulates, samples as u64);
     }
 
     /// Programs the sums over `samples` and counts one write of each array.
     fn program(&mut self, layer: usize, samples: Range<usize>, shift: u32) {
         let wiring = self.layers[layer].spec.wiring;
         self.row_sums[layer] = None;
+        self.registers[layer].pulses = Pulses::none(self.collect, &self.layers[layer]);
         if !samples.is_empty() {
             let counts = self.program_some(layer, &samples, shift);
             for (array, counts) in counts {
@@ -65,16 +94,16 @@ impl Engine {
                     (Event::Bounded, counts.bounded),
                     (Event::PulsesAttempted, counts.attempted),
                     (Event::PulsesEffective, counts.effective),
+                    (Event::VerifyReads, verified(self.hardware.timing, counts)),
                 ] {
                     self.charge(layer, code, During::Update, event, count);
                 }
             }
         }
         self.layers[layer].writes.iter_mut().for_each(|writes| *writes += 1);
-        let cells = self.layers[layer].layout.cells() as u64;
-        for pathway in wiring.pathways() {
-            self.charge(layer, pathway.code, During::Update, Event::DeltaComputations, cells);
-        }
+        self.charge_cells(layer, Event::DeltaComputations, 1);
+        let remainder = 2 * u64::from(self.hardware.residual_bits.get());
+        self.charge_cells(layer, Event::SramBits, remainder);
     }
 
     fn program_some(
@@ -119,7 +148,7 @@ impl Engine {
             ceiling: hardware.window.ceiling(),
             residual_bits: hardware.residual_bits.get(),
         };
-        let (backend, seed) = (self.backend, self.seed);
+        let (backend, seed, collect) = (self.backend, self.seed, self.collect);
         let this = &mut self.layers[layer];
         let index = this.index;
         let request = |array: usize, count: u64| {
@@ -139,6 +168,7 @@ impl Engine {
                     sub: 0,
                     count,
                 },
+                collect,
             }
         };
         let work = this.layout.cells() * this.arrays.len() * samples.len();
@@ -148,16 +178,22 @@ impl Engine {
         }
         let writes = &this.writes;
         let panel_gates = PANEL_COLUMNS * stride;
-        let counts = each(work, strips, |(array, mut strip)| {
+        let written = each(work, strips, |(array, mut strip)| {
             let panels = strip.panels();
             let gates = &gates[array][panels.start * panel_gates..panels.end * panel_gates];
             let kernel = Kernel::start(backend);
-            (array, strip.write(&kernel, &request(array, writes[array]), gates))
+            let written = strip.write(&kernel, &request(array, writes[array]), gates);
+            (array, panels.start * PANEL_COLUMNS, written)
         });
         drop((gates, turned));
+        if let Some(pulses) = &mut self.registers[layer].pulses {
+            for (array, first, part) in &written {
+                pulses.merge(&self.layers[layer], *array, *first, &part.collected);
+            }
+        }
         self.registers[layer].turned = kept;
         self.registers[layer].gates = registers;
-        counts
+        written.into_iter().map(|(array, _, written)| (array, written.counts)).collect()
     }
 
     /// Turns the drives of some samples as an update takes them. Returns which blocks are driven at all.
@@ -183,6 +219,18 @@ impl Engine {
                 live
             })
             .collect()
+    }
+}
+
+/// Bits of the sum of a cell in digital memory.
+const SUM_BITS: u64 = 32;
+
+/// Cells read after pulses to see what those did: one a pulse that was given.
+fn verified(timing: Option<Timing>, counts: WriteCounts) -> u64 {
+    match timing {
+        Some(Timing { verify: true, pulse_code: PulseCode::Unary, .. }) => counts.attempted,
+        Some(Timing { verify: true, pulse_code: PulseCode::Amplitude, .. }) => counts.requested,
+        _ => 0,
     }
 }
 

@@ -9,7 +9,7 @@ use std::time::Instant;
 
 use super::RunError;
 use crate::chip::crossbar::kernel::Backend;
-use crate::chip::engine::{Calibration, Currents, Phase};
+use crate::chip::engine::{Calibration, Currents, Phase, Recorded};
 use crate::chip::hardware::{Adc, AdcRange};
 use crate::chip::ledger::{Event, Ledger};
 use crate::lab::config::{Config, Select, TrainOn};
@@ -94,6 +94,35 @@ impl Session {
             session.warn_of_low_codes(&calibration);
         }
         Ok(session)
+    }
+
+    /// Learns this many updates of the first epoch and stops inside it.
+    ///
+    /// # Errors
+    /// When the epoch has fewer.
+    pub fn updates(&mut self, updates: u64) -> Result<(), RunError> {
+        if updates == 0 {
+            return Ok(());
+        }
+        let Self { trainer, pool, train, .. } = self;
+        let mut done = 0;
+        let _ = pool.install(|| {
+            trainer.learn(train, &mut |_| {
+                done += 1;
+                done < updates
+            })
+        });
+        if done < updates { Err(RunError::NoUpdate { update: updates, updates: done }) } else { Ok(()) }
+    }
+
+    /// Starts recording operations; what was read before the last samples were loaded is forgotten.
+    pub fn keep_tape(&mut self) {
+        let _ = self.trainer.driver_mut().engine_mut().record(true);
+    }
+
+    /// What was executed since the last samples were loaded.
+    pub fn take_tape(&mut self) -> Vec<Recorded> {
+        self.trainer.driver_mut().engine_mut().record(false)
     }
 
     fn calibrate(&mut self) -> Option<Calibration> {

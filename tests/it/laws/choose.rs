@@ -1,7 +1,8 @@
 //! Any valid chip, any small network on it, any list of choices.
 
 use dalean::chip::hardware::{
-    Adc, AdcRange, DitherBits, DitherPattern, FloorKind, Hardware, Subtract, Window,
+    Adc, AdcRange, DitherBits, DitherPattern, FloorKind, Hardware, PulseCode, Subtract, Timing,
+    Window,
 };
 use dalean::chip::layer::{LayerSpec, Taps};
 use dalean::chip::population::Wiring;
@@ -193,6 +194,48 @@ pub(crate) fn net(sides: impl Strategy<Value = Vec<usize>>) -> impl Strategy<Val
 /// Any network of one to three layers.
 pub(crate) fn any_net() -> impl Strategy<Value = Net> {
     net(prop::collection::vec(side(), 2..=4))
+}
+
+/// Any timing, short enough to be counted cycle by cycle.
+pub(crate) fn timing() -> impl Strategy<Value = Timing> {
+    let read = (1u64..=9, 1u64..=3, 1u64..=6, any::<bool>(), 1u64..=12);
+    let write = (
+        1u64..=4,
+        prop::sample::select(vec![PulseCode::Unary, PulseCode::Amplitude]),
+        prop::bool::weighted(0.3),
+        prop::option::weighted(0.3, 1u64..=9),
+    );
+    let digital = (prop_oneof![3 => Just(1u64), 1 => 2u64..=3], 0u64..=3);
+    (read, write, digital).prop_map(
+        |(
+            (settle, convert, share, overlapped, lanes),
+            (pulse, pulse_code, verify, active_max),
+            (beat, hops),
+        )| Timing {
+            clock_khz: 1_000_000,
+            beat,
+            settle,
+            convert,
+            share,
+            overlapped,
+            lanes,
+            hops,
+            pulse,
+            pulse_code,
+            verify,
+            active_max,
+        },
+    )
+}
+
+/// A small network of one to three layers on a chip that counts cycles.
+pub(crate) fn timed_net() -> impl Strategy<Value = Net> {
+    let side = || prop_oneof![4 => 1usize..=9, 1 => 10usize..=18];
+    let sides = prop::collection::vec(side(), 2..=4);
+    (net(sides), timing()).prop_map(|(mut net, timing)| {
+        net.hardware.timing = Some(timing);
+        net
+    })
 }
 
 /// One decision: what to do, and with which numbers.

@@ -20,7 +20,7 @@ fn waiting() -> Engine {
     for layer in 0..2 {
         engine.execute(&Operation::Forward { layer, side: Side::Rows });
         let words = vec![1; 2 * net.taps[layer].width];
-        engine.execute(&Operation::Error { layer, samples: 0..2, words: &words });
+        engine.execute(&Operation::Error { layer, samples: 0..2, words: &words, shared: false });
         let update = Operation::Update { layer, write: Write::Add, samples: 0..1, shift: 0 };
         engine.execute(&update);
     }
@@ -31,7 +31,7 @@ fn waiting() -> Engine {
 fn gates_of_samples_that_are_not_added_may_change() {
     let mut engine = waiting();
     let words = vec![0; engine.layers()[1].taps.width];
-    engine.execute(&Operation::Error { layer: 1, samples: 1..2, words: &words });
+    engine.execute(&Operation::Error { layer: 1, samples: 1..2, words: &words, shared: false });
 }
 
 #[test]
@@ -39,7 +39,7 @@ fn gates_of_samples_that_are_not_added_may_change() {
 fn gates_of_added_samples_do_not_change_before_the_write() {
     let mut engine = waiting();
     let words = vec![0; engine.layers()[1].taps.width];
-    engine.execute(&Operation::Error { layer: 1, samples: 0..1, words: &words });
+    engine.execute(&Operation::Error { layer: 1, samples: 0..1, words: &words, shared: false });
 }
 
 #[test]

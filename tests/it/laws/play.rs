@@ -19,7 +19,7 @@ pub(crate) enum Op {
     Drives(Vec<u8>),
     Forward(usize),
     Backward(usize),
-    Error { layer: usize, samples: Range<usize>, words: Vec<i16> },
+    Error { layer: usize, samples: Range<usize>, words: Vec<i16>, shared: bool },
     Update { layer: usize, write: Write, samples: Range<usize>, shift: u32 },
     Calibrate(Vec<u8>),
     Charge(Phase),
@@ -37,10 +37,17 @@ struct Script<'a> {
     gates: Vec<Vec<bool>>,
     /// Samples added and not yet written.
     pending: Vec<usize>,
+    /// Whether ranges of converters are found.
+    calibrates: bool,
 }
 
 /// A list of valid operations, from any list of choices.
 pub(crate) fn script(net: &Net, choices: &[Choice]) -> Vec<Op> {
+    script_of(net, choices, true)
+}
+
+/// The same; `calibrates`: whether ranges of converters are found on the way.
+pub(crate) fn script_of(net: &Net, choices: &[Choice], calibrates: bool) -> Vec<Op> {
     let count = net.specs.len();
     let mut script = Script {
         net,
@@ -50,6 +57,7 @@ pub(crate) fn script(net: &Net, choices: &[Choice]) -> Vec<Op> {
         read: 0,
         gates: vec![vec![]; count],
         pending: vec![0; count],
+        calibrates,
     };
     for layer in 0..count {
         for array in 0..net.specs[layer].wiring.pathways().len() {
@@ -157,7 +165,8 @@ impl Script<'_> {
             _ => numbers.within(-rail, rail),
         };
         let words = (0..(to - from) * width).map(word).map(|word| word as i16).collect();
-        self.ops.push(Op::Error { layer, samples: from..to, words });
+        let shared = self.pick(2) == 1;
+        self.ops.push(Op::Error { layer, samples: from..to, words, shared });
         self.gates[layer][from..to].fill(true);
     }
 
@@ -224,7 +233,7 @@ impl Script<'_> {
                 }
                 self.ops.push(Op::Backward(layer));
             }
-            9 if self.net.hardware.adc != Adc::Ideal => {
+            9 if self.calibrates && self.net.hardware.adc != Adc::Ideal => {
                 (0..count).for_each(|layer| self.write_pending(layer));
                 let codes = self.codes();
                 self.ops.push(Op::Calibrate(codes));
@@ -262,30 +271,37 @@ pub(crate) fn engine(net: &Net, backend: Backend) -> Engine {
     engine
 }
 
-pub(crate) fn execute(engine: &mut Engine, op: &Op) -> Option<Calibration> {
-    let operation = match op {
+/// The operation of a choice, where it is one of the chip's.
+pub(crate) fn operation(op: &Op) -> Option<Operation<'_>> {
+    Some(match op {
         Op::Levels { layer, array, row, levels } => {
             Operation::LoadWeights { layer: *layer, array: *array, row: *row, levels }
         }
         Op::Drives(codes) => Operation::LoadDrives { codes },
         Op::Forward(layer) => Operation::Forward { layer: *layer, side: Side::Rows },
         Op::Backward(layer) => Operation::Forward { layer: *layer, side: Side::Columns },
-        Op::Error { layer, samples, words } => {
-            Operation::Error { layer: *layer, samples: samples.clone(), words }
-        }
+        Op::Error { layer, samples, words, shared } => Operation::Error {
+            layer: *layer,
+            samples: samples.clone(),
+            words,
+            shared: *shared,
+        },
         Op::Update { layer, write, samples, shift } => Operation::Update {
             layer: *layer,
             write: *write,
             samples: samples.clone(),
             shift: *shift,
         },
+        Op::Calibrate(_) | Op::Charge(_) => return None,
+    })
+}
+
+pub(crate) fn execute(engine: &mut Engine, op: &Op) -> Option<Calibration> {
+    match op {
         Op::Calibrate(codes) => return engine.calibrate(codes),
-        Op::Charge(phase) => {
-            engine.set_phase(*phase);
-            return None;
-        }
-    };
-    engine.execute(&operation);
+        Op::Charge(phase) => engine.set_phase(*phase),
+        _ => engine.execute(&operation(op).expect("an operation of the chip")),
+    }
     None
 }
 
@@ -297,8 +313,13 @@ fn shadow_execute(shadow: &mut Shadow, pending: &mut [usize], op: &Op) -> Option
         Op::Drives(codes) => shadow.load_drives(codes),
         Op::Forward(layer) => shadow.forward(*layer),
         Op::Backward(layer) => shadow.forward_columns(*layer),
-        Op::Error { layer, samples, words } => shadow.error(*layer, samples.clone(), words),
+        Op::Error { layer, samples, words, .. } => shadow.error(*layer, samples.clone(), words),
         Op::Update { layer, write, samples, shift } => {
+            match write {
+                Write::Add => shadow.move_bits(*layer, samples.len() as u64, 0),
+                Write::Program => shadow.move_bits(*layer, 1, 1),
+                Write::Now => shadow.move_bits(*layer, 0, 1),
+            }
             if *write != Write::Program {
                 shadow.add(*layer, samples.clone());
                 pending[*layer] += samples.len();
@@ -360,9 +381,12 @@ fn compare_step(engine: &Engine, shadow: &Shadow, op: &Op) -> Result<(), String>
     }
 }
 
-fn compare_ledgers(got: &Ledger, want: &Ledger) -> Result<(), String> {
+pub(crate) fn compare_ledgers(got: &Ledger, want: &Ledger) -> Result<(), String> {
     if got == want {
         return Ok(());
+    }
+    if got.cycles() != want.cycles() {
+        return Err(format!("{:?}, but the law says {:?}", got.cycles(), want.cycles()));
     }
     let entry = |(layer, code, during, event, count)| {
         format!("layer {layer} code {code} {during:?} {event:?} {count}")

@@ -319,6 +319,7 @@ impl Shadow {
                 for (high, wide) in tile_sizes(rows, columns, hw.tile_rows, hw.tile_columns) {
                     let converted = if current && bank == 1 { 0 } else { wide };
                     for (event, count) in [
+                        (Event::SramBits, high * u64::from(hw.dac_bits)),
                         (Event::DacSlices, high),
                         (Event::CellReads, high * wide),
                         (Event::Holds, wide),
@@ -331,6 +332,7 @@ impl Shadow {
             }
             let (code, units) = (self.unit_code(layer, target), (self.samples * columns) as u64);
             self.count(layer, code, During::ForwardRows, Event::LookUps, units);
+            self.count(layer, code, During::ForwardRows, Event::SramBits, 32 * units);
         }
     }
 

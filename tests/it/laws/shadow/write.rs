@@ -60,6 +60,7 @@ impl Shadow {
                 (self.unit_code(layer, target), saturated_gates[target.index()]);
             self.count(layer, code, During::Error, Event::BusWords, taps.width as u64 * count);
             self.count(layer, code, During::Error, Event::Multiplies, units as u64 * count);
+            self.count(layer, code, During::Error, Event::SramBits, 8 * units as u64 * count);
             self.count(layer, code, During::Error, Event::SaturatedGates, saturated);
         }
         let code = self.unit_code(layer, Stream::P);
@@ -126,6 +127,17 @@ impl Shadow {
             }
             let cells = (this.rows * this.spec.units * samples.len()) as u64;
             self.count(layer, pathway.code, During::Update, Event::Accumulates, cells);
+        }
+    }
+
+    /// Bits that sums and remainders move in memory, `times` what an array holds.
+    pub(crate) fn move_bits(&mut self, layer: usize, sums: u64, remainders: u64) {
+        let bits = u64::from(self.net.hardware.residual_bits.get());
+        let this = &self.layers[layer];
+        let cells = (this.rows * this.spec.units) as u64;
+        let count = cells * (64 * sums + 2 * bits * remainders);
+        for pathway in this.spec.wiring.pathways() {
+            self.count(layer, pathway.code, During::Update, Event::SramBits, count);
         }
     }
 

@@ -1,0 +1,100 @@
+//! How long a write takes: rows of a tile one after the other, tiles side by side.
+//!
+//! ```text
+//! row      2 + pass (passes+ + passes-)                             compute, set, reset, turn around
+//! passes   P (unary), P > 0 (amplitude)                             P: most pulses of a cell, both banks
+//!          sum_q ceil(active(q) / W)                                where only W cells can be pulsed at a time
+//! ```
+//!
+//! The only place where numbers decide how long something takes. See docs/MODEL.md, 4.5.
+#![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
+
+use super::pulses::{Pulses, active};
+use crate::chip::crossbar::Collect;
+use crate::chip::hardware::{Hardware, PulseCode, Timing};
+use crate::chip::layer::Layer;
+use crate::chip::population::Stream;
+
+/// What a write of a layer took.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Passes {
+    /// Busy cycles of the slowest tile.
+    pub(super) busy: u64,
+    /// Passes of all tiles, by target stream.
+    pub(super) by_target: [u64; 2],
+}
+
+/// What has to be collected of a write so that its time is known.
+pub(super) fn collect(hardware: &Hardware) -> Collect {
+    match hardware.timing {
+        None => Collect::Nothing,
+        Some(Timing { active_max: None, .. }) => {
+            Collect::Peaks { tile_columns: hardware.tile_columns }
+        }
+        Some(_) => Collect::Pulses,
+    }
+}
+
+impl Passes {
+    /// Passes of a write, from its pulses.
+    pub(super) fn new(
+        hardware: &Hardware,
+        timing: Timing,
+        layer: &Layer,
+        pulses: Option<&Pulses>,
+    ) -> Self {
+        let mut passes = Self { busy: 0, by_target: [0; 2] };
+        match pulses {
+            None => passes.add(hardware, timing, Stream::P, vec![0; layer.layout.rows]),
+            Some(Pulses::Peaks(tiles)) => {
+                for tile in tiles {
+                    let rows = tile.peaks.rows.iter();
+                    let rows = rows.map(|row| row.map(|p| timing.passes(p.into())).iter().sum());
+                    passes.add(hardware, timing, tile.target, rows.collect());
+                }
+            }
+            Some(Pulses::Every(arrays)) => {
+                for &target in layer.spec.wiring.targets() {
+                    let banks = layer.spec.wiring.banks(target).map(|at| &arrays[at][..]);
+                    for first in (0..layer.layout.columns).step_by(hardware.tile_columns) {
+                        let rows = limited(hardware, timing, layer, banks, first);
+                        passes.add(hardware, timing, target, rows);
+                    }
+                }
+            }
+        }
+        passes
+    }
+
+    /// Takes a column of tiles along, given the passes of every row.
+    fn add(&mut self, hardware: &Hardware, timing: Timing, target: Stream, rows: Vec<u64>) {
+        for tile in rows.chunks(hardware.tile_rows) {
+            self.busy = self.busy.max(tile.iter().map(|&row| timing.row(row)).sum());
+        }
+        self.by_target[target.index()] += rows.iter().sum::<u64>();
+    }
+}
+
+/// Passes of every row of a column of tiles that begins at column `first`, when few cells are pulsed at a time.
+fn limited(
+    hardware: &Hardware,
+    timing: Timing,
+    layer: &Layer,
+    banks: [&[i8]; 2],
+    first: usize,
+) -> Vec<u64> {
+    let columns = layer.layout.columns;
+    let end = columns.min(first + hardware.tile_columns);
+    let together = timing.active_max.expect("only called where there is a limit");
+    let bound = u8::try_from(hardware.increment_max.get()).expect("1..=127");
+    let row = |row: usize| {
+        let cells = banks.into_iter().flat_map(|bank| &bank[row * columns + first..row * columns + end]);
+        let turns = active(cells, bound);
+        let turns = match timing.pulse_code {
+            PulseCode::Unary => &turns[..],
+            PulseCode::Amplitude => &turns[..1],
+        };
+        turns.iter().flatten().map(|&cells| u64::from(cells).div_ceil(together)).sum()
+    };
+    (0..layer.layout.rows).map(row).collect()
+}

@@ -1,0 +1,341 @@
+//! How long operations take, in closed form.
+//!
+//! What a chip does at the same time is fixed by rules, not by data; only how often a row is pulsed depends on
+//! numbers. Operations in the order they are issued form *segments*, and segments follow one another:
+//!
+//! ```text
+//! reads      FWD(rows) of successive layers, in a pipeline of layers and samples
+//!                sum_l (1 + T_fwd(l)) + (B - 1) max_l (1 + again(l))
+//! rounds     ERR, FWD(columns), UPD(add), UPD(now), sample by sample in the order of the list; in a round a run of
+//!            ERR with the same words is heard by all their layers at once, and a run of UPD on different layers
+//!            goes side by side:  sum_b ( 1 + T_err + ... + 1 + max_l T_upd(l, b) )
+//! writes     UPD(write) on different layers side by side:  1 + max_l T_write(l)
+//! loads      LOADW, a row a cycle
+//! ```
+//!
+//! Where a later operation would see what an earlier one of another sample has still to do (a second UPD(now) of a
+//! sample, a read from columns beside writes), a segment ends. Input drives are loaded while the chip works and take
+//! no time of their own. `Tick` is the cycle-by-cycle twin. See docs/MODEL.md, 4.5.
+#![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
+
+use std::ops::Range;
+
+use super::Write;
+use crate::chip::hardware::timing::{Timing, tree_levels};
+use crate::chip::hardware::Hardware;
+use crate::chip::layer::Layer;
+use crate::chip::ledger::{Cycles, During, Part, Stage};
+
+/// A layer as time sees it.
+#[derive(Debug, Clone, Copy)]
+struct Shape {
+    /// Greatest rows and columns of a tile.
+    rows: u64,
+    columns: u64,
+    /// Levels of the trees over row tiles and over column tiles.
+    levels: [u64; 2],
+    /// Words on the bus.
+    words: u64,
+}
+
+/// Layers whose commands of one kind run at the same time.
+#[derive(Debug, Clone, Copy, Default)]
+struct Run {
+    layers: u64,
+    longest: u64,
+}
+
+impl Run {
+    const fn has(self, layer: usize) -> bool {
+        self.layers >> layer & 1 == 1
+    }
+
+    fn join(&mut self, layer: usize, cycles: u64) {
+        self.layers |= 1 << layer;
+        self.longest = self.longest.max(cycles);
+    }
+}
+
+/// What the samples of a round wait for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Doing {
+    Nothing,
+    Hearing,
+    Adding,
+    Writing,
+}
+
+#[derive(Debug, Clone, Copy)]
+struct Round {
+    doing: Doing,
+    run: Run,
+    passed: [u64; Stage::ALL.len()],
+}
+
+impl Round {
+    const NEW: Self = Self {
+        doing: Doing::Nothing,
+        run: Run { layers: 0, longest: 0 },
+        passed: [0; Stage::ALL.len()],
+    };
+
+    /// Ends the run in progress.
+    fn close(&mut self) {
+        let stage = match self.doing {
+            Doing::Nothing => return,
+            Doing::Hearing => Stage::Error,
+            Doing::Adding => Stage::Accumulate,
+            Doing::Writing => Stage::Program,
+        };
+        self.passed[stage as usize] += self.run.longest;
+        self.doing = Doing::Nothing;
+        self.run = Run::default();
+    }
+
+    fn join(&mut self, doing: Doing, layer: usize, cycles: u64, apart: bool) {
+        if apart || self.doing != doing || self.run.has(layer) {
+            self.close();
+            self.doing = doing;
+        }
+        self.run.join(layer, cycles);
+    }
+}
+
+#[derive(Debug, Clone)]
+enum Segment {
+    Nothing,
+    Reads {
+        next: usize,
+        samples: u64,
+        latency: u64,
+        again: u64,
+    },
+    Rounds {
+        rounds: Vec<Round>,
+        /// Whether something was read from its columns.
+        columns: bool,
+        /// By layer: samples written so far lie below; and the last one of any layer.
+        written: Vec<usize>,
+        last: usize,
+    },
+    Writes(Run),
+}
+
+/// The schedule of a network.
+#[derive(Debug, Clone)]
+pub(super) struct Schedule {
+    timing: Timing,
+    slices: u64,
+    shapes: Vec<Shape>,
+    segment: Segment,
+}
+
+impl Schedule {
+    pub(super) fn new(hardware: &Hardware, timing: Timing, layers: &[Layer]) -> Self {
+        let shape = |layer: &Layer| {
+            let [down, across] = layer.tiles(hardware).map(|n| n as u64);
+            Shape {
+                rows: layer.layout.rows.min(hardware.tile_rows) as u64,
+                columns: layer.layout.columns.min(hardware.tile_columns) as u64,
+                levels: [tree_levels(down), tree_levels(across)],
+                words: layer.taps.width as u64,
+            }
+        };
+        Self {
+            timing,
+            slices: u64::from(hardware.slices()),
+            shapes: layers.iter().map(shape).collect(),
+            segment: Segment::Nothing,
+        }
+    }
+
+    /// `LOADW` of one row.
+    pub(super) fn load(&mut self, cycles: &mut Cycles, layer: usize) {
+        self.settle(cycles);
+        cycles.pass(Stage::Load, self.timing.accept());
+        cycles.occupy(layer, During::LoadWeights, self.timing.accept());
+    }
+
+    /// `FWD(rows)` of all samples of a layer.
+    pub(super) fn read(&mut self, cycles: &mut Cycles, layer: usize, samples: usize) {
+        if samples == 0 {
+            return;
+        }
+        let (t, shape, ns) = (self.timing, self.shapes[layer], self.slices);
+        let joins = matches!(self.segment, Segment::Reads { next, .. } if next == layer);
+        if !joins {
+            self.settle(cycles);
+            self.segment = Segment::Reads { next: layer, samples: 0, latency: 0, again: 0 };
+        }
+        let one = t.accept() + t.read(ns, shape.columns, shape.levels[0]);
+        let front = t.accept() + t.read_again(ns, shape.columns);
+        if let Segment::Reads { next, samples: count, latency, again } = &mut self.segment {
+            *next = layer + 1;
+            *count = samples as u64;
+            *latency += one;
+            *again = (*again).max(front);
+        }
+        let count = samples as u64;
+        cycles.occupy(layer, During::ForwardRows, count * front);
+        self.engage_read(cycles, layer, count * ns, count, shape.columns, shape.levels[0]);
+    }
+
+    fn engage_read(
+        &self,
+        cycles: &mut Cycles,
+        layer: usize,
+        slices: u64,
+        reads: u64,
+        lines: u64,
+        levels: u64,
+    ) {
+        let t = self.timing;
+        cycles.engage(layer, Part::Arrays, slices * t.settle);
+        cycles.engage(layer, Part::Converters, slices * t.conversion());
+        cycles.engage(layer, Part::Tree, reads * t.beat * levels);
+        cycles.engage(layer, Part::Lanes, reads * t.beat * t.groups(lines));
+    }
+
+    /// The error unit takes the mean over a batch.
+    pub(super) fn centre(&mut self, cycles: &mut Cycles, samples: usize, words: usize) {
+        self.settle(cycles);
+        cycles.pass(Stage::Centre, self.timing.centre(samples as u64, words as u64));
+    }
+
+    /// The rounds in progress, or new ones.
+    fn rounds(&mut self, cycles: &mut Cycles, samples: &Range<usize>) -> &mut [Round] {
+        if !matches!(self.segment, Segment::Rounds { .. }) {
+            self.settle(cycles);
+            let written = vec![0; self.shapes.len()];
+            self.segment = Segment::Rounds { rounds: vec![], columns: false, written, last: 0 };
+        }
+        let Segment::Rounds { rounds, .. } = &mut self.segment else {
+            unreachable!("just made");
+        };
+        if rounds.len() < samples.end {
+            rounds.resize(samples.end, Round::NEW);
+        }
+        &mut rounds[samples.clone()]
+    }
+
+    /// `ERR`; `shared`: its words are those of the one before.
+    pub(super) fn error(
+        &mut self,
+        cycles: &mut Cycles,
+        layer: usize,
+        samples: &Range<usize>,
+        shared: bool,
+    ) {
+        if samples.is_empty() {
+            return;
+        }
+        let (t, shape) = (self.timing, self.shapes[layer]);
+        let one = t.accept() + t.error(shape.words, shape.columns);
+        for round in self.rounds(cycles, samples) {
+            round.join(Doing::Hearing, layer, one, !shared);
+        }
+        let count = samples.len() as u64;
+        cycles.occupy(layer, During::Error, count * one);
+        cycles.engage(layer, Part::Bus, count * t.beat * shape.words);
+        cycles.engage(layer, Part::Multipliers, count * t.beat * t.groups(shape.columns));
+    }
+
+    /// `FWD(columns)` of all samples: both phases, with all slices.
+    pub(super) fn columns(&mut self, cycles: &mut Cycles, layer: usize, samples: usize) {
+        if samples == 0 {
+            return;
+        }
+        if matches!(&self.segment, Segment::Rounds { written, .. } if written.iter().any(|&w| w > 0))
+        {
+            self.settle(cycles);
+        }
+        let (t, shape, slices) = (self.timing, self.shapes[layer], 2 * self.slices);
+        let one = t.accept() + t.read(slices, shape.rows, shape.levels[1]);
+        for round in self.rounds(cycles, &(0..samples)) {
+            round.close();
+            round.passed[Stage::Columns as usize] += one;
+        }
+        if let Segment::Rounds { columns, .. } = &mut self.segment {
+            *columns = true;
+        }
+        let count = samples as u64;
+        let front = t.accept() + t.read_again(slices, shape.rows);
+        cycles.occupy(layer, During::ForwardColumns, count * front);
+        self.engage_read(cycles, layer, count * slices, count, shape.rows, shape.levels[1]);
+    }
+
+    /// `UPD(add)`.
+    pub(super) fn add(&mut self, cycles: &mut Cycles, layer: usize, samples: &Range<usize>) {
+        if samples.is_empty() {
+            return;
+        }
+        let (t, shape) = (self.timing, self.shapes[layer]);
+        let busy = t.accumulate(shape.rows, shape.columns);
+        for round in self.rounds(cycles, samples) {
+            round.join(Doing::Adding, layer, t.accept() + busy, false);
+        }
+        let count = samples.len() as u64;
+        cycles.occupy(layer, During::Update, count * (t.accept() + busy));
+        cycles.engage(layer, Part::Accumulators, count * busy);
+    }
+
+    /// `UPD(now)` of a sample or `UPD(write)`, whose slowest tile takes `busy` cycles.
+    pub(super) fn program(
+        &mut self,
+        cycles: &mut Cycles,
+        layer: usize,
+        write: Write,
+        samples: &Range<usize>,
+        busy: u64,
+    ) {
+        let one = self.timing.accept() + busy;
+        cycles.occupy(layer, During::Update, one);
+        cycles.engage(layer, Part::Writers, busy);
+        if write == Write::Program {
+            if !matches!(&self.segment, Segment::Writes(run) if !run.has(layer)) {
+                self.settle(cycles);
+                self.segment = Segment::Writes(Run::default());
+            }
+            if let Segment::Writes(run) = &mut self.segment {
+                run.join(layer, one);
+            }
+            return;
+        }
+        let sample = samples.start;
+        let ends = |segment: &Segment| match segment {
+            Segment::Rounds { columns, written, last, .. } => {
+                *columns || sample < written[layer] || sample < *last
+            }
+            _ => false,
+        };
+        if ends(&self.segment) {
+            self.settle(cycles);
+        }
+        for round in self.rounds(cycles, samples) {
+            round.join(Doing::Writing, layer, one, false);
+        }
+        if let Segment::Rounds { written, last, .. } = &mut self.segment {
+            written[layer] = sample + 1;
+            *last = sample;
+        }
+    }
+
+    /// Ends the segment in progress: its time has passed.
+    pub(super) fn settle(&mut self, cycles: &mut Cycles) {
+        match std::mem::replace(&mut self.segment, Segment::Nothing) {
+            Segment::Nothing => {}
+            Segment::Reads { samples, latency, again, .. } => {
+                cycles.pass(Stage::Forward, latency + (samples - 1) * again);
+            }
+            Segment::Rounds { rounds, .. } => {
+                for mut round in rounds {
+                    round.close();
+                    for (stage, passed) in Stage::ALL.into_iter().zip(round.passed) {
+                        cycles.pass(stage, passed);
+                    }
+                }
+            }
+            Segment::Writes(run) => cycles.pass(Stage::Program, run.longest),
+        }
+    }
+}

@@ -1,0 +1,106 @@
+//! What was executed, with its numbers, kept so that it can be played again: cycle by cycle, or to be looked at.
+#![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
+
+use std::ops::Range;
+
+use super::{Operation, Side, Write};
+
+/// An operation with numbers of its own, or the work of the error unit between operations.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Recorded {
+    /// `LOADW`.
+    LoadWeights {
+        /// Which layer.
+        layer: usize,
+        /// Which of its arrays.
+        array: usize,
+        /// Which row.
+        row: usize,
+        /// One level a column.
+        levels: Vec<u16>,
+    },
+    /// `LOADX`.
+    LoadDrives {
+        /// `inputs` codes a sample.
+        codes: Vec<u8>,
+    },
+    /// `FWD`.
+    Forward {
+        /// Which layer.
+        layer: usize,
+        /// Which side.
+        side: Side,
+    },
+    /// The mean over a batch.
+    Centre {
+        /// Samples of the batch.
+        samples: usize,
+        /// Words of a sample.
+        words: usize,
+    },
+    /// `ERR`.
+    Error {
+        /// Which layer.
+        layer: usize,
+        /// Which samples.
+        samples: Range<usize>,
+        /// `width` words a sample.
+        words: Vec<i16>,
+        /// Whether they are the words of the `ERR` before.
+        shared: bool,
+    },
+    /// `UPD`.
+    Update {
+        /// Which layer.
+        layer: usize,
+        /// Which field.
+        write: Write,
+        /// Which samples.
+        samples: Range<usize>,
+        /// k.
+        shift: u32,
+    },
+}
+
+impl Recorded {
+    pub(super) fn new(operation: &Operation<'_>) -> Self {
+        match *operation {
+            Operation::LoadWeights { layer, array, row, levels } => {
+                Self::LoadWeights { layer, array, row, levels: levels.to_vec() }
+            }
+            Operation::LoadDrives { codes } => Self::LoadDrives { codes: codes.to_vec() },
+            Operation::Forward { layer, side } => Self::Forward { layer, side },
+            Operation::Error { layer, ref samples, words, shared } => {
+                Self::Error { layer, samples: samples.clone(), words: words.to_vec(), shared }
+            }
+            Operation::Update { layer, write, ref samples, shift } => {
+                Self::Update { layer, write, samples: samples.clone(), shift }
+            }
+        }
+    }
+
+    /// The operation, unless it is the error unit's work.
+    #[must_use]
+    pub fn operation(&self) -> Option<Operation<'_>> {
+        Some(match self {
+            Self::LoadWeights { layer, array, row, levels } => {
+                Operation::LoadWeights { layer: *layer, array: *array, row: *row, levels }
+            }
+            Self::LoadDrives { codes } => Operation::LoadDrives { codes },
+            Self::Forward { layer, side } => Operation::Forward { layer: *layer, side: *side },
+            Self::Centre { .. } => return None,
+            Self::Error { layer, samples, words, shared } => Operation::Error {
+                layer: *layer,
+                samples: samples.clone(),
+                words,
+                shared: *shared,
+            },
+            Self::Update { layer, write, samples, shift } => Operation::Update {
+                layer: *layer,
+                write: *write,
+                samples: samples.clone(),
+                shift: *shift,
+            },
+        })
+    }
+}

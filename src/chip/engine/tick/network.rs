@@ -1,0 +1,467 @@
+//! A network of tiles, cycle by cycle: what the engine's closed forms are compared with.
+//!
+//! All tiles of a layer work in step. Tiles above one another share the *head* of their columns, where an adder tree
+//! brings their sums, lanes look them up and words become gates. A list of operations is cut into segments by the
+//! rules of `schedule` and every segment is played: commands are offered when their layer is ready and what they need
+//! is there, and cycles are counted one by one. See docs/MODEL.md, 4.5.
+#![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
+
+use std::ops::Range;
+
+use super::super::{Operation, Phase, Recorded, Side, Write};
+use super::tile::{BankEvents, Command, Tile, TileEvents};
+use crate::chip::hardware::{Hardware, Timing};
+use crate::chip::layer::Layer;
+use crate::chip::ledger::{Cycles, During, Event, Ledger, Part, Stage};
+use crate::chip::population::Stream;
+
+mod layer;
+mod segment;
+mod watch;
+
+use layer::TickLayer;
+use segment::Segment;
+use watch::Watch;
+pub use watch::{Span, TileAt};
+
+/// A network, its cycles and its counts.
+#[derive(Debug)]
+pub struct Network {
+    timing: Timing,
+    layers: Vec<TickLayer>,
+    samples: usize,
+    phase: Phase,
+    ledgers: [Ledger; 3],
+    /// Cycles played so far.
+    clock: u64,
+    watch: Watch,
+}
+
+/// A command for one layer, of one sample where it has one.
+#[derive(Debug, Clone, Copy)]
+struct Order<'a> {
+    layer: usize,
+    command: Command<'a>,
+    during: During,
+    /// Words on the bus while it lasts.
+    words: &'a [i16],
+}
+
+impl Network {
+    /// A network in the state of `layers`, whose tiles remember `slots` samples.
+    ///
+    /// # Panics
+    /// When the hardware has no timing.
+    #[must_use]
+    pub fn new(hardware: Hardware, seed: u64, layers: &[Layer], slots: usize) -> Self {
+        let timing = hardware.timing.expect("time is counted on hardware that has it");
+        let ledger = Ledger::with_cycles(layers.len());
+        let layers = layers.iter().map(|layer| TickLayer::new(&hardware, timing, seed, layer, slots));
+        Self {
+            timing,
+            layers: layers.collect(),
+            samples: 0,
+            phase: Phase::Training,
+            ledgers: [ledger.clone(), ledger.clone(), ledger],
+            clock: 0,
+            watch: Watch::default(),
+        }
+    }
+
+    /// Sets the small factor of the rate and whether writes only potentiate.
+    pub fn set_learning(&mut self, mantissa: u32, potentiation_only: bool) {
+        let tiles = self.layers.iter_mut().flat_map(|layer| &mut layer.tiles);
+        tiles.for_each(|tile| tile.set_learning(mantissa.into(), potentiation_only));
+    }
+
+    /// Takes over converter shifts.
+    pub fn set_adc_shifts(&mut self, layers: &[Layer]) {
+        self.layers.iter_mut().zip(layers).for_each(|(tick, layer)| tick.set_adc_shifts(layer));
+    }
+
+    /// Charges what follows to `phase`.
+    pub const fn set_phase(&mut self, phase: Phase) {
+        self.phase = phase;
+    }
+
+    /// A ledger.
+    #[must_use]
+    pub const fn ledger(&self, phase: Phase) -> &Ledger {
+        &self.ledgers[phase as usize]
+    }
+
+    /// Levels of an array, row by row.
+    #[must_use]
+    pub fn levels(&self, layer: usize, array: usize) -> Vec<u16> {
+        self.layers[layer].levels(array)
+    }
+
+    /// Which cells of an array are gone, row by row.
+    #[must_use]
+    pub fn pruned(&self, layer: usize, array: usize) -> Vec<bool> {
+        self.layers[layer].pruned(array)
+    }
+
+    /// Remainders of an array, row by row.
+    #[must_use]
+    pub fn residuals(&self, layer: usize, array: usize) -> Vec<i64> {
+        self.layers[layer].residuals(array)
+    }
+
+    /// Accumulator and activity of a unit of the last layer's p stream.
+    #[must_use]
+    pub fn output(&self, sample: usize, unit: usize) -> (i64, u8) {
+        let last = self.layers.last().expect("a network has layers");
+        last.outputs[sample * last.columns + unit]
+    }
+
+    /// Row sums of the last transposed read, `[sample][inputs]`.
+    #[must_use]
+    pub fn backward(&self, layer: usize) -> &[i64] {
+        &self.layers[layer].backward
+    }
+
+    /// Cycles played so far.
+    #[must_use]
+    pub const fn clock(&self) -> u64 {
+        self.clock
+    }
+
+    /// Starts keeping what every layer did when.
+    pub fn keep_spans(&mut self) {
+        self.watch.keep_spans();
+    }
+
+    /// What was kept since the last call.
+    pub fn take_spans(&mut self) -> Vec<Span> {
+        self.watch.take_spans()
+    }
+
+    /// Shows a tile at the end of every cycle. Nothing happens when there is no such tile: see [`Network::grid`].
+    pub fn watch_tile(&mut self, at: TileAt, look: impl FnMut(u64, &Tile) + 'static) {
+        self.watch.tile(at, Box::new(look));
+    }
+
+    /// Target streams, tiles down and tiles across of a layer.
+    #[must_use]
+    pub fn grid(&self, layer: usize) -> [usize; 3] {
+        self.layers[layer].grid()
+    }
+
+    fn cycles(&mut self) -> &mut Cycles {
+        self.ledgers[self.phase as usize].cycles_mut().expect("made with cycles")
+    }
+
+    /// A cycle of the whole chip begins.
+    fn begin(&mut self, stage: Stage) {
+        self.cycles().pass(stage, 1);
+    }
+
+    /// It has ended.
+    fn end(&mut self) {
+        self.clock += 1;
+        self.watch.look(self.clock, &self.layers);
+    }
+
+    /// The error unit takes the mean over a batch.
+    pub fn centre(&mut self, samples: usize, words: usize) {
+        let start = self.clock;
+        for _ in 0..self.timing.beat * (samples * words + words) as u64 {
+            self.begin(Stage::Centre);
+            self.end();
+        }
+        self.watch.span(Span { layer: None, name: "mean", sample: None, start, end: self.clock });
+    }
+
+    /// Plays what an engine has recorded.
+    pub fn play_tape(&mut self, tape: &[Recorded]) {
+        let error_unit = |recorded: &Recorded| matches!(recorded, Recorded::Centre { .. });
+        for stretch in tape.split_inclusive(error_unit) {
+            let operations: Vec<_> = stretch.iter().filter_map(Recorded::operation).collect();
+            self.run(&operations);
+            if let Some(&Recorded::Centre { samples, words }) = stretch.last() {
+                self.centre(samples, words);
+            }
+        }
+    }
+
+    /// Executes operations that follow one another without a pause.
+    pub fn run(&mut self, operations: &[Operation<'_>]) {
+        for segment in segment::cut(operations, self.samples, &self.input_sizes()) {
+            match segment {
+                Segment::LoadDrives { codes } => {
+                    self.samples = codes.len() / self.layers[0].inputs;
+                    self.layers[0].load_inputs(codes);
+                }
+                Segment::LoadWeights { layer, array, row, levels } => {
+                    let code = self.layers[layer].load_row(array, row, levels);
+                    self.charge(layer, code, During::LoadWeights, Event::CellLoads, levels.len() as u64);
+                    for _ in 0..self.timing.beat {
+                        self.begin(Stage::Load);
+                        self.cycles().occupy(layer, During::LoadWeights, 1);
+                        self.end();
+                    }
+                }
+                Segment::Reads { layers, samples } => self.reads(layers, samples),
+                Segment::Rounds(operations) => self.rounds(&operations),
+                Segment::Writes(writes) => {
+                    let order = |&(layer, shift): &(usize, u32)| Order {
+                        layer,
+                        command: Command::Write { shift },
+                        during: During::Update,
+                        words: &[],
+                    };
+                    let orders: Vec<_> = writes.iter().map(order).collect();
+                    self.play(&orders, Stage::Program);
+                    orders.iter().for_each(|order| self.layers[order.layer].written());
+                }
+            }
+        }
+    }
+
+    fn input_sizes(&self) -> Vec<usize> {
+        self.layers.iter().map(|layer| layer.inputs).collect()
+    }
+
+    fn charge(&mut self, layer: usize, code: u8, during: During, event: Event, count: u64) {
+        self.ledgers[self.phase as usize].add(layer, code, during, event, count);
+    }
+
+    /// `FWD(rows)` of layers in a pipeline.
+    fn reads(&mut self, layers: Range<usize>, samples: usize) {
+        let count = self.layers.len();
+        let (mut issued, mut done) = (vec![0; count], vec![0; count]);
+        // cycles for which the next command has been offered
+        let mut offered = vec![0; count];
+        let mut started = vec![vec![]; count];
+        let beat = self.timing.beat;
+        while done[layers.end - 1] < samples {
+            self.begin(Stage::Forward);
+            for layer in layers.clone() {
+                let command = Command::Forward { slot: issued[layer] };
+                let there = layer == layers.start || done[layer - 1] > issued[layer];
+                let offer = issued[layer] < samples && there && self.layers[layer].ready(&command);
+                offered[layer] = if offer { offered[layer] + 1 } else { 0 };
+                if offered[layer] == 1 {
+                    started[layer].push(self.clock);
+                }
+                let given = (offered[layer] == beat).then_some(command);
+                self.account(layer, During::ForwardRows, offer);
+                self.layers[layer].cycle(given.as_ref(), &[]);
+                if given.is_some() {
+                    issued[layer] += 1;
+                    offered[layer] = 0;
+                }
+            }
+            self.end();
+            for layer in layers.clone() {
+                if self.layers[layer].looked_up() {
+                    let sample = done[layer];
+                    self.hand_on(layer, sample);
+                    done[layer] += 1;
+                    let (start, end) = (started[layer][sample], self.clock);
+                    let (layer, sample) = (Some(layer), Some(sample));
+                    self.watch.span(Span { layer, name: "FWD(rows)", sample, start, end });
+                }
+            }
+        }
+        layers.for_each(|layer| self.take_events(layer, During::ForwardRows, false));
+    }
+
+    /// A sample's activities become drives of the next layer, or outputs.
+    fn hand_on(&mut self, layer: usize, sample: usize) {
+        let last = layer + 1 == self.layers.len();
+        if last {
+            self.layers[layer].keep_outputs(sample);
+            return;
+        }
+        let (head, tail) = self.layers.split_at_mut(layer + 1);
+        let streams = head[layer].targets();
+        for stream in streams {
+            let values = head[layer].values(stream, sample);
+            tail[0].load_activities(stream, sample, &values);
+        }
+    }
+
+    /// ERR, FWD(columns), UPD(add), UPD(now), sample by sample.
+    fn rounds(&mut self, operations: &[&Operation<'_>]) {
+        let range = |operation: &Operation<'_>| match operation {
+            Operation::Error { samples, .. } | Operation::Update { samples, .. } => samples.clone(),
+            _ => 0..self.samples,
+        };
+        let ranges: Vec<Range<usize>> = operations.iter().map(|o| range(o)).collect();
+        let end = ranges.iter().map(|range| range.end).max().unwrap_or(0);
+        for sample in 0..end {
+            let here = operations.iter().zip(&ranges).filter(|(_, range)| range.contains(&sample));
+            let mut orders: Vec<(Order<'_>, Stage, bool)> = Vec::new();
+            for (operation, range) in here {
+                let order = self.order(operation, range, sample);
+                let (_, stage, apart) = order;
+                let same = orders.last().is_some_and(|last| last.1 == stage);
+                let again = orders.iter().any(|other| other.0.layer == order.0.layer);
+                if !orders.is_empty() && (!same || again || apart) {
+                    self.play_in_round(&orders, sample);
+                    orders.clear();
+                }
+                orders.push(order);
+            }
+            if !orders.is_empty() {
+                self.play_in_round(&orders, sample);
+            }
+        }
+    }
+
+    /// The command of an operation for one sample; true when nothing runs beside what came before.
+    fn order<'a>(
+        &self,
+        operation: &Operation<'a>,
+        range: &Range<usize>,
+        sample: usize,
+    ) -> (Order<'a>, Stage, bool) {
+        let slot = sample;
+        match *operation {
+            Operation::Error { layer, words, shared, .. } => {
+                let width = self.layers[layer].width;
+                let words = &words[(sample - range.start) * width..][..width];
+                let command = Command::Error { slot };
+                (Order { layer, command, during: During::Error, words }, Stage::Error, !shared)
+            }
+            Operation::Forward { layer, side: Side::Columns } => {
+                let command = Command::Columns { slot };
+                let during = During::ForwardColumns;
+                (Order { layer, command, during, words: &[] }, Stage::Columns, true)
+            }
+            Operation::Update { layer, write, shift, .. } => {
+                let (command, stage) = match write {
+                    Write::Now => (Command::Now { slot, shift }, Stage::Program),
+                    _ => (Command::Add { slot }, Stage::Accumulate),
+                };
+                (Order { layer, command, during: During::Update, words: &[] }, stage, false)
+            }
+            _ => unreachable!("only operations of a round"),
+        }
+    }
+
+    fn play_in_round(&mut self, orders: &[(Order<'_>, Stage, bool)], sample: usize) {
+        let stage = orders[0].1;
+        let plain: Vec<_> = orders.iter().map(|order| order.0).collect();
+        self.play(&plain, stage);
+        for order in &plain {
+            let layer = &mut self.layers[order.layer];
+            match order.command {
+                Command::Error { slot } => layer.share_gates(slot),
+                Command::Now { .. } => layer.written(),
+                Command::Columns { .. } => layer.keep_backward(sample),
+                _ => {}
+            }
+        }
+    }
+
+    /// Commands of different layers, accepted together; until the last of them is done.
+    fn play(&mut self, orders: &[Order<'_>], stage: Stage) {
+        let start = self.clock;
+        for offered in 1..=self.timing.beat {
+            self.begin(stage);
+            for order in orders {
+                let given = (offered == self.timing.beat).then_some(order.command);
+                let layer = &mut self.layers[order.layer];
+                assert!(layer.ready(&order.command), "segments begin on idle tiles");
+                layer.cycle(given.as_ref(), order.words);
+                self.cycles().occupy(order.layer, order.during, 1);
+            }
+            self.end();
+        }
+        let mut ends = vec![None; orders.len()];
+        while orders.iter().any(|order| !self.layers[order.layer].idle()) {
+            self.begin(stage);
+            for order in orders {
+                self.account(order.layer, order.during, false);
+                self.layers[order.layer].cycle(None, order.words);
+            }
+            self.end();
+            for (order, end) in orders.iter().zip(&mut ends) {
+                if end.is_none() && self.layers[order.layer].idle() {
+                    *end = Some(self.clock);
+                }
+            }
+        }
+        for (order, end) in orders.iter().zip(ends) {
+            let (name, sample) = order.command.name();
+            let end = end.unwrap_or(self.clock);
+            self.watch.span(Span { layer: Some(order.layer), name, sample, start, end });
+        }
+        for order in orders {
+            let now = matches!(order.command, Command::Now { .. });
+            self.take_events(order.layer, order.during, now);
+        }
+    }
+
+    /// Notes what a layer and its parts do in the cycle that begins.
+    fn account(&mut self, layer: usize, during: During, offered: bool) {
+        let at_work = self.layers[layer].at_work();
+        let busy = offered || self.layers[layer].busy(during);
+        let cycles = self.cycles();
+        if busy {
+            cycles.occupy(layer, during, 1);
+        }
+        for (part, count) in Part::ALL.into_iter().zip(at_work) {
+            cycles.engage(layer, part, count);
+        }
+    }
+
+    /// Moves what tiles have counted into the ledger.
+    fn take_events(&mut self, layer: usize, during: During, now: bool) {
+        let taken = self.layers[layer].take_events();
+        for (target, banks, events) in taken {
+            let codes = self.layers[layer].codes(target);
+            for (code, e) in codes.into_iter().zip(banks) {
+                for (event, count) in self.bank_counts(&e, during, now) {
+                    self.charge(layer, code, during, event, count);
+                }
+            }
+            for (event, count) in self.counts(&events) {
+                self.charge(layer, codes[0], during, event, count);
+            }
+            let p = self.layers[layer].codes(Stream::P)[0];
+            if target == Stream::P {
+                self.charge(layer, p, during, Event::SaturatedErrors, events.saturated_errors);
+            }
+        }
+    }
+
+    fn bank_counts(&self, e: &BankEvents, during: During, now: bool) -> Vec<(Event, u64)> {
+        let hardware = self.layers[0].memory;
+        let updating = during == During::Update;
+        let sums = if updating && !now { 64 * (e.accumulates + e.delta_computations) } else { 0 };
+        let rests = 2 * hardware.residual_bits * e.delta_computations;
+        let drives = if during == During::ForwardRows { hardware.dac_bits * e.dac_slices } else { 0 };
+        vec![
+            (Event::DacSlices, e.dac_slices),
+            (Event::CellReads, e.cell_reads),
+            (Event::Holds, e.holds),
+            (Event::Conversions, e.conversions),
+            (Event::ShiftAdds, e.shift_adds),
+            (Event::Accumulates, e.accumulates),
+            (Event::DeltaComputations, e.delta_computations),
+            (Event::Requested, e.requested),
+            (Event::Bounded, e.bounded),
+            (Event::PulsesAttempted, e.pulses_attempted),
+            (Event::PulsesEffective, e.pulses_effective),
+            (Event::SaturatedConversions, e.saturated_conversions),
+            (Event::VerifyReads, e.verify_reads),
+            (Event::SramBits, drives + sums + rests),
+        ]
+    }
+
+    fn counts(&self, e: &TileEvents) -> [(Event, u64); 7] {
+        [
+            (Event::LookUps, e.look_ups),
+            (Event::SaturatedLookUps, e.saturated_look_ups),
+            (Event::BusWords, e.bus_words),
+            (Event::Multiplies, e.multiplies),
+            (Event::SaturatedGates, e.saturated_gates),
+            (Event::RowPulses, e.row_pulses),
+            (Event::SramBits, 32 * e.look_ups + 8 * e.multiplies),
+        ]
+    }
+}

@@ -1,0 +1,519 @@
+//! The tiles of a layer, in step.
+//!
+//! ```text
+//! tiles[(target * down + tile row) * across + tile column]
+//! ```
+#![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
+
+use std::ops::Range;
+
+use super::super::tile::{
+    BankEvents, Command, Launch, More, Tile, TileAdc, TileConfig, TileEvents, TileSize,
+};
+use crate::chip::hardware::timing::tree_levels;
+use crate::chip::hardware::{Adc, DitherPattern, FloorKind, Hardware, Subtract, Timing};
+use crate::chip::layer::Layer;
+use crate::chip::ledger::During;
+use crate::chip::periphery;
+use crate::chip::population::{Stream, Wiring};
+use crate::num::draw::{Place, Site};
+use crate::num::fixed::DriveBits;
+
+/// Widths that decide how many bits a memory moves.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Memory {
+    pub(super) dac_bits: u64,
+    pub(super) residual_bits: u64,
+}
+
+#[derive(Debug)]
+pub(super) struct TickLayer {
+    pub(super) tiles: Vec<Tile>,
+    pub(super) inputs: usize,
+    pub(super) columns: usize,
+    pub(super) width: usize,
+    pub(super) memory: Memory,
+    /// Accumulator and activity of stream p by sample, of what was read last.
+    pub(super) outputs: Vec<(i64, u8)>,
+    pub(super) backward: Vec<i64>,
+    index: u16,
+    wiring: Wiring,
+    first: bool,
+    constant_row: bool,
+    rows: usize,
+    /// Tiles down and across, and the size of one.
+    grid: [usize; 2],
+    tile: [usize; 2],
+    drive_bits: DriveBits,
+    dither: (u32, DitherPattern),
+    seed: u64,
+    /// Writes of every array so far.
+    writes: u64,
+    /// On their way through a tree: cycles left, the head they go to, from columns, sums.
+    tree: Vec<(u64, usize, bool, Launch)>,
+    /// Cycles through the tree over rows and over columns.
+    delay: [u64; 2],
+}
+
+impl TickLayer {
+    pub(super) fn new(
+        hardware: &Hardware,
+        timing: Timing,
+        seed: u64,
+        layer: &Layer,
+        slots: usize,
+    ) -> Self {
+        let grid = layer.tiles(hardware);
+        let tile = [hardware.tile_rows, hardware.tile_columns];
+        let (rows, columns) = (layer.layout.rows, layer.layout.columns);
+        let mut this = Self {
+            tiles: vec![],
+            inputs: layer.spec.inputs,
+            columns,
+            width: layer.taps.width,
+            memory: Memory {
+                dac_bits: hardware.dac_bits.into(),
+                residual_bits: hardware.residual_bits.get().into(),
+            },
+            outputs: vec![(0, 0); slots * columns],
+            backward: vec![],
+            index: layer.index,
+            wiring: layer.spec.wiring,
+            first: layer.index == 0,
+            constant_row: layer.spec.constant_row,
+            rows,
+            grid,
+            tile,
+            drive_bits: hardware.drive_bits,
+            dither: (hardware.dither_bits.get(), hardware.dither_pattern),
+            seed,
+            writes: layer.writes.first().copied().unwrap_or(0),
+            tree: vec![],
+            delay: grid.map(|tiles| timing.beat * tree_levels(tiles as u64)),
+        };
+        let lut = layer.lut.activity.iter().zip(&layer.lut.derivative);
+        let table: Vec<[u8; 2]> = lut.map(|(&a, &slope)| [a, slope]).collect();
+        for &target in layer.spec.wiring.targets() {
+            for down in 0..grid[0] {
+                for across in 0..grid[1] {
+                    let (rows, columns) = (this.tile_rows(down), this.tile_columns(across));
+                    let size = TileSize {
+                        rows: rows.len(),
+                        columns: columns.len(),
+                        slots,
+                        tree_max: 0,
+                    };
+                    let config = config(hardware, timing, layer, target, &rows, &columns);
+                    this.tiles.push(Tile::new(size, config, table.clone()));
+                }
+            }
+        }
+        this.load_state(layer);
+        this
+    }
+
+    fn load_state(&mut self, layer: &Layer) {
+        for (at, array) in layer.arrays.iter().enumerate() {
+            let levels: Vec<u16> = array.levels().collect();
+            for (row, levels) in levels.chunks_exact(self.columns).enumerate() {
+                self.load_row(at, row, levels);
+            }
+            let gone = array.pruned();
+            let left = array.residuals();
+            for cell in 0..levels.len() {
+                let (tile, bank, row, column) = self.cell(at, cell);
+                let gone = gone.as_ref().is_some_and(|gone| gone[cell]);
+                let left = left.as_ref().map_or(0, |left| i64::from(left[cell]));
+                self.tiles[tile].restore(bank, row, column, gone, left);
+            }
+        }
+    }
+
+    /// Logical rows of a row of tiles.
+    fn tile_rows(&self, down: usize) -> Range<usize> {
+        down * self.tile[0]..((down + 1) * self.tile[0]).min(self.rows)
+    }
+
+    fn tile_columns(&self, across: usize) -> Range<usize> {
+        across * self.tile[1]..((across + 1) * self.tile[1]).min(self.columns)
+    }
+
+    /// Tile of a target at a place of the grid.
+    fn at(&self, target: Stream, down: usize, across: usize) -> usize {
+        (target.index() * self.grid[0] + down) * self.grid[1] + across
+    }
+
+    /// Targets, tiles down, tiles across.
+    pub(super) fn grid(&self) -> [usize; 3] {
+        [self.wiring.targets().len(), self.grid[0], self.grid[1]]
+    }
+
+    /// The tile at a place of the grid, if there is one.
+    pub(super) fn tile_at(&self, at: &super::TileAt) -> Option<&Tile> {
+        let [targets, downs, acrosses] = self.grid();
+        let inside = at.target < targets && at.down < downs && at.across < acrosses;
+        inside.then(|| &self.tiles[(at.target * downs + at.down) * acrosses + at.across])
+    }
+
+    /// Target and bank of an array.
+    fn bank(&self, array: usize) -> (Stream, usize) {
+        let target = self.wiring.pathways()[array].target;
+        (target, usize::from(self.wiring.banks(target)[1] == array))
+    }
+
+    /// Tile, bank, row and column of a cell of an array.
+    fn cell(&self, array: usize, cell: usize) -> (usize, usize, usize, usize) {
+        let (row, column) = (cell / self.columns, cell % self.columns);
+        let (target, bank) = self.bank(array);
+        let tile = self.at(target, row / self.tile[0], column / self.tile[1]);
+        (tile, bank, row % self.tile[0], column % self.tile[1])
+    }
+
+    fn cells<T>(&self, array: usize, of: impl Fn(&Tile, usize, usize, usize) -> T) -> Vec<T> {
+        let one = |cell| {
+            let (tile, bank, row, column) = self.cell(array, cell);
+            of(&self.tiles[tile], bank, row, column)
+        };
+        (0..self.rows * self.columns).map(one).collect()
+    }
+
+    pub(super) fn levels(&self, array: usize) -> Vec<u16> {
+        self.cells(array, Tile::level)
+    }
+
+    pub(super) fn pruned(&self, array: usize) -> Vec<bool> {
+        self.cells(array, Tile::is_pruned)
+    }
+
+    pub(super) fn residuals(&self, array: usize) -> Vec<i64> {
+        self.cells(array, Tile::residual)
+    }
+
+    pub(super) fn targets(&self) -> Vec<Stream> {
+        self.wiring.targets().to_vec()
+    }
+
+    /// Pathway codes of the banks of a target.
+    pub(super) fn codes(&self, target: Stream) -> [u8; 2] {
+        self.wiring.banks(target).map(|at| self.wiring.pathways()[at].code)
+    }
+
+    pub(super) fn set_adc_shifts(&mut self, layer: &Layer) {
+        let each = self.grid[0] * self.grid[1];
+        for (tile, tick) in self.tiles.iter_mut().enumerate() {
+            if let Some(shifts) = layer.adc_shifts.get(tile / each) {
+                tick.set_adc_shifts(shifts);
+            }
+        }
+    }
+
+    /// Loads a row of an array; the code of its pathway.
+    pub(super) fn load_row(&mut self, array: usize, row: usize, levels: &[u16]) -> u8 {
+        for (column, &level) in levels.iter().enumerate() {
+            let (tile, bank, row, column) = self.cell(array, row * self.columns + column);
+            self.tiles[tile].load_level(bank, row, column, level);
+        }
+        self.wiring.pathways()[array].code
+    }
+
+    /// Source of the rows of a bank.
+    fn source(&self, target: Stream, bank: usize) -> Stream {
+        self.wiring.pathways()[self.wiring.banks(target)[bank]].source
+    }
+
+    /// Puts a drive code on a row of every bank that `stream` drives (all of them in the first layer).
+    fn load_drive(&mut self, stream: Option<Stream>, slot: usize, row: usize, code: u8) {
+        for target in self.targets() {
+            for bank in 0..2 {
+                if stream.is_some_and(|stream| stream != self.source(target, bank)) {
+                    continue;
+                }
+                for across in 0..self.grid[1] {
+                    let tile = self.at(target, row / self.tile[0], across);
+                    self.tiles[tile].load_drive(bank, slot, row % self.tile[0], code);
+                }
+            }
+        }
+    }
+
+    pub(super) fn load_inputs(&mut self, codes: &[u8]) {
+        for (slot, codes) in codes.chunks_exact(self.inputs).enumerate() {
+            for (row, &code) in codes.iter().enumerate() {
+                self.load_drive(None, slot, row, code);
+            }
+            self.load_constant(slot);
+        }
+    }
+
+    fn load_constant(&mut self, slot: usize) {
+        if self.constant_row {
+            self.load_drive(None, slot, self.inputs, self.drive_bits.code_max());
+        }
+    }
+
+    pub(super) fn load_activities(&mut self, stream: Stream, slot: usize, values: &[u8]) {
+        assert!(!self.first, "the first layer is driven by data");
+        for (row, &value) in values.iter().enumerate() {
+            self.load_drive(Some(stream), slot, row, periphery::drive(value, self.drive_bits));
+        }
+        self.load_constant(slot);
+    }
+
+    /// Activities of a stream.
+    pub(super) fn values(&self, target: Stream, slot: usize) -> Vec<u8> {
+        let value = |column| {
+            let head = &self.tiles[self.at(target, 0, column / self.tile[1])];
+            head.value(slot, column % self.tile[1])
+        };
+        (0..self.columns).map(value).collect()
+    }
+
+    pub(super) fn keep_outputs(&mut self, sample: usize) {
+        let values = self.values(Stream::P, sample);
+        for (column, value) in values.into_iter().enumerate() {
+            let head = &self.tiles[self.at(Stream::P, 0, column / self.tile[1])];
+            let sum = head.out(column % self.tile[1]);
+            self.outputs[sample * self.columns + column] = (sum, value);
+        }
+    }
+
+    pub(super) fn keep_backward(&mut self, sample: usize) {
+        self.backward.truncate(sample * self.inputs);
+        for row in 0..self.inputs {
+            let head = &self.tiles[self.at(Stream::P, row / self.tile[0], 0)];
+            self.backward.push(head.backward_sum(row % self.tile[0]));
+        }
+    }
+
+    /// Gates go down from the heads of the columns.
+    pub(super) fn share_gates(&mut self, slot: usize) {
+        for target in self.targets() {
+            for across in 0..self.grid[1] {
+                let gates = self.tiles[self.at(target, 0, across)].gates(slot).to_vec();
+                for down in 1..self.grid[0] {
+                    let tile = self.at(target, down, across);
+                    self.tiles[tile].set_gates(slot, &gates);
+                }
+            }
+        }
+    }
+
+    /// Every array has been written once more.
+    pub(super) const fn written(&mut self) {
+        self.writes += 1;
+    }
+
+    /// Whether a command concerns a tile: words go to heads, transposed reads to target p.
+    fn concerns(&self, command: &Command<'_>, tile: usize) -> bool {
+        let down = tile / self.grid[1] % self.grid[0];
+        let target = tile / (self.grid[0] * self.grid[1]);
+        match command {
+            Command::Error { .. } => down == 0,
+            Command::Columns { .. } => target == Stream::P.index(),
+            _ => true,
+        }
+    }
+
+    pub(super) fn ready(&self, command: &Command<'_>) -> bool {
+        let waits = !matches!(command, Command::Forward { .. }) && !self.tree.is_empty();
+        !waits && self.tiles.iter().all(|tile| tile.ready(command))
+    }
+
+    pub(super) fn idle(&self) -> bool {
+        self.tree.is_empty() && self.tiles.iter().all(Tile::idle)
+    }
+
+    /// One cycle of all tiles and of the tree between them.
+    pub(super) fn cycle(&mut self, command: Option<&Command<'_>>, words: &[i16]) {
+        for tile in 0..self.tiles.len() {
+            let command = command.filter(|command| self.concerns(command, tile));
+            let word = words.get(self.tiles[tile].bus_index()).copied().unwrap_or(0);
+            if self.tiles[tile].dither_wanted() {
+                let [e, i] = [0, 1].map(|bank| self.draws(tile, bank));
+                self.tiles[tile].cycle(command, word, [&e, &i]);
+            } else {
+                self.tiles[tile].cycle(command, word, [&[]; 2]);
+            }
+        }
+        self.tree();
+    }
+
+    /// The draws of the row that a tile is about to write.
+    fn draws(&self, tile: usize, bank: usize) -> Vec<u16> {
+        let across = tile % self.grid[1];
+        let down = tile / self.grid[1] % self.grid[0];
+        let target = self.targets()[tile / (self.grid[0] * self.grid[1])];
+        let row = down * self.tile[0] + self.tiles[tile].dither_row();
+        let place = Place {
+            seed: self.seed,
+            site: Site::WriteDither,
+            layer: self.index,
+            pathway: self.codes(target)[bank],
+            sub: 0,
+            count: self.writes,
+        };
+        let (bits, pattern) = self.dither;
+        let word = |place: &Place, rows, row, column| match bits {
+            0 => 0,
+            8 => {
+                let mut bytes = [0; 64];
+                place.bytes(rows, column, row / 64, &mut bytes);
+                u16::from(bytes[row % 64])
+            }
+            _ => place.half(rows, row, column),
+        };
+        let draw = |column| match pattern {
+            DitherPattern::PerCell => word(&place, self.rows, row, column),
+            DitherPattern::Separable => {
+                let down = word(&Place { sub: 1, ..place }, self.rows, row, 0);
+                // numbered as one column
+                down ^ word(&Place { sub: 2, ..place }, self.columns, column, 0)
+            }
+        };
+        self.tile_columns(across).map(draw).collect()
+    }
+
+    fn tree(&mut self) {
+        self.tree.iter_mut().for_each(|entry| entry.0 -= 1);
+        while self.tree.first().is_some_and(|entry| entry.0 == 0) {
+            let (_, head, columns, launch) = self.tree.remove(0);
+            self.tiles[head].arrive(launch, columns);
+        }
+        for (head, columns, launch) in self.launched() {
+            match self.delay[usize::from(columns)] {
+                0 => self.tiles[head].arrive(launch, columns),
+                delay => self.tree.push((delay, head, columns, launch)),
+            }
+        }
+    }
+
+    /// What left the tiles in this cycle, added up for the head it goes to.
+    fn launched(&mut self) -> Vec<(usize, bool, Launch)> {
+        let mut heads: Vec<(usize, bool, Launch)> = Vec::new();
+        for tile in 0..self.tiles.len() {
+            let Some((launch, columns)) = self.tiles[tile].take_launch() else { continue };
+            let each = self.grid[0] * self.grid[1];
+            let head = match columns {
+                false => tile / each * each + tile % self.grid[1],
+                true => tile / self.grid[1] * self.grid[1],
+            };
+            match heads.iter_mut().find(|other| other.0 == head) {
+                Some((_, _, total)) => {
+                    assert_eq!(total.slot, launch.slot, "tiles of a layer are in step");
+                    total.sums.iter_mut().zip(launch.sums).for_each(|(sum, more)| *sum += more);
+                }
+                None => heads.push((head, columns, launch)),
+            }
+        }
+        heads
+    }
+
+    /// Whether the widest head has looked up the last group of a sample in this cycle.
+    pub(super) fn looked_up(&self) -> bool {
+        self.tiles[0].looked_up()
+    }
+
+    pub(super) fn busy(&self, during: During) -> bool {
+        self.tiles.iter().any(|tile| match during {
+            During::ForwardRows | During::ForwardColumns => tile.front_is_busy(),
+            During::Error => tile.errors_are_busy(),
+            During::Update => tile.update_is_busy(),
+            During::LoadWeights => false,
+        })
+    }
+
+    /// Parts at work in the cycle that begins, in the order of `Part`. The first tile is the largest.
+    pub(super) fn at_work(&self) -> [u64; 8] {
+        let tile = &self.tiles[0];
+        let in_tree = self.tree.iter().filter(|entry| entry.1 == 0).count() as u64;
+        let [arrays, converters, lanes, bus, multipliers, accumulators] =
+            tile.at_work().map(u64::from);
+        let writers = u64::from(self.tiles.iter().any(Tile::is_writing));
+        [arrays, converters, in_tree, lanes, bus, multipliers, accumulators, writers]
+    }
+
+    /// What was counted since the last call, by target: banks, and what is beside them.
+    pub(super) fn take_events(&mut self) -> Vec<(Stream, [BankEvents; 2], TileEvents)> {
+        let mut all = Vec::new();
+        for target in self.targets() {
+            let mut banks = [BankEvents::default(); 2];
+            let mut events = TileEvents::default();
+            for down in 0..self.grid[0] {
+                for across in 0..self.grid[1] {
+                    let tile = self.at(target, down, across);
+                    let (tile_banks, tile_events) = self.tiles[tile].take_events();
+                    banks.iter_mut().zip(&tile_banks).for_each(|(sum, more)| sum.merge(more));
+                    events.merge(&tile_events, across == 0);
+                }
+            }
+            all.push((target, banks, events));
+        }
+        all
+    }
+}
+
+/// Configuration of one tile of a layer.
+fn config(
+    hardware: &Hardware,
+    timing: Timing,
+    layer: &Layer,
+    target: Stream,
+    rows: &Range<usize>,
+    columns: &Range<usize>,
+) -> TileConfig {
+    let small = |number: u64| usize::try_from(number).expect("configured sizes are small");
+    let shifts = layer.adc_shifts.get(target.index()).cloned().unwrap_or_default();
+    let first = shifts.first().copied().unwrap_or(0);
+    let adc = match hardware.adc {
+        Adc::Ideal => TileAdc::Ideal,
+        Adc::Finite { bits, subtract: Subtract::Digital, .. } => {
+            TileAdc::Digital { bits: bits.get(), shift: first }
+        }
+        Adc::Finite { bits, subtract: Subtract::Current, .. } => {
+            TileAdc::Current { bits: bits.get(), shift: first }
+        }
+    };
+    let taps = &layer.taps;
+    let own = taps.words.chunks_exact(taps.per_unit).skip(columns.start).take(columns.len());
+    let own = own.map(|words| words.iter().map(|&word| usize::from(word)).collect());
+    TileConfig {
+        rows: rows.len(),
+        columns: columns.len(),
+        settle: timing.settle,
+        convert: timing.convert,
+        share: small(timing.share),
+        overlap: timing.overlapped,
+        slices: hardware.slices(),
+        dac_bits: hardware.dac_bits,
+        tree: 0,
+        lanes: small(timing.lanes),
+        hops: small(timing.hops),
+        words: taps.width,
+        tap_base: 0,
+        pulse: timing.pulse,
+        adc,
+        lut_bits: hardware.lut_bits.get(),
+        lut_shift: layer.lut.shift,
+        error_bits: hardware.error_bits.get(),
+        negate: target == Stream::N,
+        mantissa: 1,
+        dither_bits: hardware.dither_bits.get(),
+        increment_max: hardware.increment_max.get().into(),
+        floor: hardware.window.floor(),
+        ceiling: hardware.window.ceiling(),
+        absorbing: hardware.floor_kind == FloorKind::Absorbing,
+        more: More {
+            adc_shifts: shifts,
+            tree_outside: true,
+            taps: own.collect(),
+            tap_shift: taps.shift,
+            beat: timing.beat,
+            potentiation_only: false,
+            shift_extra: layer.spec.wiring.shift_extra(),
+            residual_bits: hardware.residual_bits.get(),
+            verify: timing.verify,
+            active_max: timing.active_max.map(small),
+            pulse_code: timing.pulse_code,
+        },
+    }
+}

@@ -1,0 +1,587 @@
+//! One tile, cycle by cycle: the page docs/TILE.md as plain Rust.
+//!
+//! All parts of a tile act at once on its registers as they were at the start of a cycle. Here they act one after the
+//! other, from the end of the data's way to its start, so that each still sees what the part before it had left the
+//! cycle before: lanes, tree, converters, front end; then error unit, update, and last the command that is accepted.
+//!
+//! Beyond the page, for networks of tiles (docs/MODEL.md, 4.5): an adder tree outside, more than one tap, remainders,
+//! verified, limited and amplitude-coded pulses, reads from the columns, and digital actions of more than one cycle.
+#![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
+
+use crate::chip::hardware::PulseCode;
+
+mod network;
+mod read;
+mod registers;
+mod write;
+
+/// Sizes a tile is built with.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct TileSize {
+    /// Rows.
+    pub rows: usize,
+    /// Columns.
+    pub columns: usize,
+    /// Samples it remembers.
+    pub slots: usize,
+    /// Stages of the adder tree there are registers for.
+    pub tree_max: usize,
+}
+
+/// What converts a column.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum TileAdc {
+    /// Lossless.
+    Ideal,
+    /// Each bank on its own.
+    Digital {
+        /// Width of a code.
+        bits: u32,
+        /// `ash`, by slice.
+        shift: u32,
+    },
+    /// The difference of the banks.
+    Current {
+        /// Width of a code.
+        bits: u32,
+        /// `ash`, by slice.
+        shift: u32,
+    },
+}
+
+/// Configuration registers. What docs/TILE.md lists comes first.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct TileConfig {
+    /// Rows in use.
+    pub rows: usize,
+    /// Columns in use.
+    pub columns: usize,
+    /// `T_A`.
+    pub settle: u64,
+    /// `T_C`.
+    pub convert: u64,
+    /// `S`.
+    pub share: usize,
+    /// Whether a slice settles while the one before is converted.
+    pub overlap: bool,
+    /// `NS`.
+    pub slices: u32,
+    /// Bits of a slice.
+    pub dac_bits: u32,
+    /// `T_tree`.
+    pub tree: usize,
+    /// `U`.
+    pub lanes: usize,
+    /// `H`.
+    pub hops: usize,
+    /// `CE`.
+    pub words: usize,
+    /// Word of the first column.
+    pub tap_base: usize,
+    /// `T_W`.
+    pub pulse: u64,
+    /// Converters; a slice may have a shift of its own, see `adc_shifts`.
+    pub adc: TileAdc,
+    /// Width of the table's index.
+    pub lut_bits: u32,
+    /// `lsh`.
+    pub lut_shift: u32,
+    /// Width of an error word.
+    pub error_bits: u32,
+    /// Whether units are of stream n and latch the negated word.
+    pub negate: bool,
+    /// Rate mantissa.
+    pub mantissa: i64,
+    /// D.
+    pub dither_bits: u32,
+    /// Bound of the pulses.
+    pub increment_max: i64,
+    /// Least level.
+    pub floor: u16,
+    /// Greatest level.
+    pub ceiling: u16,
+    /// Floor kind.
+    pub absorbing: bool,
+    /// What only networks of tiles have.
+    pub more: More,
+}
+
+/// What a tile of a network has beyond docs/TILE.md; the default is none of it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct More {
+    /// Shift of each slice; empty: the converter's own.
+    pub adc_shifts: Vec<u32>,
+    /// Whether accumulators leave the tile for a tree outside.
+    pub tree_outside: bool,
+    /// Words a column adds; empty: the modulo tap.
+    pub taps: Vec<Vec<usize>>,
+    /// Shift of the sum of more than one word.
+    pub tap_shift: u32,
+    /// Cycles of a digital action.
+    pub beat: u64,
+    /// Whether only potentiating gates count: positive ones in bank e, negative ones in bank i.
+    pub potentiation_only: bool,
+    /// Added to the shift of a write.
+    pub shift_extra: u32,
+    /// Fractional bits of the remainder behind a cell.
+    pub residual_bits: u32,
+    /// Whether each pulse is followed by a read.
+    pub verify: bool,
+    /// Cells that can be pulsed at a time.
+    pub active_max: Option<usize>,
+    /// How pulses are given.
+    pub pulse_code: PulseCode,
+}
+
+impl Default for More {
+    fn default() -> Self {
+        Self {
+            adc_shifts: vec![],
+            tree_outside: false,
+            taps: vec![],
+            tap_shift: 0,
+            beat: 1,
+            potentiation_only: false,
+            shift_extra: 0,
+            residual_bits: 0,
+            verify: false,
+            active_max: None,
+            pulse_code: PulseCode::Unary,
+        }
+    }
+}
+
+impl TileConfig {
+    /// `conv`.
+    const fn conversion(&self) -> u64 {
+        self.share as u64 * self.convert
+    }
+
+    /// Cycles of a slice.
+    fn period(&self) -> u64 {
+        if self.overlap {
+            self.settle.max(self.conversion())
+        } else {
+            self.settle + self.conversion()
+        }
+    }
+}
+
+/// A command and its fields.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Command<'a> {
+    /// `LOADW`.
+    LoadWeights {
+        /// Which row.
+        row: usize,
+        /// Levels of the columns in use, by bank.
+        levels: [&'a [u16]; 2],
+    },
+    /// `LOADX`.
+    LoadDrives {
+        /// Which row.
+        row: usize,
+        /// Which sample.
+        slot: usize,
+        /// Drive code of each bank.
+        codes: [u8; 2],
+    },
+    /// `FWD(rows)`.
+    Forward {
+        /// Which sample.
+        slot: usize,
+    },
+    /// `FWD(columns)`, driven by gates.
+    Columns {
+        /// Which sample.
+        slot: usize,
+    },
+    /// `ERR`.
+    Error {
+        /// Which sample.
+        slot: usize,
+    },
+    /// `UPD(now)`.
+    Now {
+        /// Which sample.
+        slot: usize,
+        /// k.
+        shift: u32,
+    },
+    /// `UPD(add)`.
+    Add {
+        /// Which sample.
+        slot: usize,
+    },
+    /// `UPD(write)`.
+    Write {
+        /// k.
+        shift: u32,
+    },
+}
+
+impl Command<'_> {
+    /// As the instruction is written, and the sample it is for.
+    #[must_use]
+    pub const fn name(&self) -> (&'static str, Option<usize>) {
+        match *self {
+            Self::LoadWeights { .. } => ("LOADW(row)", None),
+            Self::LoadDrives { slot, .. } => ("LOADX(row)", Some(slot)),
+            Self::Forward { slot } => ("FWD(rows)", Some(slot)),
+            Self::Columns { slot } => ("FWD(columns)", Some(slot)),
+            Self::Error { slot } => ("ERR(words)", Some(slot)),
+            Self::Now { slot, .. } => ("UPD(now)", Some(slot)),
+            Self::Add { slot } => ("UPD(add)", Some(slot)),
+            Self::Write { .. } => ("UPD(write)", None),
+        }
+    }
+}
+
+/// Counters of one bank, in the order of docs/TILE.md, 6.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct BankEvents {
+    /// Levels loaded.
+    pub cell_loads: u64,
+    /// Rows driven with a slice.
+    pub dac_slices: u64,
+    /// Cells that carried a read.
+    pub cell_reads: u64,
+    /// Columns sampled.
+    pub holds: u64,
+    /// Conversions.
+    pub conversions: u64,
+    /// Codes added up.
+    pub shift_adds: u64,
+    /// Products added to sums.
+    pub accumulates: u64,
+    /// Increments computed.
+    pub delta_computations: u64,
+    /// Increments that were not 0 before the bound.
+    pub requested: u64,
+    /// Increments that the bound changed.
+    pub bounded: u64,
+    /// Pulses given.
+    pub pulses_attempted: u64,
+    /// Levels moved.
+    pub pulses_effective: u64,
+    /// Conversions on the rail.
+    pub saturated_conversions: u64,
+    /// Only in networks.
+    pub verify_reads: u64,
+}
+
+/// Counters of a tile, in the order of docs/TILE.md, 6.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct TileEvents {
+    /// Columns looked up.
+    pub look_ups: u64,
+    /// Indices on the rail.
+    pub saturated_look_ups: u64,
+    /// Words heard.
+    pub bus_words: u64,
+    /// Words multiplied with slopes.
+    pub multiplies: u64,
+    /// Gates on the rail.
+    pub saturated_gates: u64,
+    /// Pulses of a row.
+    pub row_pulses: u64,
+    /// Only in networks: sums of taps that hit their rail.
+    pub saturated_errors: u64,
+}
+
+/// Which lines a read goes through.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+enum Way {
+    /// Rows are driven, columns are read.
+    #[default]
+    Rows,
+    /// Columns are driven, rows are read.
+    Columns,
+}
+
+/// Sampled currents and accumulators of the lines that are read.
+#[derive(Debug, Clone, Default)]
+struct Lines {
+    hold: [Vec<i64>; 2],
+    acc: Vec<i64>,
+    out: Vec<i64>,
+}
+
+#[derive(Debug, Clone, Default)]
+struct Front {
+    busy: bool,
+    slice: u32,
+    phase: u64,
+    slot: usize,
+    way: Way,
+}
+
+#[derive(Debug, Clone, Default)]
+struct Conv {
+    busy: bool,
+    slice: u32,
+    step: usize,
+    count: u64,
+    slot: usize,
+    way: Way,
+}
+
+#[derive(Debug, Clone, Default)]
+struct Lane {
+    busy: bool,
+    group: usize,
+    slot: usize,
+    way: Way,
+    /// Cycles of the group that have passed.
+    beat: u64,
+}
+
+#[derive(Debug, Clone, Default)]
+struct Err {
+    busy: bool,
+    count: usize,
+    slot: usize,
+    beat: u64,
+}
+
+/// What an update does in a cycle.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+enum UpdPhase {
+    #[default]
+    Compute,
+    Set,
+    Reset,
+    Turn,
+}
+
+/// Field of an update, as it is numbered in the register.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+enum UpdKind {
+    #[default]
+    Now,
+    Add,
+    Write,
+}
+
+#[derive(Debug, Clone, Default)]
+struct Upd {
+    busy: bool,
+    kind: UpdKind,
+    row: usize,
+    group: usize,
+    phase: UpdPhase,
+    pulse: i64,
+    count: u64,
+    slot: usize,
+    shift: u32,
+    beat: u64,
+    /// Passes of the pulse in progress that are done.
+    pass: usize,
+}
+
+/// A stage of the adder tree.
+#[derive(Debug, Clone, Default)]
+struct TreeStage {
+    valid: bool,
+    slot: usize,
+    sums: Vec<i64>,
+}
+
+/// Accumulators on their way to the lanes of a network.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Launch {
+    /// Which sample.
+    pub slot: usize,
+    /// A sum a line.
+    pub sums: Vec<i64>,
+}
+
+/// A tile.
+#[derive(Debug, Clone)]
+pub struct Tile {
+    size: TileSize,
+    config: TileConfig,
+    /// `[activity, derivative]` by index.
+    table: Vec<[u8; 2]>,
+    /// `[row][column]`.
+    level: [Vec<u16>; 2],
+    pruned: [Vec<bool>; 2],
+    residual: [Vec<i64>; 2],
+    /// `[slot][row]`.
+    drive: [Vec<u8>; 2],
+    lines: [Lines; 2],
+    tree: Vec<TreeStage>,
+    /// `[slot][column]`.
+    value: Vec<u8>,
+    slope: Vec<u8>,
+    /// By row, of the last read from the columns.
+    backward: Vec<i64>,
+    error: Vec<i64>,
+    /// Sums of taps while words arrive.
+    heard: Vec<i64>,
+    /// `[slot][column]`.
+    gate: Vec<i64>,
+    sum: [Vec<i64>; 2],
+    pulse: [Vec<i64>; 2],
+    peak_set: i64,
+    peak_reset: i64,
+    front: Front,
+    conv: Conv,
+    lane: Lane,
+    err: Err,
+    upd: Upd,
+    bank_events: [BankEvents; 2],
+    events: TileEvents,
+    launched: Option<(Launch, Way)>,
+    /// Whether the lanes have seen the last group of a sample in this cycle.
+    looked_up: bool,
+}
+
+impl Tile {
+    /// A tile after reset, with its look-up table: `2^lut_bits` pairs of activity and derivative.
+    ///
+    /// # Panics
+    /// When the configuration does not fit the size or the table.
+    #[must_use]
+    pub fn new(size: TileSize, config: TileConfig, table: Vec<[u8; 2]>) -> Self {
+        assert!((1..=size.rows).contains(&config.rows), "rows in use are rows");
+        assert!((1..=size.columns).contains(&config.columns), "columns in use are columns");
+        assert!(config.tree <= size.tree_max, "the tree has its stages");
+        assert_eq!(table.len(), 1 << config.lut_bits, "a table entry an index");
+        let positive = [config.settle, config.convert, config.pulse, config.more.beat];
+        assert!(positive.iter().all(|&cycles| cycles > 0), "what takes time takes a cycle");
+        assert!(config.share > 0 && config.lanes > 0 && config.words > 0, "counts are positive");
+        let cells = size.rows * size.columns;
+        let two = |count: usize| [vec![0; count], vec![0; count]];
+        let lines =
+            |count: usize| Lines { hold: two(count), acc: vec![0; count], out: vec![0; count] };
+        let stage = TreeStage { sums: vec![0; size.columns], ..TreeStage::default() };
+        Self {
+            level: [vec![0; cells], vec![0; cells]],
+            pruned: [vec![false; cells], vec![false; cells]],
+            residual: two(cells),
+            drive: [vec![0; size.slots * size.rows], vec![0; size.slots * size.rows]],
+            lines: [lines(size.columns), lines(size.rows)],
+            tree: vec![stage; size.tree_max],
+            value: vec![0; size.slots * size.columns],
+            slope: vec![0; size.slots * size.columns],
+            backward: vec![0; size.rows],
+            error: vec![0; size.columns],
+            heard: vec![0; size.columns],
+            gate: vec![0; size.slots * size.columns],
+            sum: two(cells),
+            pulse: two(size.columns),
+            peak_set: 0,
+            peak_reset: 0,
+            front: Front::default(),
+            conv: Conv::default(),
+            lane: Lane::default(),
+            err: Err::default(),
+            upd: Upd::default(),
+            bank_events: Default::default(),
+            events: TileEvents::default(),
+            launched: None,
+            looked_up: false,
+            size,
+            config,
+            table,
+        }
+    }
+
+    /// `NG` of so many lines.
+    const fn groups(&self, lines: usize) -> usize {
+        lines.div_ceil(self.config.lanes)
+    }
+
+    /// Whether nothing is in progress.
+    #[must_use]
+    pub fn idle(&self) -> bool {
+        let tree = self.tree.iter().any(|stage| stage.valid);
+        let busy = [self.front.busy, self.conv.busy, self.lane.busy, self.err.busy, self.upd.busy];
+        !tree && busy.iter().all(|busy| !busy)
+    }
+
+    /// Whether a command would be accepted in this cycle.
+    #[must_use]
+    pub fn ready(&self, command: &Command<'_>) -> bool {
+        match command {
+            Command::Forward { .. } => !self.front.busy && !self.err.busy && !self.upd.busy,
+            _ => self.idle(),
+        }
+    }
+
+    /// Number of the error word that arrives in this cycle; 0 when none.
+    #[must_use]
+    pub const fn bus_index(&self) -> usize {
+        if self.bus_wanted() { self.err.count - self.config.hops } else { 0 }
+    }
+
+    /// Whether an error word arrives in this cycle.
+    #[must_use]
+    pub const fn bus_wanted(&self) -> bool {
+        let hops = self.config.hops;
+        self.err.busy && self.err.count >= hops && self.err.count < hops + self.config.words
+    }
+
+    /// Row whose draws are wanted.
+    #[must_use]
+    pub const fn dither_row(&self) -> usize {
+        self.upd.row
+    }
+
+    /// Whether draws are taken in this cycle.
+    #[must_use]
+    pub fn dither_wanted(&self) -> bool {
+        let computes = self.upd.phase == UpdPhase::Compute && self.upd.kind != UpdKind::Add;
+        self.upd.busy && computes
+    }
+
+    /// One cycle. `command` is what is offered, `bus_word` what the bus carries, `dither` a draw a column and bank.
+    pub fn cycle(&mut self, command: Option<&Command<'_>>, bus_word: i16, dither: [&[u16]; 2]) {
+        let accepted = command.filter(|command| self.ready(command));
+        self.launched = None;
+        self.looked_up = false;
+        self.lanes();
+        self.tree();
+        self.converters();
+        self.front_end();
+        self.errors(i64::from(bus_word));
+        self.updates(dither);
+        if let Some(command) = accepted {
+            self.accept(command);
+        }
+    }
+
+    fn accept(&mut self, command: &Command<'_>) {
+        let read = |slot, way| Front { busy: true, slice: 0, phase: 0, slot, way };
+        let update = |kind, slot, shift| Upd { busy: true, kind, slot, shift, ..Upd::default() };
+        match *command {
+            Command::LoadWeights { row, levels } => {
+                for (bank, levels) in levels.into_iter().enumerate() {
+                    let at = row * self.size.columns;
+                    let count = self.config.columns;
+                    self.level[bank][at..at + count].copy_from_slice(&levels[..count]);
+                    self.bank_events[bank].cell_loads += count as u64;
+                }
+            }
+            Command::LoadDrives { row, slot, codes } => {
+                for (bank, code) in codes.into_iter().enumerate() {
+                    self.drive[bank][slot * self.size.rows + row] = code;
+                }
+            }
+            Command::Forward { slot } => self.front = read(slot, Way::Rows),
+            Command::Columns { slot } => self.front = read(slot, Way::Columns),
+            Command::Error { slot } => {
+                self.heard.fill(0);
+                self.err = Err { busy: true, slot, ..Err::default() };
+            }
+            Command::Now { slot, shift } => self.upd = update(UpdKind::Now, slot, shift),
+            // the field is taken, and not used
+            Command::Add { slot } => self.upd = update(UpdKind::Add, slot, 0),
+            Command::Write { shift } => self.upd = update(UpdKind::Write, 0, shift),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

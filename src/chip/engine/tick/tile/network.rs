@@ -1,0 +1,152 @@
+//! What a network of tiles asks of one: state from outside, state to compare, parts at work, counts.
+#![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
+
+use super::{BankEvents, Tile, TileEvents, UpdKind, Way};
+
+impl Tile {
+    const fn place(&self, row: usize, column: usize) -> usize {
+        row * self.size.columns + column
+    }
+
+    pub(in super::super) fn load_level(
+        &mut self,
+        bank: usize,
+        row: usize,
+        column: usize,
+        level: u16,
+    ) {
+        let at = self.place(row, column);
+        self.level[bank][at] = level;
+    }
+
+    pub(in super::super) fn restore(
+        &mut self,
+        bank: usize,
+        row: usize,
+        column: usize,
+        pruned: bool,
+        residual: i64,
+    ) {
+        let at = self.place(row, column);
+        self.pruned[bank][at] = pruned;
+        self.residual[bank][at] = residual;
+    }
+
+    pub(in super::super) fn load_drive(&mut self, bank: usize, slot: usize, row: usize, code: u8) {
+        self.drive[bank][slot * self.size.rows + row] = code;
+    }
+
+    pub(in super::super) const fn set_learning(&mut self, mantissa: i64, potentiation_only: bool) {
+        self.config.mantissa = mantissa;
+        self.config.more.potentiation_only = potentiation_only;
+    }
+
+    pub(in super::super) fn set_adc_shifts(&mut self, shifts: &[u32]) {
+        self.config.more.adc_shifts = shifts.to_vec();
+    }
+
+    pub(in super::super) fn level(&self, bank: usize, row: usize, column: usize) -> u16 {
+        self.level[bank][self.place(row, column)]
+    }
+
+    pub(in super::super) fn is_pruned(&self, bank: usize, row: usize, column: usize) -> bool {
+        self.pruned[bank][self.place(row, column)]
+    }
+
+    pub(in super::super) fn residual(&self, bank: usize, row: usize, column: usize) -> i64 {
+        self.residual[bank][self.place(row, column)]
+    }
+
+    pub(in super::super) fn value(&self, slot: usize, column: usize) -> u8 {
+        self.value[slot * self.size.columns + column]
+    }
+
+    pub(in super::super) fn out(&self, column: usize) -> i64 {
+        self.lines[Way::Rows as usize].out[column]
+    }
+
+    pub(in super::super) fn backward_sum(&self, row: usize) -> i64 {
+        self.backward[row]
+    }
+
+    pub(in super::super) fn gates(&self, slot: usize) -> &[i64] {
+        &self.gate[slot * self.size.columns..][..self.size.columns]
+    }
+
+    pub(in super::super) fn set_gates(&mut self, slot: usize, gates: &[i64]) {
+        self.gate[slot * self.size.columns..][..gates.len()].copy_from_slice(gates);
+    }
+
+    /// Whether the last group of a sample was looked up in the cycle that has just ended.
+    pub(in super::super) const fn looked_up(&self) -> bool {
+        self.looked_up
+    }
+
+    pub(in super::super) const fn front_is_busy(&self) -> bool {
+        self.front.busy
+    }
+
+    pub(in super::super) const fn errors_are_busy(&self) -> bool {
+        self.err.busy
+    }
+
+    pub(in super::super) const fn update_is_busy(&self) -> bool {
+        self.upd.busy
+    }
+
+    pub(in super::super) fn is_writing(&self) -> bool {
+        self.upd.busy && self.upd.kind != UpdKind::Add
+    }
+
+    /// Array, converters, lanes, bus, multipliers, accumulators in the cycle that begins.
+    pub(in super::super) fn at_work(&self) -> [bool; 6] {
+        let front = &self.front;
+        let in_slice = front.slice < self.read_slices(front.way);
+        let words = self.config.hops + self.config.words;
+        [
+            front.busy && in_slice && front.phase < self.config.settle,
+            self.conv.busy,
+            self.lane.busy,
+            self.bus_wanted(),
+            self.err.busy && self.err.count >= words,
+            self.upd.busy && self.upd.kind == UpdKind::Add,
+        ]
+    }
+
+    /// Counts since the last call.
+    pub(in super::super) fn take_events(&mut self) -> ([BankEvents; 2], TileEvents) {
+        (std::mem::take(&mut self.bank_events), std::mem::take(&mut self.events))
+    }
+}
+
+impl BankEvents {
+    pub(in super::super) const fn merge(&mut self, more: &Self) {
+        self.cell_loads += more.cell_loads;
+        self.dac_slices += more.dac_slices;
+        self.cell_reads += more.cell_reads;
+        self.holds += more.holds;
+        self.conversions += more.conversions;
+        self.shift_adds += more.shift_adds;
+        self.accumulates += more.accumulates;
+        self.delta_computations += more.delta_computations;
+        self.requested += more.requested;
+        self.bounded += more.bounded;
+        self.pulses_attempted += more.pulses_attempted;
+        self.pulses_effective += more.pulses_effective;
+        self.saturated_conversions += more.saturated_conversions;
+        self.verify_reads += more.verify_reads;
+    }
+}
+
+impl TileEvents {
+    /// Adds another tile's; words on the bus are heard by all, and counted where `bus` says so.
+    pub(in super::super) const fn merge(&mut self, more: &Self, bus: bool) {
+        self.look_ups += more.look_ups;
+        self.saturated_look_ups += more.saturated_look_ups;
+        self.bus_words += if bus { more.bus_words } else { 0 };
+        self.multiplies += more.multiplies;
+        self.saturated_gates += more.saturated_gates;
+        self.row_pulses += more.row_pulses;
+        self.saturated_errors += more.saturated_errors;
+    }
+}

@@ -1,0 +1,291 @@
+//! Errors and updates: taps, gates, sums, pulses. See docs/TILE.md, 4.
+#![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
+
+use super::{Tile, Upd, UpdKind, UpdPhase};
+use crate::chip::hardware::PulseCode;
+use crate::num::fixed::{rsh, sat};
+
+impl Tile {
+    pub(super) fn errors(&mut self, word: i64) {
+        if !self.err.busy {
+            return;
+        }
+        self.err.beat += 1;
+        if self.err.beat < self.config.more.beat {
+            return;
+        }
+        self.err.beat = 0;
+        let (hops, words) = (self.config.hops, self.config.words);
+        let groups = self.groups(self.config.columns);
+        let count = self.err.count;
+        if (hops..hops + words).contains(&count) {
+            self.hear(count - hops, word);
+        } else if count >= hops + words {
+            for column in self.group(count - hops - words, self.config.columns) {
+                self.multiply(column);
+            }
+        }
+        self.err.count += 1;
+        if self.err.count == hops + words + groups {
+            self.err.busy = false;
+            self.err.count = 0;
+        }
+    }
+
+    /// Columns whose tap is word `k` latch it.
+    fn hear(&mut self, k: usize, word: i64) {
+        self.events.bus_words += 1;
+        for column in 0..self.config.columns {
+            if let Some(taps) = self.config.more.taps.get(column) {
+                let times = taps.iter().filter(|&&tap| tap == k).count();
+                self.heard[column] += word * i64::try_from(times).expect("few taps");
+            } else if (column + self.config.tap_base) % self.config.words == k {
+                self.error[column] = if self.config.negate { -word } else { word };
+            }
+        }
+    }
+
+    fn multiply(&mut self, column: usize) {
+        let bits = self.config.error_bits;
+        if let Some(taps) = self.config.more.taps.get(column) {
+            let mut word = self.heard[column];
+            if taps.len() > 1 {
+                let (bounded, changed) = sat(rsh(word, self.config.more.tap_shift), bits);
+                self.events.saturated_errors += u64::from(changed);
+                word = bounded;
+            }
+            self.error[column] = if self.config.negate { -word } else { word };
+        }
+        let at = self.err.slot * self.size.columns + column;
+        let slope = self.slope[at];
+        let (u, saturated) = sat(rsh(self.error[column] * i64::from(slope), bits), 8);
+        self.gate[at] = u;
+        self.events.multiplies += 1;
+        self.events.saturated_gates += u64::from(saturated);
+    }
+
+    pub(super) fn updates(&mut self, dither: [&[u16]; 2]) {
+        if !self.upd.busy {
+            return;
+        }
+        match (self.upd.kind, self.upd.phase) {
+            (UpdKind::Add, _) => {
+                if self.beat_is_over() {
+                    self.add();
+                }
+            }
+            (_, UpdPhase::Compute) => {
+                if self.beat_is_over() {
+                    self.compute(dither);
+                }
+            }
+            (_, UpdPhase::Set | UpdPhase::Reset) => self.pulses(),
+            (_, UpdPhase::Turn) => {
+                if self.beat_is_over() {
+                    self.turn_around();
+                }
+            }
+        }
+    }
+
+    const fn beat_is_over(&mut self) -> bool {
+        self.upd.beat += 1;
+        let over = self.upd.beat == self.config.more.beat;
+        if over {
+            self.upd.beat = 0;
+        }
+        over
+    }
+
+    /// The product of a row's drive and a column's gate as a bank takes it.
+    fn outer(&self, bank: usize, column: usize) -> i64 {
+        let drive = i64::from(self.drive[bank][self.upd.slot * self.size.rows + self.upd.row]);
+        let gate = self.gate[self.upd.slot * self.size.columns + column];
+        let only = self.config.more.potentiation_only;
+        match bank {
+            0 if only => drive * gate.max(0),
+            0 => drive * gate,
+            _ if only => -drive * gate.min(0),
+            _ => -drive * gate,
+        }
+    }
+
+    fn add(&mut self) {
+        for column in self.group(self.upd.group, self.config.columns) {
+            for bank in 0..2 {
+                let product = self.outer(bank, column);
+                self.sum[bank][self.upd.row * self.size.columns + column] += product;
+                self.bank_events[bank].accumulates += 1;
+            }
+        }
+        self.upd.group += 1;
+        if self.upd.group == self.groups(self.config.columns) {
+            self.upd.group = 0;
+            self.next_row();
+        }
+    }
+
+    fn next_row(&mut self) {
+        self.upd.row += 1;
+        if self.upd.row == self.config.rows {
+            let Upd { kind, slot, shift, .. } = self.upd;
+            self.upd = Upd { kind, slot, shift, ..Upd::default() };
+        }
+    }
+
+    /// Rounds and bounds a row.
+    fn compute(&mut self, dither: [&[u16]; 2]) {
+        self.peak_set = 0;
+        self.peak_reset = 0;
+        for bank in 0..2 {
+            for column in 0..self.config.columns {
+                let at = self.upd.row * self.size.columns + column;
+                let sum = match self.upd.kind {
+                    UpdKind::Now => {
+                        self.bank_events[bank].accumulates += 1;
+                        self.outer(bank, column)
+                    }
+                    UpdKind::Write | UpdKind::Add => std::mem::take(&mut self.sum[bank][at]),
+                };
+                let word = dither[bank].get(column).copied().unwrap_or(0);
+                let pulses = self.bounded(bank, at, sum * self.config.mantissa, word);
+                self.pulse[bank][column] = pulses;
+                self.peak_set = self.peak_set.max(pulses);
+                self.peak_reset = self.peak_reset.max(-pulses);
+            }
+        }
+        self.upd.phase = if self.peak_set > 0 {
+            UpdPhase::Set
+        } else if self.peak_reset > 0 {
+            UpdPhase::Reset
+        } else {
+            UpdPhase::Turn
+        };
+    }
+
+    /// Bounded pulses of a cell, with its remainder if it has one.
+    fn bounded(&mut self, bank: usize, at: usize, total: i64, word: u16) -> i64 {
+        let max = self.config.increment_max;
+        let fraction = self.config.more.residual_bits;
+        let rounded = self.rounded(total, word, fraction);
+        let (asked, pulses);
+        if fraction == 0 {
+            asked = rounded;
+            pulses = asked.clamp(-max, max);
+        } else {
+            // level and remainder are clamped as one number: docs/MODEL.md, 5
+            let sum = self.residual[bank][at] + rounded;
+            asked = sum >> fraction;
+            pulses = asked.clamp(-max, max);
+            let level = i64::from(self.level[bank][at]);
+            let rest = (1 << fraction) - 1;
+            let wanted = level + pulses;
+            let left = sum - (pulses << fraction);
+            self.residual[bank][at] = if wanted < i64::from(self.config.floor) {
+                0
+            } else if wanted > i64::from(self.config.ceiling) {
+                rest
+            } else {
+                left.clamp(0, rest)
+            };
+        }
+        let events = &mut self.bank_events[bank];
+        events.delta_computations += 1;
+        events.requested += u64::from(asked != 0);
+        events.bounded += u64::from(asked != pulses);
+        pulses
+    }
+
+    /// `SR(total, k)`, `F` bits finer.
+    fn rounded(&self, total: i64, word: u16, fraction: u32) -> i64 {
+        let dither = self.config.dither_bits;
+        let shift = i64::from(self.upd.shift + self.config.more.shift_extra);
+        let shift = shift - i64::from(fraction) - i64::from(dither);
+        let q = match u32::try_from(shift) {
+            Ok(right) => rsh(total, right),
+            Err(_) => total << shift.unsigned_abs(),
+        };
+        let mask = (1i64 << dither) - 1;
+        (q + (i64::from(word) & mask)) >> dither
+    }
+
+    /// One cycle of the pulses of a polarity.
+    fn pulses(&mut self) {
+        let verify = self.config.more.verify;
+        let reading = if verify { self.config.settle + self.config.conversion() } else { 0 };
+        self.upd.count += 1;
+        if self.upd.count < self.config.pulse + reading {
+            return;
+        }
+        self.upd.count = 0;
+        let set = self.upd.phase == UpdPhase::Set;
+        let active = self.active(set);
+        let together = self.config.more.active_max.unwrap_or(usize::MAX);
+        let first = self.upd.pass * together;
+        for &(bank, column) in active.iter().skip(first).take(together) {
+            let by = match self.config.more.pulse_code {
+                PulseCode::Unary => 1,
+                PulseCode::Amplitude => self.pulse[bank][column].abs(),
+            };
+            self.move_cell(bank, column, if set { by } else { -by });
+        }
+        self.events.row_pulses += 1;
+        self.upd.pass += 1;
+        if active.len() > self.upd.pass.saturating_mul(together) {
+            return;
+        }
+        self.upd.pass = 0;
+        self.upd.pulse += 1;
+        let peak = if set { self.peak_set } else { self.peak_reset };
+        let last = match self.config.more.pulse_code {
+            PulseCode::Unary => self.upd.pulse == peak,
+            PulseCode::Amplitude => true,
+        };
+        if last {
+            self.upd.pulse = 0;
+            self.upd.phase =
+                if set && self.peak_reset > 0 { UpdPhase::Reset } else { UpdPhase::Turn };
+        }
+    }
+
+    /// Cells of the row that get the pulse in progress, bank after bank.
+    fn active(&self, set: bool) -> Vec<(usize, usize)> {
+        let wanted = |bank: usize, column: usize| {
+            let pulses = self.pulse[bank][column];
+            (if set { pulses } else { -pulses }) > self.upd.pulse
+        };
+        let columns = self.config.columns;
+        let cells = (0..2).flat_map(|bank| (0..columns).map(move |column| (bank, column)));
+        cells.filter(|&(bank, column)| wanted(bank, column)).collect()
+    }
+
+    /// A pulse of a cell: one level, or as many as its amplitude says.
+    fn move_cell(&mut self, bank: usize, column: usize, by: i64) {
+        let at = self.upd.row * self.size.columns + column;
+        let before = i64::from(self.level[bank][at]);
+        let (floor, ceiling) = (i64::from(self.config.floor), i64::from(self.config.ceiling));
+        let wanted = if by > 0 { (before + by).min(ceiling) } else { (before + by).max(floor) };
+        let after = if self.pruned[bank][at] { before } else { wanted };
+        self.level[bank][at] = u16::try_from(after).expect("inside the window");
+        let events = &mut self.bank_events[bank];
+        events.pulses_attempted += by.unsigned_abs();
+        events.pulses_effective += (after - before).unsigned_abs();
+        events.verify_reads += u64::from(self.config.more.verify);
+    }
+
+    fn turn_around(&mut self) {
+        if self.config.absorbing {
+            for bank in 0..2 {
+                for column in 0..self.config.columns {
+                    let at = self.upd.row * self.size.columns + column;
+                    let rests = self.level[bank][at] == self.config.floor;
+                    if rests && self.pulse[bank][column] != 0 {
+                        self.pruned[bank][at] = true;
+                    }
+                }
+            }
+        }
+        self.upd.phase = UpdPhase::Compute;
+        self.next_row();
+    }
+}

@@ -1,0 +1,113 @@
+//! Waves: one update of a training, cycle by cycle, in files that viewers open.
+//!
+//! ```text
+//! VCD        registers of one tile over cycles (docs/TILE.md); GTKWave, Surfer
+//! Perfetto   what every tile did when, one track a tile; ui.perfetto.dev, chrome://tracing
+//! ```
+//!
+//! The update is found by the fast engine and played again by the cycle-by-cycle network of tiles, which has to reach
+//! the same state in as many cycles: a trace that does not is an error of ours, and said.
+
+use std::cell::RefCell;
+use std::rc::Rc;
+
+use crate::chip::engine::tick::{Network, Span, Tile, TileAt};
+use crate::chip::engine::{Phase, Recorded};
+use crate::chip::ledger::Cycles;
+use crate::lab::config::Config;
+use crate::lab::data::{self, DataRoot};
+use crate::lab::run::{Machine, RunError, Session};
+
+mod perfetto;
+mod vcd;
+
+/// Registers with more numbers than this are left out of a wave, unless all are asked for.
+const NUMBERS_MAX: usize = 512;
+
+/// What to look at.
+#[derive(Debug, Clone, Copy)]
+pub struct Look {
+    /// Which update, from 1.
+    pub update: u64,
+    /// Which tile's registers.
+    pub tile: TileAt,
+    /// Whether registers of whole arrays are written too.
+    pub all: bool,
+}
+
+/// One update, as it can be looked at.
+#[derive(Debug)]
+pub struct Wave {
+    /// Registers of the tile over cycles.
+    pub vcd: Vec<u8>,
+    /// Operations of all tiles over time.
+    pub perfetto: String,
+    /// Cycles by stage, layer and part.
+    pub cycles: Cycles,
+}
+
+/// Plays an update of an experiment.
+///
+/// # Errors
+/// When the configuration has no timing, data cannot be read, there is no such update or tile.
+pub fn record(
+    config: &Config,
+    root: &DataRoot,
+    machine: Machine,
+    look: Look,
+) -> Result<Wave, RunError> {
+    let Some(timing) = config.hardware.timing else {
+        return Err(RunError::NoTiming { model: config.hardware_name.clone() });
+    };
+    let session = || Session::new(config, data::load(&config.source()?, root)?, machine);
+    let before = {
+        let mut session = session()?;
+        session.updates(look.update - 1)?;
+        session
+    };
+    let mut after = session()?;
+    after.keep_tape();
+    after.updates(look.update)?;
+    let tape = after.take_tape();
+    let samples = samples_of(&tape, before.trainer().driver().engine().layers()[0].spec.inputs);
+
+    let engine = before.trainer().driver().engine();
+    let mut network = Network::new(config.hardware, config.seed, engine.layers(), samples);
+    network.set_learning(engine.mantissa(), engine.potentiation_only());
+    let place = look.tile;
+    let grid = (place.layer < engine.layers().len()).then(|| network.grid(place.layer));
+    let inside = |[targets, downs, acrosses]: [usize; 3]| {
+        place.target < targets && place.down < downs && place.across < acrosses
+    };
+    if !grid.is_some_and(inside) {
+        return Err(RunError::NoTile { layers: engine.layers().len(), grid });
+    }
+    network.keep_spans();
+    let writer = Rc::new(RefCell::new(vcd::Writer::new(timing.clock_khz, look.all)));
+    let sink = Rc::clone(&writer);
+    network.watch_tile(place, move |cycle, tile: &Tile| {
+        sink.borrow_mut().cycle(cycle, &tile.registers());
+    });
+    network.play_tape(&tape);
+
+    let reached = after.trainer().driver().engine();
+    for (at, layer) in reached.layers().iter().enumerate() {
+        for (array, cells) in layer.arrays.iter().enumerate() {
+            let same = cells.levels().eq(network.levels(at, array));
+            assert!(same, "cycle by cycle, layer {at} reaches other levels");
+        }
+    }
+    let spans: Vec<Span> = network.take_spans();
+    let grids: Vec<_> = (0..engine.layers().len()).map(|layer| network.grid(layer)).collect();
+    let cycles = network.ledger(Phase::Training).cycles().expect("counted").clone();
+    let vcd = writer.borrow_mut().finish();
+    Ok(Wave { vcd, perfetto: perfetto::text(&spans, &grids, timing.clock_khz), cycles })
+}
+
+fn samples_of(tape: &[Recorded], inputs: usize) -> usize {
+    let count = |recorded: &Recorded| match recorded {
+        Recorded::LoadDrives { codes } => codes.len() / inputs,
+        _ => 0,
+    };
+    tape.iter().map(count).max().unwrap_or(0)
+}
