@@ -13,3 +13,5 @@ mod oracle;
 mod program;
 mod rules;
 mod same_bits;
+mod tile;
+mod tile_program;
