@@ -112,7 +112,11 @@ impl Session {
                 done < updates
             })
         });
-        if done < updates { Err(RunError::NoUpdate { update: updates, updates: done }) } else { Ok(()) }
+        if done < updates {
+            Err(RunError::NoUpdate { update: updates, updates: done })
+        } else {
+            Ok(())
+        }
     }
 
     /// Starts recording operations; what was read before the last samples were loaded is forgotten.
