@@ -85,11 +85,11 @@ pub(crate) fn settings() -> Vec<Setting> {
         shifts,
     };
     let mut settings = vec![
-        make("plain", 8, "", [6, 14], plain(8)),
+        make("plain", 8, "c1621393cffec28e", [6, 14], plain(8)),
         make(
             "one bit slices, long settling, digital converters, no dither, stream n",
             8,
-            "",
+            "c81876d975b305b1",
             [0, 14],
             TileConfig {
                 settle: 13,
@@ -114,7 +114,7 @@ pub(crate) fn settings() -> Vec<Setting> {
         make(
             "slow shared converters of currents, absorbing floor",
             8,
-            "",
+            "3cfd5026ab02c804",
             [2, 16],
             TileConfig {
                 settle: 1,
@@ -139,7 +139,7 @@ pub(crate) fn settings() -> Vec<Setting> {
         make(
             "no overlap, part of the tile, absorbing floor above 0",
             8,
-            "",
+            "8a5c5cc145b89b58",
             [0, 18],
             TileConfig {
                 rows: 5,
@@ -173,7 +173,7 @@ pub(crate) fn settings() -> Vec<Setting> {
         make(
             "one slice, one lane: the look-up is what is slow",
             8,
-            "",
+            "879df9055e4bbf68",
             [4, 15],
             TileConfig {
                 settle: 1,
@@ -195,7 +195,7 @@ pub(crate) fn settings() -> Vec<Setting> {
         make(
             "a converter step nobody waits in: more share than columns",
             8,
-            "",
+            "05e9ba7bc8de726a",
             [1, 12],
             TileConfig {
                 rows: 8,
@@ -222,14 +222,14 @@ pub(crate) fn settings() -> Vec<Setting> {
         make(
             "one cell",
             8,
-            "",
+            "cdf31d68b257a514",
             [4, 16],
             TileConfig { words: 2, tap_base: 1, tree: 1, lut_shift: 8, ceiling: 31, ..plain(1) },
         ),
         make(
             "one lane and a short period, no overlap",
             8,
-            "",
+            "ab15237c3ec2da9c",
             [5, 17],
             TileConfig {
                 settle: 1,
@@ -252,14 +252,14 @@ pub(crate) fn settings() -> Vec<Setting> {
         make(
             "large and plain",
             16,
-            "",
+            "85623810d285567c",
             [6, 16],
             TileConfig { words: 10, lut_shift: 12, ..plain(16) },
         ),
         make(
             "large, shared converters, three lanes, error bits 3",
             16,
-            "",
+            "d95e6939b3e0bcb6",
             [2, 12],
             TileConfig {
                 settle: 3,
@@ -286,7 +286,7 @@ pub(crate) fn settings() -> Vec<Setting> {
         make(
             "large, part of it, more words than columns",
             16,
-            "",
+            "c85b2a23d8b3e4c9",
             [0, 14],
             TileConfig {
                 rows: 11,
@@ -317,7 +317,7 @@ pub(crate) fn settings() -> Vec<Setting> {
         make(
             "large, one lane, one slice, absorbing floor",
             16,
-            "",
+            "46b908edcaed3556",
             [3, 18],
             TileConfig {
                 settle: 1,
@@ -339,7 +339,7 @@ pub(crate) fn settings() -> Vec<Setting> {
         make(
             "large, more share than columns, five slices of which one is empty",
             16,
-            "",
+            "d8411bf0315b4717",
             [2, 15],
             TileConfig {
                 settle: 20,
@@ -446,6 +446,8 @@ pub(crate) struct Program {
     waiting: VecDeque<Offer>,
     /// A command out of turn, withdrawn if the tile does not take it at once.
     stray: Option<Offer>,
+    /// Commands until every row in use has been loaded: before, its levels may lie outside the window.
+    unloaded: usize,
     pause: usize,
     /// What the bus carries.
     pub(crate) bus_word: i16,
@@ -462,12 +464,20 @@ impl Program {
             words: Words(setting.seed),
             waiting: VecDeque::new(),
             stray: None,
+            unloaded: 0,
             pause: 0,
             bus_word: 0,
             dither: [vec![0; setting.size], vec![0; setting.size]],
         };
-        program.load();
+        program.restart();
         program
+    }
+
+    /// The tile was reset: begins with loading again.
+    pub(crate) fn restart(&mut self) {
+        self.waiting.clear();
+        self.load();
+        self.unloaded = self.config.rows;
     }
 
     /// Chooses what the next cycle brings.
@@ -483,7 +493,7 @@ impl Program {
         if self.waiting.is_empty() {
             self.plan();
         }
-        self.stray = self.words.one_in(12).then(|| self.any());
+        self.stray = (self.unloaded == 0 && self.words.one_in(12)).then(|| self.any());
         if self.pause > 0 {
             self.pause -= 1;
         } else if self.words.one_in(40) {
@@ -503,6 +513,7 @@ impl Program {
         if self.stray.is_none() {
             self.waiting.pop_front();
         }
+        self.unloaded = self.unloaded.saturating_sub(1);
     }
 
     /// A word of the error bus: mostly of the width in use, at times wider, which saturates gates.
