@@ -17,6 +17,7 @@ use std::ops::Range;
 
 use aligned_vec::{AVec, CACHELINE_ALIGN};
 
+use super::crossbar::Collect;
 use super::crossbar::kernel::{Backend, LookUp};
 use super::crossbar::layout::BLOCK_ROWS;
 use super::hardware::Hardware;
@@ -30,10 +31,12 @@ mod currents;
 mod each;
 mod error;
 mod forward;
+mod pulses;
 mod read;
 mod update;
 
 pub use calibrate::Calibration;
+pub use pulses::{Pulses, TilePeaks, active};
 
 /// Which side of a crossbar is driven.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -166,6 +169,8 @@ struct Registers {
     backward: Vec<i64>,
     /// Samples added and not yet programmed, and their shift.
     pending: usize,
+    /// Pulses of the last write, if they were asked for.
+    pulses: Option<Pulses>,
 }
 
 /// Numbers that start on a line of the processor's cache.
@@ -203,6 +208,8 @@ pub struct Engine {
     seed: u64,
     /// Only potentiating pulses: excitatory arrays take positive gates, inhibitory ones negative gates.
     potentiation_only: bool,
+    /// What is told of the pulses of a write.
+    collect: Collect,
     /// Rate mantissa.
     mantissa: u32,
     layers: Vec<Layer>,
@@ -236,6 +243,7 @@ impl Engine {
             backend,
             seed,
             potentiation_only: false,
+            collect: Collect::Nothing,
             mantissa: 1,
             registers: vec![Registers::default(); layers.len()],
             currents: vec![[[0; 2]; 2]; layers.len()],

@@ -51,8 +51,8 @@ pub use self::{
     chacha::Draws,
     conv::{ConvPlan, ConvScratch, ConvShape, ConvTurned, Image, Pixels},
     data::{
-        Banks, Cells, Conversion, Dither, Drives, Half, LookUp, Scratch, TOGETHER, Write,
-        WriteCounts,
+        Banks, Cells, Conversion, Dither, Drives, Extremes, Half, LookUp, Peaks, Pulsed, Scratch,
+        TOGETHER, Write, WriteCounts,
     },
 };
 
@@ -168,6 +168,10 @@ trait Loops: Copy {
         dither: Dither<'_>,
     ) -> WriteCounts {
         scalar::program(cells, sums, write, dither)
+    }
+
+    fn peaks(self, extremes: &Extremes) -> Peaks {
+        scalar::peaks(extremes)
     }
 
     fn peak(self, _rounds: usize) -> u64 {
@@ -468,6 +472,13 @@ impl Kernel {
         assert!(write.floor <= write.ceiling, "the window is not empty");
         with!(self, loops => loops.program(cells, sums, write, dither))
     }
+
+    /// Sizes of the most positive and the most negative pulses of each row.
+    #[must_use]
+    pub fn peaks(&self, extremes: &Extremes) -> Peaks {
+        with!(self, loops => loops.peaks(extremes))
+    }
+
     /// Multiplies random numbers in registers, and nothing else, for some rounds. Returns the products made: what this
     /// back end's instruction reaches at most, once a caller has timed it. 0 where a back end has no such measure.
     #[must_use]

@@ -15,6 +15,7 @@ use aligned_vec::AVec;
 
 use super::each::each;
 use super::error::{gates_of, stride_of};
+use super::pulses::Pulses;
 use super::{Engine, Write};
 use crate::chip::crossbar::kernel::{self, Kernel, WriteCounts};
 use crate::chip::crossbar::layout::{BLOCK_ROWS, PANEL_COLUMNS};
@@ -56,6 +57,7 @@ impl Engine {
     fn program(&mut self, layer: usize, samples: Range<usize>, shift: u32) {
         let wiring = self.layers[layer].spec.wiring;
         self.row_sums[layer] = None;
+        self.registers[layer].pulses = Pulses::none(self.collect, &self.layers[layer]);
         if !samples.is_empty() {
             let counts = self.program_some(layer, &samples, shift);
             for (array, counts) in counts {
@@ -119,7 +121,7 @@ impl Engine {
             ceiling: hardware.window.ceiling(),
             residual_bits: hardware.residual_bits.get(),
         };
-        let (backend, seed) = (self.backend, self.seed);
+        let (backend, seed, collect) = (self.backend, self.seed, self.collect);
         let this = &mut self.layers[layer];
         let index = this.index;
         let request = |array: usize, count: u64| {
@@ -139,6 +141,7 @@ impl Engine {
                     sub: 0,
                     count,
                 },
+                collect,
             }
         };
         let work = this.layout.cells() * this.arrays.len() * samples.len();
@@ -148,16 +151,22 @@ impl Engine {
         }
         let writes = &this.writes;
         let panel_gates = PANEL_COLUMNS * stride;
-        let counts = each(work, strips, |(array, mut strip)| {
+        let written = each(work, strips, |(array, mut strip)| {
             let panels = strip.panels();
             let gates = &gates[array][panels.start * panel_gates..panels.end * panel_gates];
             let kernel = Kernel::start(backend);
-            (array, strip.write(&kernel, &request(array, writes[array]), gates))
+            let written = strip.write(&kernel, &request(array, writes[array]), gates);
+            (array, panels.start * PANEL_COLUMNS, written)
         });
         drop((gates, turned));
+        if let Some(pulses) = &mut self.registers[layer].pulses {
+            for (array, first, part) in &written {
+                pulses.merge(&self.layers[layer], *array, *first, &part.collected);
+            }
+        }
         self.registers[layer].turned = kept;
         self.registers[layer].gates = registers;
-        counts
+        written.into_iter().map(|(array, _, written)| (array, written.counts)).collect()
     }
 
     /// Turns the drives of some samples as an update takes them. Returns which blocks are driven at all.

@@ -7,7 +7,7 @@ use super::time::{Arm, race};
 use super::{Plan, chance, kernels, panels_timed};
 use crate::chip::crossbar::kernel::{Backend, Half, Kernel, Write};
 use crate::chip::crossbar::layout::{BLOCK_ROWS, HALF_CELLS, HALF_COLUMNS, Layout, PANEL_COLUMNS};
-use crate::chip::crossbar::{Crossbar, WriteRequest};
+use crate::chip::crossbar::{Collect, Crossbar, WriteRequest};
 use crate::chip::hardware::Hardware;
 use crate::num::draw::{Place, Site};
 
@@ -132,6 +132,7 @@ fn written<'a>(
         dither_bits: hardware.dither_bits,
         dither_pattern: hardware.dither_pattern,
         place: Place::global(4, Site::WriteDither, 0),
+        collect: Collect::Nothing,
     };
     Arm::here(move || {
         request.place.count += 1;

@@ -13,7 +13,8 @@ use std::arch::x86_64::*;
 use std::ops::Range;
 
 use super::{
-    Cells, Conversion, Dither, Draws, Drives, Half, Loops, Write, WriteCounts, lanes, peak,
+    Cells, Conversion, Dither, Draws, Drives, Extremes, Half, Loops, Peaks, Write, WriteCounts,
+    lanes, peak,
 };
 use crate::chip::crossbar::layout::{BLOCK_CELLS, BLOCK_ROWS, HALF_CELLS, HALF_COLUMNS, Layout};
 use crate::num::fixed::ErrorBits;
@@ -91,6 +92,10 @@ impl Loops for Avx2 {
         compiled!(program::program(cells, sums, write, dither))
     }
 
+    fn peaks(self, extremes: &Extremes) -> Peaks {
+        compiled!(peaks(extremes))
+    }
+
     fn peak(self, rounds: usize) -> u64 {
         peak::avx2(self, rounds)
     }
@@ -104,6 +109,11 @@ fn convert(
     codes: &mut [i16],
 ) -> [u64; 2] {
     lanes::convert(currents, conversion, live, codes)
+}
+
+#[target_feature(enable = "avx2,popcnt")]
+fn peaks(extremes: &Extremes) -> Peaks {
+    lanes::peaks(extremes)
 }
 
 #[target_feature(enable = "avx2,popcnt")]

@@ -16,8 +16,8 @@ use std::arch::x86_64::*;
 use std::ops::Range;
 
 use super::{
-    Cells, ConvScratch, Conversion, Dither, Draws, Drives, Half, Image, LookUp, Loops, Packed,
-    Scratch, Write, WriteCounts, peak,
+    Cells, ConvScratch, Conversion, Dither, Draws, Drives, Extremes, Half, Image, LookUp, Loops,
+    Packed, Peaks, Scratch, Write, WriteCounts, peak,
 };
 use crate::chip::crossbar::layout::{BLOCK_CELLS, BLOCK_ROWS, HALF_CELLS, HALF_COLUMNS, Layout};
 use crate::num::fixed::ErrorBits;
@@ -27,6 +27,7 @@ mod conv;
 mod dither;
 mod few;
 mod program;
+mod pulses;
 mod turn;
 mod units;
 
@@ -193,6 +194,10 @@ impl Loops for Avx512 {
         dither: Dither<'_>,
     ) -> WriteCounts {
         compiled!(program::program(cells, sums, write, dither))
+    }
+
+    fn peaks(self, extremes: &Extremes) -> Peaks {
+        compiled!(pulses::peaks(extremes))
     }
 
     fn peak(self, rounds: usize) -> u64 {

@@ -180,7 +180,65 @@ pub struct Cells<'a> {
     pub residual: Option<&'a mut Half<u16>>,
     /// Cells gone for good, of absorbing floors: one bit a cell, in the order of levels.
     pub pruned: Option<&'a mut [u64; HALF_CELLS / 64]>,
+    /// Where bounded pulses go, if they are wanted. Groups that are passed over put nothing there.
+    pub pulses: Option<Pulsed<'a>>,
 }
+
+/// Where bounded pulses go.
+#[derive(Debug)]
+pub enum Pulsed<'a> {
+    /// All are kept, in the order of levels.
+    Every(&'a mut Half<i8>),
+    /// The extremes are kept.
+    Most(&'a mut Extremes),
+}
+
+/// Most positive and most negative pulses over half blocks side by side, cell by cell, in the order of levels.
+#[derive(Debug, Clone)]
+#[repr(align(64))]
+pub struct Extremes {
+    /// At least 0.
+    pub most: Half<i8>,
+    /// At most 0.
+    pub least: Half<i8>,
+}
+
+impl Extremes {
+    /// No pulses.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self { most: [0; HALF_CELLS], least: [0; HALF_CELLS] }
+    }
+
+    /// Takes the pulses of some cells along.
+    #[inline(always)]
+    pub fn take(&mut self, from: usize, pulses: &[i8]) {
+        let most = self.most[from..from + pulses.len()].iter_mut();
+        most.zip(pulses).for_each(|(most, &pulses)| *most = (*most).max(pulses));
+        let least = self.least[from..from + pulses.len()].iter_mut();
+        least.zip(pulses).for_each(|(least, &pulses)| *least = (*least).min(pulses));
+    }
+}
+
+impl Default for Extremes {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl Pulsed<'_> {
+    /// Puts the pulses of some cells there.
+    #[inline(always)]
+    pub fn take(&mut self, from: usize, pulses: &[i8]) {
+        match self {
+            Self::Every(plane) => plane[from..from + pulses.len()].copy_from_slice(pulses),
+            Self::Most(extremes) => extremes.take(from, pulses),
+        }
+    }
+}
+
+/// Sizes of the most positive and the most negative pulses of each row of a block.
+pub type Peaks = [[u8; 2]; BLOCK_ROWS];
 
 /// What one write did, summed over cells.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]

@@ -15,7 +15,7 @@
 //! Otherwise `rounded` is at most the sum, and a residual of 16 bits fits above it.
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
-use super::{Cells, Conversion, Dither, Half, Write, WriteCounts};
+use super::{Cells, Conversion, Dither, Extremes, Half, Peaks, Write, WriteCounts};
 use crate::chip::crossbar::layout::{BLOCK_ROWS, HALF_CELLS, HALF_COLUMNS, PANEL_COLUMNS};
 use crate::num::fixed::ErrorBits;
 
@@ -138,6 +138,7 @@ pub(super) fn program(
     let (mut high, mut residual, mut pruned) = ([0; HALF_CELLS], [0; HALF_CELLS], [0; 16]);
     let high = cells.high.unwrap_or(&mut high);
     let residual = cells.residual.unwrap_or(&mut residual);
+    let mut out = cells.pulses;
     let absorbs = cells.pruned.is_some();
     let pruned = cells.pruned.unwrap_or(&mut pruned);
     let (scale, bytes, words) = match dither {
@@ -167,6 +168,7 @@ pub(super) fn program(
                 }
             }
         }
+        let mut pulses = [[0u32; HALF_COLUMNS]; 4];
         for r in 0..4 {
             for c in 0..HALF_COLUMNS {
                 levels[r][c] |= above[r][c] << 8;
@@ -175,12 +177,17 @@ pub(super) fn program(
                 scale,
                 sums[from + r * HALF_COLUMNS..].first_chunk().expect("16 sums a row"),
                 &drawn[r],
-                [&mut levels[r], &mut left[r], &mut gone[r]],
+                [&mut levels[r], &mut left[r], &mut gone[r], &mut pulses[r]],
                 &mut counts,
             );
         }
-        bytes_of_rows(&levels, 0, cells.low, from);
-        bytes_of_rows(&levels, 8, high, from);
+        if let Some(out) = &mut out {
+            let mut bytes = [0; 64];
+            bytes_of_rows(&pulses, 0, &mut bytes);
+            out.take(from, &bytes.map(u8::cast_signed));
+        }
+        bytes_of_rows(&levels, 0, &mut cells.low[from..from + 64]);
+        bytes_of_rows(&levels, 8, &mut high[from..from + 64]);
         words_of_rows(&left, residual, from);
         if absorbs {
             for (r, gone) in gone.iter().enumerate() {
@@ -193,6 +200,23 @@ pub(super) fn program(
     let [requested, bounded, attempted, effective] =
         counts.map(|lanes| lanes.iter().map(|&lane| u64::from(lane)).sum());
     WriteCounts { requested, bounded, attempted, effective }
+}
+
+/// [`super::scalar::peaks`], a group of 4 rows and 16 columns at a time.
+#[inline(always)]
+pub(super) fn peaks(extremes: &Extremes) -> Peaks {
+    let mut peaks = [[0; BLOCK_ROWS]; 2];
+    for (peaks, cells) in peaks.iter_mut().zip([&extremes.most, &extremes.least]) {
+        let groups = cells.as_chunks::<64>().0.iter().zip(peaks.as_chunks_mut::<4>().0);
+        for (cells, peaks) in groups {
+            for column in cells.as_chunks::<4>().0 {
+                for (peak, pulses) in peaks.iter_mut().zip(column) {
+                    *peak = (*peak).max(pulses.unsigned_abs());
+                }
+            }
+        }
+    }
+    std::array::from_fn(|row| [peaks[0][row], peaks[1][row]])
 }
 
 /// Four rows of 16 columns out of bytes in the order of levels: a column's four rows are one word.
@@ -208,8 +232,8 @@ fn rows_of_bytes(bytes: &Half<u8>, from: usize, rows: &mut [[u32; HALF_COLUMNS];
 
 /// The reverse of [`rows_of_bytes`], of bits `shift .. shift + 8`.
 #[inline(always)]
-fn bytes_of_rows(rows: &[[u32; HALF_COLUMNS]; 4], shift: u32, bytes: &mut Half<u8>, from: usize) {
-    for (c, four) in bytes[from..from + 64].as_chunks_mut::<4>().0.iter_mut().enumerate() {
+fn bytes_of_rows(rows: &[[u32; HALF_COLUMNS]; 4], shift: u32, bytes: &mut [u8]) {
+    for (c, four) in bytes.as_chunks_mut::<4>().0.iter_mut().enumerate() {
         let mut word = 0;
         for (r, row) in rows.iter().enumerate() {
             word |= (row[c] >> shift & 0xff) << (8 * r);
@@ -244,7 +268,7 @@ fn row(
     scale: Scale,
     sums: &[i32; HALF_COLUMNS],
     words: &[u32; HALF_COLUMNS],
-    [levels, left, gone]: [&mut [u32; HALF_COLUMNS]; 3],
+    [levels, left, gone, pulsed]: [&mut [u32; HALF_COLUMNS]; 4],
     counts: &mut [[u32; HALF_COLUMNS]; 4],
 ) {
     let most_left = (1 << scale.fraction) - 1;
@@ -265,6 +289,7 @@ fn row(
         left[c] = rest.cast_unsigned();
         gone[c] |= u32::from(pulses != 0) & u32::from(level == scale.floor);
         levels[c] = level.cast_unsigned();
+        pulsed[c] = pulses.cast_unsigned();
         counts[0][c] += u32::from(wanted != 0);
         counts[1][c] += u32::from(wanted != pulses);
         counts[2][c] += pulses.unsigned_abs();

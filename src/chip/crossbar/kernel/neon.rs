@@ -16,7 +16,10 @@ use std::arch::aarch64::*;
 use std::arch::{asm, is_aarch64_feature_detected};
 use std::ops::Range;
 
-use super::{Cells, Conversion, Dither, Draws, Drives, Half, Loops, Write, WriteCounts, lanes};
+use super::{
+    Cells, Conversion, Dither, Draws, Drives, Extremes, Half, Loops, Peaks, Write, WriteCounts,
+    lanes,
+};
 use crate::chip::crossbar::layout::{BLOCK_CELLS, BLOCK_ROWS, HALF_CELLS, HALF_COLUMNS, Layout};
 use crate::num::fixed::ErrorBits;
 
@@ -125,6 +128,10 @@ impl Loops for Neon {
         dither: Dither<'_>,
     ) -> WriteCounts {
         lanes::program(cells, sums, write, dither)
+    }
+
+    fn peaks(self, extremes: &Extremes) -> Peaks {
+        lanes::peaks(extremes)
     }
 }
 

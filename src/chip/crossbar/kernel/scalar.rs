@@ -20,8 +20,8 @@
 use std::ops::Range;
 
 use super::{
-    Cells, ConvScratch, Conversion, Dither, Draws, Drives, Half, Image, LookUp, Loops, Write,
-    WriteCounts, conv,
+    Cells, ConvScratch, Conversion, Dither, Draws, Drives, Extremes, Half, Image, LookUp, Loops,
+    Peaks, Write, WriteCounts, conv,
 };
 use crate::chip::crossbar::layout::{
     BLOCK_CELLS, BLOCK_ROWS, HALF_CELLS, HALF_COLUMNS, Layout, PANEL_COLUMNS, in_half,
@@ -229,6 +229,14 @@ pub(super) fn loud(sums: &Half<i32>, write: &Write, bits: u32) -> u16 {
     groups.fold(0, |mask, (group, sums)| mask | u16::from(sums.iter().any(loud)) << group)
 }
 
+pub(super) fn peaks(extremes: &Extremes) -> Peaks {
+    let peak = |cells: &Half<i8>, row| {
+        let sizes = (0..HALF_COLUMNS).map(|column| cells[in_half(row, column)].unsigned_abs());
+        sizes.max().expect("16 columns")
+    };
+    std::array::from_fn(|row| [&extremes.most, &extremes.least].map(|cells| peak(cells, row)))
+}
+
 pub(super) fn program(
     mut cells: Cells<'_>,
     sums: &Half<i32>,
@@ -275,6 +283,9 @@ pub(super) fn program(
             if let Some(pruned) = cells.pruned.as_mut() {
                 let now = gone || (pulses != 0 && level == floor);
                 pruned[at / 64] |= u64::from(now) << (at % 64);
+            }
+            if let Some(out) = cells.pulses.as_mut() {
+                out.take(at, &[pulses as i8]);
             }
             counts.requested += u64::from(wanted != 0);
             counts.bounded += u64::from(wanted != pulses);

@@ -203,6 +203,7 @@ struct State {
     high: Half<u8>,
     residual: Half<u16>,
     pruned: [u64; 16],
+    pulses: Half<i8>,
     counts: WriteCounts,
 }
 
@@ -220,6 +221,7 @@ fn programmed(
         high: wide.then_some(&mut state.high),
         residual: (write.residual_bits > 0).then_some(&mut state.residual),
         pruned: absorbs.then_some(&mut state.pruned),
+        pulses: (write.increment_max % 5 != 0).then_some(Pulsed::Every(&mut state.pulses)),
     };
     state.counts = kernel.program(cells, sums, write, dither);
     state
@@ -235,7 +237,8 @@ fn check_program(levels: &Half<u8>, sums: &Half<i32>, write: &Write, seed: u64) 
     residual.iter_mut().for_each(|left| *left &= (1 << write.residual_bits) - 1);
     let high = levels.map(|level| level.rotate_left(3) & 15);
     let pruned = std::array::from_fn(|i| u64::from(words[i]) * 0x8000_4000_2001);
-    let fresh = State { low: *levels, high, residual, pruned, counts: WriteCounts::default() };
+    let (pulses, counts) = ([0; HALF_CELLS], WriteCounts::default());
+    let fresh = State { low: *levels, high, residual, pruned, pulses, counts };
     for dither in [Dither::Nearest, Dither::Byte(&byte_words), Dither::Word(&words)] {
         for modes in [[false, false], [false, true], [true, false], [true, true]] {
             if modes[0] && write.ceiling == 0 {
@@ -406,6 +409,7 @@ fn a_zero_sum_moves_nothing_whatever_the_word() {
                         high: [0; HALF_CELLS],
                         residual: [0; HALF_CELLS],
                         pruned: [0; 16],
+                        pulses: [0; HALF_CELLS],
                         counts: WriteCounts::default(),
                     };
                     let sums = [0; HALF_CELLS];

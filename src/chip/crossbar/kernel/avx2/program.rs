@@ -27,7 +27,7 @@
 use std::arch::x86_64::*;
 
 use super::{load, load_sums, store};
-use crate::chip::crossbar::kernel::{Cells, Dither, Half, Write, WriteCounts, lanes};
+use crate::chip::crossbar::kernel::{Cells, Dither, Half, Pulsed, Write, WriteCounts, lanes};
 
 /// Half-up.
 const NEAREST: u8 = 0;
@@ -58,7 +58,7 @@ pub(super) fn program(
     let window = (floor, ceiling);
     // Without a remainder nothing reads or keeps these words.
     let mut none = [0; _];
-    let (low, left) = (cells.low, cells.residual);
+    let (low, left) = ((cells.low, cells.pulses), cells.residual);
     match (dither, left) {
         (Dither::Nearest, None) => {
             self::cells::<NEAREST, false>(low, &mut none, sums, write, window, &[0; _], &[0; _])
@@ -218,7 +218,7 @@ fn zeros(v: __m256i) -> u32 {
 
 #[target_feature(enable = "avx2,popcnt")]
 fn cells<const DITHER: u8, const RESIDUAL: bool>(
-    low: &mut Half<u8>,
+    (low, mut out): (&mut Half<u8>, Option<Pulsed<'_>>),
     left: &mut Half<u16>,
     sums: &Half<i32>,
     write: &Write,
@@ -250,7 +250,7 @@ fn cells<const DITHER: u8, const RESIDUAL: bool>(
     let groups = sums.as_chunks::<64>().0.iter().zip(low.as_chunks_mut::<64>().0);
     let dithers = bytes.as_chunks::<64>().0.iter().zip(words.as_chunks::<64>().0);
     let groups = groups.zip(left.as_chunks_mut::<64>().0);
-    for (((sums, low), left), (bytes, words)) in groups.zip(dithers) {
+    for (group, (((sums, low), left), (bytes, words))) in groups.zip(dithers).enumerate() {
         let (sums, _) = sums.as_chunks::<8>();
         let dithers = bytes.as_chunks::<32>().0.iter().zip(words.as_chunks::<32>().0);
         let halves = low.as_chunks_mut::<32>().0.iter_mut().zip(left.as_chunks_mut::<32>().0);
@@ -288,6 +288,11 @@ fn cells<const DITHER: u8, const RESIDUAL: bool>(
             let pulses = _mm256_shuffle_epi8(_mm256_packs_epi16(pulses_a, pulses_b), levels);
             // The bound is at least 1, so pulses are 0 exactly where none were wanted.
             quiet += zeros(pulses);
+            if let Some(out) = &mut out {
+                let mut given = [0; 32];
+                store(&mut given, pulses);
+                out.take(64 * group + 32 * h, &given.map(u8::cast_signed));
+            }
             let before = load(low);
             let level = _mm256_adds_epi8(_mm256_xor_si256(before, flip), pulses);
             let level = _mm256_max_epi8(_mm256_min_epi8(level, ceiling), floor);

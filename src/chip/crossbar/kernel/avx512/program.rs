@@ -25,8 +25,8 @@
 use std::arch::x86_64::*;
 
 use self::general::general;
-use super::{load, load_sums, store};
-use crate::chip::crossbar::kernel::{Cells, Dither, Half, Write, WriteCounts, scalar};
+use super::{load, load_sums, pulses, store};
+use crate::chip::crossbar::kernel::{Cells, Dither, Half, Pulsed, Write, WriteCounts, scalar};
 
 mod general;
 
@@ -72,7 +72,7 @@ pub(super) fn program(
         };
     };
     let window = (floor, ceiling);
-    let low = cells.low;
+    let low = (cells.low, cells.pulses);
     match dither {
         Dither::Nearest => scaled::<NEAREST>(low, sums, write, window, &[0; _], &[0; _]),
         Dither::Byte(words) if write.shift >= 8 && write.increment_max <= 15 => {
@@ -86,11 +86,14 @@ pub(super) fn program(
     }
 }
 
+/// Levels, and where pulses go if they are wanted.
+type Planes<'a> = (&'a mut Half<u8>, Option<Pulsed<'a>>);
+
 /// Writes as they usually are: bytes of dither, sums of at least 2^8 a pulse, and bounds whose pulses add up inside a
 /// byte over 16 groups.
 #[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi,popcnt")]
 fn usual(
-    low: &mut Half<u8>,
+    low: Planes<'_>,
     sums: &Half<i32>,
     write: &Write,
     window: (u8, u8),
@@ -112,7 +115,7 @@ const MERGED: [u8; 16] = [0, 8, 1, 9, 2, 10, 3, 11, 4, 12, 5, 13, 6, 14, 7, 15];
 /// window of all levels (`FULL`) is where the addition saturates.
 #[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi,popcnt")]
 fn usual_cells<const SCALE: u8, const FULL: bool>(
-    low: &mut Half<u8>,
+    (low, mut out): Planes<'_>,
     sums: &Half<i32>,
     write: &Write,
     window: (u8, u8),
@@ -139,6 +142,9 @@ fn usual_cells<const SCALE: u8, const FULL: bool>(
         }
         let level = _mm512_xor_si512(level, flip);
         store(low, level);
+        if let Some(out) = &mut out {
+            pulses::take(out, group, pulses);
+        }
         let size = _mm512_abs_epi8(pulses);
         requested = _mm512_add_epi8(requested, _mm512_min_epu8(size, one));
         attempted = _mm512_add_epi8(attempted, size);
@@ -180,7 +186,7 @@ fn usual_wanted<const SCALE: u8>(sums: &[i32; 64], words: &[u8; 64], scale: Scal
 
 #[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi,popcnt")]
 fn scaled<const DITHER: u8>(
-    low: &mut Half<u8>,
+    low: Planes<'_>,
     sums: &Half<i32>,
     write: &Write,
     window: (u8, u8),
@@ -350,10 +356,15 @@ fn tally(write: &Write, (floor, ceiling): (u8, u8)) -> Tally {
     }
 }
 
-/// Bounds and programs 64 cells that want `a` (rows 0 and 1) and `b` (rows 2 and 3), of 16 bits.
+/// Bounds and programs 64 cells that want `a` (rows 0 and 1) and `b` (rows 2 and 3), of 16 bits. Returns the pulses.
 #[inline]
 #[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi,popcnt")]
-fn settle<const BYTES_TELL: bool>(a: __m512i, b: __m512i, low: &mut [u8; 64], t: &mut Tally) {
+fn settle<const BYTES_TELL: bool>(
+    a: __m512i,
+    b: __m512i,
+    low: &mut [u8; 64],
+    t: &mut Tally,
+) -> __m512i {
     if !BYTES_TELL {
         t.bounded += _mm512_cmpgt_epi16_mask(a, t.over).count_ones();
         t.bounded += _mm512_cmpgt_epi16_mask(b, t.over).count_ones();
@@ -370,6 +381,7 @@ fn settle<const BYTES_TELL: bool>(a: __m512i, b: __m512i, low: &mut [u8; 64], t:
     let size = _mm512_sad_epu8(_mm512_xor_si512(pulses, t.flip), t.flip);
     t.attempted = _mm512_add_epi64(t.attempted, size);
     t.effective = _mm512_add_epi64(t.effective, _mm512_sad_epu8(level, before));
+    pulses
 }
 
 #[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi,popcnt")]
@@ -384,7 +396,7 @@ fn counts(t: &Tally) -> WriteCounts {
 
 #[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi,popcnt")]
 fn cells<const DITHER: u8, const SCALE: u8>(
-    low: &mut Half<u8>,
+    (low, mut out): Planes<'_>,
     sums: &Half<i32>,
     write: &Write,
     window: (u8, u8),
@@ -396,7 +408,7 @@ fn cells<const DITHER: u8, const SCALE: u8>(
     let mut tally = tally(write, window);
     let groups = sums.as_chunks::<64>().0.iter().zip(low.as_chunks_mut::<64>().0);
     let dithers = bytes.as_chunks::<64>().0.iter().zip(words.as_chunks::<64>().0);
-    for ((sums, low), (bytes, words)) in groups.zip(dithers) {
+    for (group, ((sums, low), (bytes, words))) in groups.zip(dithers).enumerate() {
         let (sums, _) = sums.as_chunks::<16>();
         let mut q = [_mm512_setzero_si512(); 4];
         for (q, sums) in q.iter_mut().zip(sums) {
@@ -410,15 +422,18 @@ fn cells<const DITHER: u8, const SCALE: u8>(
         }
         let mut a = _mm512_packs_epi32(q[0], q[1]);
         let mut b = _mm512_packs_epi32(q[2], q[3]);
-        if DITHER == BYTE {
+        let pulses = if DITHER == BYTE {
             let words = load(bytes);
             let word = _mm512_srlv_epi16(_mm512_shuffle_epi8(words, rows_01), scale.less);
             a = _mm512_srav_epi16(_mm512_adds_epi16(a, word), scale.last);
             let word = _mm512_srlv_epi16(_mm512_shuffle_epi8(words, rows_23), scale.less);
             b = _mm512_srav_epi16(_mm512_adds_epi16(b, word), scale.last);
-            settle::<true>(a, b, low, &mut tally);
+            settle::<true>(a, b, low, &mut tally)
         } else {
-            settle::<false>(a, b, low, &mut tally);
+            settle::<false>(a, b, low, &mut tally)
+        };
+        if let Some(out) = &mut out {
+            pulses::take(out, group, pulses);
         }
     }
     counts(&tally)

@@ -16,7 +16,7 @@
 use std::arch::x86_64::*;
 
 use super::{NEAREST, PLUS, WIDE, WORD, dither_rows, quotient, scale};
-use crate::chip::crossbar::kernel::avx512::{load_sums, store};
+use crate::chip::crossbar::kernel::avx512::{load_sums, pulses, store};
 use crate::chip::crossbar::kernel::{Cells, Half, Write, WriteCounts};
 use crate::chip::crossbar::layout::HALF_CELLS;
 
@@ -46,7 +46,7 @@ pub(super) fn general<const DITHER: u8>(
     let floor = _mm512_set1_epi32(write.floor.into());
     let ceiling = _mm512_set1_epi32(write.ceiling.into());
     // What a write does not have is nowhere: it is neither read nor stored.
-    let Cells { low, mut high, mut residual, mut pruned } = cells;
+    let Cells { low, mut high, mut residual, mut pruned, pulses: mut out } = cells;
     let (mut requested, mut bounded) = (0, 0);
     let (mut attempted, mut effective) = (zero, zero);
     for group in 0..HALF_CELLS / 64 {
@@ -70,6 +70,7 @@ pub(super) fn general<const DITHER: u8>(
             left.as_ref().map_or([zero; 4], |left| dither_rows::<WORD>(&[0; 64], left));
         let mut gone = bits.as_ref().map_or(0, |bits| **bits);
         let sums = sums[group * 64..].as_chunks::<16>().0;
+        let mut given = [zero; 4];
         for row in 0..4 {
             let sum = _mm512_mullo_epi32(load_sums(&sums[row]), scale.mantissa);
             let sum = _mm512_max_epi32(_mm512_min_epi32(sum, reach), least_reach);
@@ -83,6 +84,7 @@ pub(super) fn general<const DITHER: u8>(
             let total = _mm512_add_epi32(remainder[row], rounded);
             let wanted = _mm512_srav_epi32(total, fraction);
             let pulses = _mm512_max_epi32(_mm512_min_epi32(wanted, most), least);
+            given[row] = pulses;
             let before = levels[row];
             let reached = _mm512_add_epi32(before, pulses);
             let held = _mm512_max_epi32(_mm512_min_epi32(reached, ceiling), floor);
@@ -114,6 +116,9 @@ pub(super) fn general<const DITHER: u8>(
         }
         if let Some(bits) = bits {
             *bits = gone;
+        }
+        if let Some(out) = &mut out {
+            pulses::take(out, group, bytes_of(given));
         }
     }
     WriteCounts {
