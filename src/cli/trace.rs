@@ -47,8 +47,7 @@ pub(super) fn execute(args: &TraceArgs) -> Done {
         return Err(usage("name a file to write: --vcd FILE, --perfetto FILE, or both"));
     }
     let tile = tile(&args.tile)?;
-    let config =
-        configuration(args.file.as_ref(), args.hw.as_deref(), &args.settings, args.seed)?;
+    let config = configuration(args.file.as_ref(), args.hw.as_deref(), &args.settings, args.seed)?;
     let look = Look { update: args.update, tile, all: args.all };
     let wave = wave::record(&config, &args.shared.data_root(), args.shared.machine()?, look)?;
     let mut written = Vec::new();

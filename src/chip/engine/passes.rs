@@ -88,7 +88,8 @@ fn limited(
     let together = timing.active_max.expect("only called where there is a limit");
     let bound = u8::try_from(hardware.increment_max.get()).expect("1..=127");
     let row = |row: usize| {
-        let cells = banks.into_iter().flat_map(|bank| &bank[row * columns + first..row * columns + end]);
+        let cells =
+            banks.into_iter().flat_map(|bank| &bank[row * columns + first..row * columns + end]);
         let turns = active(cells, bound);
         let turns = match timing.pulse_code {
             PulseCode::Unary => &turns[..],

@@ -161,7 +161,12 @@ mod tests {
         let words: Vec<_> = (0..samples * 10).map(|at| (at * 53 % 255) as i16 - 127).collect();
         engine.execute(&Operation::LoadDrives { codes: &codes });
         engine.execute(&Operation::Forward { layer: 0, side: Side::Rows });
-        engine.execute(&Operation::Error { layer: 0, samples: 0..samples, words: &words, shared: false });
+        engine.execute(&Operation::Error {
+            layer: 0,
+            samples: 0..samples,
+            words: &words,
+            shared: false,
+        });
         let update = |write, samples| Operation::Update { layer: 0, write, samples, shift: 12 };
         engine.execute(&update(Write::Add, 0..samples));
         engine.execute(&update(Write::Program, 0..0));

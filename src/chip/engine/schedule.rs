@@ -21,8 +21,8 @@
 use std::ops::Range;
 
 use super::Write;
-use crate::chip::hardware::timing::{Timing, tree_levels};
 use crate::chip::hardware::Hardware;
+use crate::chip::hardware::timing::{Timing, tree_levels};
 use crate::chip::layer::Layer;
 use crate::chip::ledger::{Cycles, During, Part, Stage};
 

@@ -89,12 +89,9 @@ impl Recorded {
             Self::LoadDrives { codes } => Operation::LoadDrives { codes },
             Self::Forward { layer, side } => Operation::Forward { layer: *layer, side: *side },
             Self::Centre { .. } => return None,
-            Self::Error { layer, samples, words, shared } => Operation::Error {
-                layer: *layer,
-                samples: samples.clone(),
-                words,
-                shared: *shared,
-            },
+            Self::Error { layer, samples, words, shared } => {
+                Operation::Error { layer: *layer, samples: samples.clone(), words, shared: *shared }
+            }
             Self::Update { layer, write, samples, shift } => Operation::Update {
                 layer: *layer,
                 write: *write,

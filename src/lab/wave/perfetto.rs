@@ -13,7 +13,9 @@ pub(super) fn text(spans: &[Span], grids: &[[usize; 3]], clock_khz: u64) -> Stri
         events.push(process(layer, format!("layer {layer}")));
         for (tid, name) in tiles(*grid) {
             let args = json!({"name": name});
-            events.push(json!({"ph": "M", "name": "thread_name", "pid": layer, "tid": tid, "args": args}));
+            events.push(
+                json!({"ph": "M", "name": "thread_name", "pid": layer, "tid": tid, "args": args}),
+            );
         }
     }
     events.push(process(unit, "error unit".into()));
@@ -38,8 +40,11 @@ pub(super) fn text(spans: &[Span], grids: &[[usize; 3]], clock_khz: u64) -> Stri
 /// Number and name of each tile of a layer.
 fn tiles([targets, downs, acrosses]: [usize; 3]) -> Vec<(usize, String)> {
     let stream = |target: usize| ["p", "n"][target];
-    let all = (0..targets).flat_map(|t| (0..downs).flat_map(move |d| (0..acrosses).map(move |a| (t, d, a))));
-    all.enumerate().map(|(tid, (t, d, a))| (tid, format!("tile {} row {d} column {a}", stream(t)))).collect()
+    let all = (0..targets)
+        .flat_map(|t| (0..downs).flat_map(move |d| (0..acrosses).map(move |a| (t, d, a))));
+    all.enumerate()
+        .map(|(tid, (t, d, a))| (tid, format!("tile {} row {d} column {a}", stream(t))))
+        .collect()
 }
 
 /// Tiles that take part: words go to the heads of columns.

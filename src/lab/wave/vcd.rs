@@ -32,11 +32,7 @@ impl Writer {
         self.write(cycle, registers).expect("memory takes what is written");
     }
 
-    fn write(
-        &mut self,
-        cycle: u64,
-        registers: &[(&'static str, Vec<i64>)],
-    ) -> std::io::Result<()> {
+    fn write(&mut self, cycle: u64, registers: &[(&'static str, Vec<i64>)]) -> std::io::Result<()> {
         if self.registers.is_none() {
             self.header(registers)?;
         }

@@ -90,7 +90,12 @@ fn a_transposed_read_reaches_its_bound() {
             fill(&mut engine, 0, 0..1);
             forward(&mut engine, &[0, 0]);
             let words = [127, -127];
-            engine.execute(&Operation::Error { layer: 0, samples: 0..2, words: &words, shared: false });
+            engine.execute(&Operation::Error {
+                layer: 0,
+                samples: 0..2,
+                words: &words,
+                shared: false,
+            });
             engine.execute(&Operation::Forward { layer: 0, side: Side::Columns });
             let want = SIDE_MAX as i64 * i64::from(engine.hardware().window.ceiling()) * 127;
             assert_eq!(engine.backward(0), [want, -want], "{}", backend.name());
@@ -109,7 +114,12 @@ fn a_write_reaches_its_bound_with_the_greatest_batch_and_mantissa() {
             engine.set_mantissa(15);
             forward(&mut engine, &vec![255; batch]);
             let words = vec![word; batch];
-            engine.execute(&Operation::Error { layer: 0, samples: 0..batch, words: &words, shared: false });
+            engine.execute(&Operation::Error {
+                layer: 0,
+                samples: 0..batch,
+                words: &words,
+                shared: false,
+            });
             for (write, samples, shift) in [(Write::Add, 0..batch, 0), (Write::Program, 0..0, 23)] {
                 engine.execute(&Operation::Update { layer: 0, write, samples, shift });
             }

@@ -280,12 +280,9 @@ pub(crate) fn operation(op: &Op) -> Option<Operation<'_>> {
         Op::Drives(codes) => Operation::LoadDrives { codes },
         Op::Forward(layer) => Operation::Forward { layer: *layer, side: Side::Rows },
         Op::Backward(layer) => Operation::Forward { layer: *layer, side: Side::Columns },
-        Op::Error { layer, samples, words, shared } => Operation::Error {
-            layer: *layer,
-            samples: samples.clone(),
-            words,
-            shared: *shared,
-        },
+        Op::Error { layer, samples, words, shared } => {
+            Operation::Error { layer: *layer, samples: samples.clone(), words, shared: *shared }
+        }
         Op::Update { layer, write, samples, shift } => Operation::Update {
             layer: *layer,
             write: *write,

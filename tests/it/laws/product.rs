@@ -62,7 +62,12 @@ fn equals_its_product(net: &Net, backend: Backend) {
     let taps = &net.taps[0];
     let word = |_| numbers.within(-rail, rail) as i16;
     let words: Vec<i16> = (0..samples * taps.width).map(word).collect();
-    engine.execute(&Operation::Error { layer: 0, samples: 0..samples, words: &words, shared: false });
+    engine.execute(&Operation::Error {
+        layer: 0,
+        samples: 0..samples,
+        words: &words,
+        shared: false,
+    });
     engine.execute(&Operation::Forward { layer: 0, side: Side::Columns });
     let rows = engine.backward(0).chunks(inputs);
     for (words, got) in words.chunks(taps.width).zip(rows) {

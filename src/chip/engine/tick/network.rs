@@ -56,7 +56,8 @@ impl Network {
     pub fn new(hardware: Hardware, seed: u64, layers: &[Layer], slots: usize) -> Self {
         let timing = hardware.timing.expect("time is counted on hardware that has it");
         let ledger = Ledger::with_cycles(layers.len());
-        let layers = layers.iter().map(|layer| TickLayer::new(&hardware, timing, seed, layer, slots));
+        let layers =
+            layers.iter().map(|layer| TickLayer::new(&hardware, timing, seed, layer, slots));
         Self {
             timing,
             layers: layers.collect(),
@@ -195,7 +196,13 @@ impl Network {
                 }
                 Segment::LoadWeights { layer, array, row, levels } => {
                     let code = self.layers[layer].load_row(array, row, levels);
-                    self.charge(layer, code, During::LoadWeights, Event::CellLoads, levels.len() as u64);
+                    self.charge(
+                        layer,
+                        code,
+                        During::LoadWeights,
+                        Event::CellLoads,
+                        levels.len() as u64,
+                    );
                     for _ in 0..self.timing.beat {
                         self.begin(Stage::Load);
                         self.cycles().occupy(layer, During::LoadWeights, 1);
@@ -434,7 +441,8 @@ impl Network {
         let updating = during == During::Update;
         let sums = if updating && !now { 64 * (e.accumulates + e.delta_computations) } else { 0 };
         let rests = 2 * hardware.residual_bits * e.delta_computations;
-        let drives = if during == During::ForwardRows { hardware.dac_bits * e.dac_slices } else { 0 };
+        let drives =
+            if during == During::ForwardRows { hardware.dac_bits * e.dac_slices } else { 0 };
         vec![
             (Event::DacSlices, e.dac_slices),
             (Event::CellReads, e.cell_reads),

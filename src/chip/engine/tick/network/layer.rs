@@ -97,12 +97,8 @@ impl TickLayer {
             for down in 0..grid[0] {
                 for across in 0..grid[1] {
                     let (rows, columns) = (this.tile_rows(down), this.tile_columns(across));
-                    let size = TileSize {
-                        rows: rows.len(),
-                        columns: columns.len(),
-                        slots,
-                        tree_max: 0,
-                    };
+                    let size =
+                        TileSize { rows: rows.len(), columns: columns.len(), slots, tree_max: 0 };
                     let config = config(hardware, timing, layer, target, &rows, &columns);
                     this.tiles.push(Tile::new(size, config, table.clone()));
                 }

@@ -8,9 +8,19 @@ use crate::chip::engine::{Operation, Side, Write};
 /// Operations that overlap in time.
 #[derive(Debug)]
 pub(super) enum Segment<'a> {
-    LoadDrives { codes: &'a [u8] },
-    LoadWeights { layer: usize, array: usize, row: usize, levels: &'a [u16] },
-    Reads { layers: Range<usize>, samples: usize },
+    LoadDrives {
+        codes: &'a [u8],
+    },
+    LoadWeights {
+        layer: usize,
+        array: usize,
+        row: usize,
+        levels: &'a [u16],
+    },
+    Reads {
+        layers: Range<usize>,
+        samples: usize,
+    },
     Rounds(Vec<&'a Operation<'a>>),
     /// Layers and shifts.
     Writes(Vec<(usize, u32)>),
@@ -66,7 +76,9 @@ fn nothing(operation: &Operation<'_>, samples: usize) -> bool {
 /// Whether playing sample by sample what is here with one more operation changes nothing.
 fn fits(list: &[&Operation<'_>], operation: &Operation<'_>) -> bool {
     let written = |operation: &Operation<'_>| match operation {
-        Operation::Update { layer, write: Write::Now, samples, .. } => Some((*layer, samples.start)),
+        Operation::Update { layer, write: Write::Now, samples, .. } => {
+            Some((*layer, samples.start))
+        }
         _ => None,
     };
     let read = |operation: &Operation<'_>| matches!(operation, Operation::Forward { .. });
