@@ -146,8 +146,15 @@ pub(super) fn profile(args: &ProfileArgs) -> Done {
         say(&format!("area of {name}: {typical:.3} mm2 ({low:.3} to {high:.3})"));
     }
     if !shared.quiet {
-        for warning in &profile.warnings {
+        // what is not simulated is a list of its own: `hw show`
+        let warnings = profile.warnings.iter().filter(|text| !text.starts_with("not simulated"));
+        for warning in warnings {
             say(&format!("warning: {warning}"));
+        }
+        let effects: Vec<_> =
+            config.not_simulated.keys().map(|key| key.replace('_', " ")).collect();
+        if !effects.is_empty() {
+            say(&format!("not simulated: {} (see dalean hw show)", effects.join(", ")));
         }
     }
     for act in &profile.acts {

@@ -14,3 +14,5 @@ mod oracle;
 mod program;
 mod rules;
 mod same_bits;
+mod tile;
+mod tile_program;

@@ -7,7 +7,7 @@ use super::ConfigError;
 use super::chip;
 use super::file::{DataFile, ExperimentFile, HardwareFile, LearningFile, NetworkFile, PerLayer};
 use super::quantity::Constants;
-use crate::chip::hardware::{Adc, Hardware};
+use crate::chip::hardware::{Adc, Hardware, WriteScheme};
 use crate::chip::layer::LayerSpec;
 use crate::chip::population::Wiring;
 use crate::learn::error::Centre;
@@ -185,6 +185,12 @@ pub(super) fn config(mut file: ExperimentFile) -> Result<Config, ConfigError> {
     if mode == UpdateMode::Online && centre == Centre::Batch {
         let allowed = "one sample has no mean; use learning.centre = \"running\" or \"none\" with mode = \"online\"";
         return Err(wrong("learning.centre", "is \"batch\"", allowed));
+    }
+
+    if mode == UpdateMode::Accumulate && hardware.scheme != WriteScheme::Rounded {
+        let allowed = "trains write one sample at a time; with hw.write.scheme = \"rank1\" use mode = \"replay\" or \
+                       \"online\"";
+        return Err(wrong("learning.mode", "is \"accumulate\"", allowed));
     }
 
     let network = file.network.get_or_insert_with(NetworkFile::default);

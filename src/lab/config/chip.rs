@@ -8,7 +8,7 @@ use super::file::{
 };
 use crate::chip::hardware::{
     Adc, AdcRange, DitherBits, DitherPattern, FloorKind, Hardware, PulseCode, Subtract, Timing,
-    Window,
+    Window, WriteScheme,
 };
 use crate::num::fixed::{
     AdcBits, DriveBits, ErrorBits, IncrementMax, LevelBits, LutBits, ResidualBits,
@@ -87,7 +87,17 @@ pub(super) fn resolve(file: &mut HardwareFile, prefix: &str) -> Result<Hardware,
     let bits = *write.residual_bits.get_or_insert(0);
     let residual_bits = range(&key("write.residual_bits"), ResidualBits::new(bits))?;
 
+    let scheme = scheme(write, &key, increments)?;
     let timing = file.timing.as_mut().map(|table| timing(table, mode, &key)).transpose()?;
+    if let (WriteScheme::Trains { .. }, Some(timing)) = (scheme, timing) {
+        let limited = timing.verify || timing.active_max.is_some();
+        if limited || timing.pulse_code != PulseCode::Unary {
+            let found = "is \"rank1\" beside verified, limited or amplitude-coded pulses";
+            let allowed = "all rows and columns fire at once: leave out timing.verify, timing.write_active_max and \
+                           timing.pulses, or use write.scheme = \"rounded\"";
+            return Err(wrong(&key("write.scheme"), found, allowed));
+        }
+    }
     let size = |n: i64| usize::try_from(n).expect("checked to be positive");
     Ok(Hardware {
         level_bits,
@@ -106,8 +116,40 @@ pub(super) fn resolve(file: &mut HardwareFile, prefix: &str) -> Result<Hardware,
         dither_bits,
         dither_pattern,
         residual_bits,
+        scheme,
         timing,
     })
+}
+
+fn scheme(
+    write: &mut WriteFile,
+    key: &dyn Fn(&str) -> String,
+    increments: i64,
+) -> Result<WriteScheme, ConfigError> {
+    let schemes = [("rounded", false), ("rank1", true)];
+    if !word(&key("write.scheme"), &mut write.scheme, "rounded", &schemes)? {
+        return match write.train_slots {
+            None => Ok(WriteScheme::Rounded),
+            Some(slots) => {
+                let allowed = "only write.scheme = \"rank1\" has trains";
+                Err(wrong(&key("write.train_slots"), format!("is {slots}"), allowed))
+            }
+        };
+    }
+    let slots = *write.train_slots.get_or_insert(1 << increments.ilog2().min(5));
+    let most = i64::from(WriteScheme::SLOTS_MAX).min(increments);
+    if slots < 1 || slots > most || slots.count_ones() != 1 {
+        let allowed = format!(
+            "it is a power of two in 1..={most}: a cell gets at most one pulse a slot, and write.increment_max is \
+             {increments}"
+        );
+        return Err(wrong(&key("write.train_slots"), format!("is {slots}"), allowed));
+    }
+    if write.residual_bits != Some(0) {
+        let allowed = "coincidences of trains have no remainder; set it to 0";
+        return Err(wrong(&key("write.residual_bits"), "is not 0", allowed));
+    }
+    Ok(WriteScheme::Trains { slots_log2: slots.ilog2() })
 }
 
 fn converters(table: &mut AdcTable, key: &dyn Fn(&str) -> String) -> Result<Adc, ConfigError> {

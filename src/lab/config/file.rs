@@ -238,6 +238,10 @@ keys! {
         dither: String,
         /// Bits of the digital remainder behind a cell.
         residual_bits: i64,
+        /// `rounded` or `rank1`.
+        scheme: String,
+        /// Slots of a train (`rank1`).
+        train_slots: i64,
         /// Where the numbers come from.
         source: String,
         /// `measured`, `fitted`, `assumed`.
