@@ -128,7 +128,7 @@ fn constant_text(constant: &Constant, unit: &str) -> String {
     let value = match unit {
         // a prefix on a square metre would be read wrongly
         "m2" => {
-            let [low, typical, high] = constant.value.map(|area| area * 1e12);
+            let [low, typical, high] = constant.value.map(|area| (area * 1e15).round() / 1e3);
             format!("{typical} um2 ({low} to {high})")
         }
         _ => bounds(constant.value, unit),

@@ -11,12 +11,14 @@
 
 mod bill;
 mod changes;
+mod cost;
 mod peak;
 mod plan;
 mod unit;
 
 pub use bill::{Bill, Group, Idle, Line, Missing, Range, Share, price};
 pub use changes::{Change, changes};
+pub use cost::Cost;
 pub use peak::{Figure, Peak, areas, figures, peak};
 pub use plan::{Plan, PlanLayer};
 pub use unit::{bounds, prefixed};

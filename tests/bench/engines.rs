@@ -280,7 +280,11 @@ fn main() {
         rtl.finish();
         // loads are cycles of the RTL alone; the last one is accepted in the cycle after the write
         let loads = (SAMPLES * SIDE) as u64 + 1;
-        assert_eq!(elapsed(&fast) - before.0 + loads, rtl.cycles - before.1, "cycles of batch {at}");
+        assert_eq!(
+            elapsed(&fast) - before.0 + loads,
+            rtl.cycles - before.1,
+            "cycles of batch {at}"
+        );
         let arrays = &fast.layers()[0].arrays;
         let now: Vec<u16> = arrays.iter().flat_map(|array| array.levels()).collect();
         assert_eq!([tick.levels(0, 0), tick.levels(0, 1)].concat(), now, "Tick, batch {at}");
@@ -297,23 +301,37 @@ fn main() {
     let macs = (2 * 2 * SAMPLES * SIDE * SIDE) as f64;
     let batches: Vec<_> = (0..16).map(batch).collect();
     let rates = [
-        ("Fast", rate(|at| {
-            let (codes, words) = &batches[at % 16];
-            operations(codes, words).iter().for_each(|operation| fast.execute(operation));
-            fast.settle();
-        })),
-        ("Tick", rate(|at| {
-            let (codes, words) = &batches[at % 16];
-            tick.run(&operations(codes, words));
-        })),
-        ("RTL, Verilator", rate(|at| {
-            let (codes, words) = &batches[at % 16];
-            rtl.batch(codes, words);
-            rtl.finish();
-        })),
+        (
+            "Fast",
+            rate(|at| {
+                let (codes, words) = &batches[at % 16];
+                operations(codes, words).iter().for_each(|operation| fast.execute(operation));
+                fast.settle();
+            }),
+        ),
+        (
+            "Tick",
+            rate(|at| {
+                let (codes, words) = &batches[at % 16];
+                tick.run(&operations(codes, words));
+            }),
+        ),
+        (
+            "RTL, Verilator",
+            rate(|at| {
+                let (codes, words) = &batches[at % 16];
+                rtl.batch(codes, words);
+                rtl.finish();
+            }),
+        ),
     ];
-    println!("one tile of {SIDE} x {SIDE}, lossless converters, batches of {SAMPLES}: about {cycles} cycles each");
-    println!("{:16} {:>12} {:>14} {:>12} {:>10}", "engine", "batches / s", "cycles / s", "MAC / s", "x RTL");
+    println!(
+        "one tile of {SIDE} x {SIDE}, lossless converters, batches of {SAMPLES}: about {cycles} cycles each"
+    );
+    println!(
+        "{:16} {:>12} {:>14} {:>12} {:>10}",
+        "engine", "batches / s", "cycles / s", "MAC / s", "x RTL"
+    );
     let slowest = rates[2].1;
     for (name, rate) in rates {
         println!(

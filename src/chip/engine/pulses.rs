@@ -101,7 +101,9 @@ mod tests {
     use super::*;
     use crate::chip::crossbar::kernel::Backend;
     use crate::chip::engine::{Operation, Side, Write};
-    use crate::chip::hardware::{Adc, DitherBits, DitherPattern, FloorKind, Hardware, Window, WriteScheme};
+    use crate::chip::hardware::{
+        Adc, DitherBits, DitherPattern, FloorKind, Hardware, Window, WriteScheme,
+    };
     use crate::chip::layer::{LayerSpec, Taps};
     use crate::chip::population::Wiring;
     use crate::num::fixed::{DriveBits, ErrorBits, IncrementMax, LevelBits, LutBits, ResidualBits};
@@ -162,7 +164,12 @@ mod tests {
         let words: Vec<_> = (0..samples * 10).map(|at| (at * 53 % 255) as i16 - 127).collect();
         engine.execute(&Operation::LoadDrives { codes: &codes });
         engine.execute(&Operation::Forward { layer: 0, side: Side::Rows });
-        engine.execute(&Operation::Error { layer: 0, samples: 0..samples, words: &words, shared: false });
+        engine.execute(&Operation::Error {
+            layer: 0,
+            samples: 0..samples,
+            words: &words,
+            shared: false,
+        });
         let update = |write, samples| Operation::Update { layer: 0, write, samples, shift: 12 };
         engine.execute(&update(Write::Add, 0..samples));
         engine.execute(&update(Write::Program, 0..0));

@@ -141,8 +141,11 @@ pub fn price<'a>(
             None
         }
         _ => {
-            let why = "no cycles were counted: a model without [timing]".into();
-            missing.push(Missing { what: "time".into(), count: None, why });
+            // how often rows are pulsed is known where pulses take time
+            for what in ["time", Event::RowPulses.name()] {
+                let why = "no cycles were counted: a model without [timing]".into();
+                missing.push(Missing { what: what.into(), count: None, why });
+            }
             None
         }
     };

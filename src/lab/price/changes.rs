@@ -17,17 +17,34 @@ pub struct Change {
 /// Follows from rows of a tile.
 const DOWN: &[Event] = &[Event::Holds, Event::Conversions, Event::ShiftAdds, Event::RowPulses];
 /// Follows from columns of a tile.
-const ACROSS: &[Event] = &[Event::DacSlices, Event::RowPulses];
+const ACROSS: &[Event] = &[Event::DacSlices, Event::SramBits, Event::RowPulses];
 /// Follows from the number of slices.
-const SLICES: &[Event] =
-    &[Event::DacSlices, Event::CellReads, Event::Holds, Event::Conversions, Event::ShiftAdds];
+const SLICES: &[Event] = &[
+    Event::DacSlices,
+    Event::SramBits,
+    Event::CellReads,
+    Event::Holds,
+    Event::Conversions,
+    Event::ShiftAdds,
+];
 /// Follows from where banks are subtracted.
 const BANKS: &[Event] = &[Event::Conversions, Event::ShiftAdds];
 /// Follows from how pulses are given.
 const PULSES: &[Event] = &[Event::RowPulses, Event::VerifyReads];
 /// Follows from what was learnt: another width or range learns another net.
-const LEARNT: &[Event] =
+const LEARNT: &[Event] = &[Event::PulsesAttempted, Event::RowPulses, Event::VerifyReads];
+/// Follows from remainders behind cells.
+const REMAINDERS: &[Event] =
     &[Event::PulsesAttempted, Event::RowPulses, Event::VerifyReads, Event::SramBits];
+/// Follows from how increments become pulses.
+const SCHEME: &[Event] = &[
+    Event::PulsesAttempted,
+    Event::RowPulses,
+    Event::VerifyReads,
+    Event::SramBits,
+    Event::Accumulates,
+    Event::DeltaComputations,
+];
 
 /// The differences that matter to a ledger made on `run` when it is priced as if made on `other`. The clock is none:
 /// cycles do not depend on it.
@@ -57,7 +74,8 @@ pub fn changes(run: &Hardware, other: &Hardware) -> Vec<Change> {
     differ("write.increment_max", run.increment_max != other.increment_max, LEARNT, true);
     differ("write.dither_bits", run.dither_bits != other.dither_bits, LEARNT, true);
     differ("write.dither", run.dither_pattern != other.dither_pattern, LEARNT, true);
-    differ("write.residual_bits", run.residual_bits != other.residual_bits, LEARNT, true);
+    differ("write.residual_bits", run.residual_bits != other.residual_bits, REMAINDERS, true);
+    differ("write.scheme", run.scheme != other.scheme, SCHEME, true);
 
     match (run.timing, other.timing) {
         (None, None) => {}

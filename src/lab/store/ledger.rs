@@ -106,8 +106,8 @@ impl LedgerRecord {
                 count,
             });
         }
-        let Some(cycles) = cycles_of(ledger) else { return };
-        let passed = match before.and_then(cycles_of) {
+        let Some(cycles) = ledger.cycles() else { return };
+        let passed = match before.and_then(Ledger::cycles) {
             None => cycles.clone(),
             Some(before) => {
                 let pairs = cycles.numbers().into_iter().zip(before.numbers());
@@ -153,12 +153,6 @@ impl LedgerRecord {
             None => Ok(record),
         }
     }
-}
-
-/// Cycles of a ledger, when the hardware has a timing.
-#[must_use]
-pub const fn cycles_of(_ledger: &Ledger) -> Option<&Cycles> {
-    None
 }
 
 #[cfg(test)]

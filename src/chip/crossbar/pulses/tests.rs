@@ -7,7 +7,9 @@ use super::*;
 use crate::chip::crossbar::kernel::{Backend, Write};
 use crate::chip::crossbar::layout::PANEL_COLUMNS;
 use crate::chip::crossbar::{Crossbar, WriteRequest, Written};
-use crate::chip::hardware::{Adc, DitherBits, DitherPattern, FloorKind, Hardware, Window, WriteScheme};
+use crate::chip::hardware::{
+    Adc, DitherBits, DitherPattern, FloorKind, Hardware, Window, WriteScheme,
+};
 use crate::num::draw::{Place, Site};
 use crate::num::fixed::{DriveBits, ErrorBits, IncrementMax, LevelBits, LutBits, ResidualBits};
 
