@@ -20,6 +20,7 @@ use crate::lab::run::Machine;
 mod bench;
 mod data;
 mod hw;
+mod price;
 mod progress;
 mod run;
 mod trace;
@@ -69,6 +70,10 @@ enum Command {
     Eval(run::EvalArgs),
     /// Do a run again and compare every state hash
     Verify(run::VerifyArgs),
+    /// Say what one update and one inference cost: cycles, critical parts, energy
+    Profile(price::ProfileArgs),
+    /// Price a finished run: joules and seconds, with its own constants or another chip's
+    Price(price::PriceArgs),
     /// Show and fetch data sets
     #[command(subcommand)]
     Data(data::DataCommand),
@@ -181,6 +186,8 @@ pub fn main() -> ExitCode {
         Command::Train(args) => run::train(&args),
         Command::Eval(args) => run::eval(&args),
         Command::Verify(args) => run::verify(&args),
+        Command::Profile(args) => price::profile(&args),
+        Command::Price(args) => price::price(&args),
         Command::Data(command) => data::execute(&command),
         Command::Hw(command) => hw::execute(&command),
         Command::Trace(args) => trace::execute(&args),

@@ -2,6 +2,7 @@
 
 pub mod config;
 pub mod data;
+pub mod price;
 pub mod report;
 pub mod run;
 pub mod store;

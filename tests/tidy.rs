@@ -22,8 +22,8 @@ const HOUSE: [(&str, &[&str]); 6] = [
     ("chip", &["hardware", "ledger", "periphery", "crossbar", "population", "layer", "engine"]),
     ("learn", &["error", "route", "statistics", "rule", "driver"]),
     ("task", &["classify"]),
-    ("lab", &["data", "config", "store", "report", "run"]),
-    ("cli", &["progress", "data", "hw", "run", "bench"]),
+    ("lab", &["data", "config", "store", "price", "report", "run", "wave"]),
+    ("cli", &["progress", "data", "hw", "run", "price", "trace", "bench"]),
 ];
 
 /// Wings that know no floats, clocks, hash maps, environment or files.

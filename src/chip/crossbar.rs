@@ -18,9 +18,11 @@ use layout::{BLOCK_CELLS, BLOCK_ROWS, HALF_CELLS, HALF_COLUMNS, Layout, PANEL_CO
 pub mod kernel;
 pub mod layout;
 mod pulses;
+mod trains;
 mod write;
 
 pub use pulses::{Collect, Collected, RowPeaks};
+pub use trains::ColumnTrain;
 pub use write::{WriteRequest, Written};
 
 /// One logical array of cells and the digital state behind them.

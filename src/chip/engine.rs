@@ -37,6 +37,7 @@ mod read;
 mod schedule;
 mod tape;
 pub mod tick;
+mod trains;
 mod update;
 
 use schedule::Schedule;

@@ -130,6 +130,23 @@ pub enum DitherPattern {
     Separable,
 }
 
+/// How a write turns sums into pulses.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum WriteScheme {
+    /// Sums are rounded with a draw and bounded.
+    Rounded,
+    /// Rank 1, one sample at a time: rows and columns fire random trains, and a cell is pulsed where both fire.
+    Trains {
+        /// `log2` of the slots of a train.
+        slots_log2: u32,
+    },
+}
+
+impl WriteScheme {
+    /// Slots of a train, at most.
+    pub const SLOTS_MAX: u32 = 64;
+}
+
 /// A chip. Lengths are in cells, widths in bits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Hardware {
@@ -165,6 +182,8 @@ pub struct Hardware {
     pub dither_pattern: DitherPattern,
     /// Fractional bits of the digital remainder behind a cell.
     pub residual_bits: ResidualBits,
+    /// How sums become pulses.
+    pub scheme: WriteScheme,
     /// Cycles of what a tile does; `None`: no cycles are counted.
     pub timing: Option<Timing>,
 }

@@ -1,49 +1,194 @@
-//! `hw list`, `hw show`, `hw check`.
+//! `hw list`, `hw show`, `hw peak`, `hw check`.
 
-use clap::Subcommand;
+use clap::{Args, Subcommand};
+use serde_json::json;
 
-use super::{Done, say, usage};
-use crate::chip::hardware::{Adc, AdcRange, Hardware, Subtract};
-use crate::lab::config::{builtin_models, load_model};
+use super::{Done, Failure, say, usage};
+use crate::chip::hardware::{Adc, AdcRange, Hardware, PulseCode, Subtract, Timing};
+use crate::lab::config::{self, Config, Constant, Sources, Table, builtin_models, load_model};
+use crate::lab::price::{bounds, figures, peak, prefixed};
+
+/// Error words that `hw show` reckons with: those of ten classes.
+const WORDS: u64 = 10;
 
 #[derive(Debug, Subcommand)]
 pub(super) enum HwCommand {
     /// Show the built-in models
     List,
-    /// Show a model: its numbers, then its text with sources
+    /// Show a model: its numbers, times and energies, then its text with sources
     Show {
         /// A built-in name or a file
         model: String,
+        /// Change a key, such as hw.timing.lanes=8 (repeatable)
+        #[arg(long = "set", value_name = "KEY=VALUE")]
+        settings: Vec<String>,
     },
-    /// Check a model file: keys, ranges, a source beside every table
+    /// The most a chip can read: operations a second of all its tiles, in any mode
+    Peak(PeakArgs),
+    /// Check a model file: keys, ranges, a source beside every number, units
     Check {
         /// A built-in name or a file
         model: String,
     },
 }
 
+#[derive(Debug, Args)]
+pub(super) struct PeakArgs {
+    /// A built-in name or a file
+    model: String,
+    /// Change a key, such as hw.drive.phases=2 (repeatable)
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    settings: Vec<String>,
+    /// Tiles that read [default: tile.count, or 1]
+    #[arg(long, value_name = "N")]
+    tiles: Option<u64>,
+    /// Slices or phases of a read [default: those of the model]
+    #[arg(long, value_name = "N")]
+    slices: Option<u64>,
+    /// Cells of a weight: 2 of a pair, 8 where a design joins eight
+    #[arg(long, value_name = "N", default_value_t = 2)]
+    cells: u64,
+    /// One JSON object on standard output
+    #[arg(long)]
+    json: bool,
+}
+
 pub(super) fn execute(command: &HwCommand) -> Done {
     match command {
         HwCommand::List => {
             for model in builtin_models() {
-                say(&format!("{:8} {}", model.name, model.summary));
+                say(&format!("{:12} {}", model.name, model.summary));
             }
         }
-        HwCommand::Show { model } => {
-            let model = load_model(model).map_err(|e| usage(&e.to_string()))?;
-            say(&format!("{}: {}\n", model.name, model.summary));
-            for (name, value) in numbers(&model.hardware) {
-                say(&format!("  {name:16} {value}"));
-            }
-            for (what, how) in &model.not_simulated {
-                say(&format!("  {:16} {what}: {how}", "not simulated"));
-            }
-            say(&format!("\n{}", model.text.trim_end()));
-        }
+        HwCommand::Show { model, settings } => show(model, settings)?,
+        HwCommand::Peak(args) => show_peak(args)?,
         HwCommand::Check { model } => {
             let model = load_model(model).map_err(|e| usage(&e.to_string()))?;
-            say(&format!("{}: valid; every table has a source", model.name));
+            let complaints = model.constants.complaints();
+            if !complaints.is_empty() {
+                return Err(Failure { code: 1, message: complaints.join("\n") });
+            }
+            let numbers = model.constants.iter().count();
+            say(&format!(
+                "{}: valid; every table has a source, {numbers} physical numbers lie where they can",
+                model.name
+            ));
         }
+    }
+    Ok(())
+}
+
+/// A model with some keys changed, as a run on it would have it.
+fn changed(model: &str, settings: &[String]) -> Result<Config, Failure> {
+    let sources = Sources { hardware: Some(model), settings, ..Sources::default() };
+    config::load(&sources).map_err(|e| usage(&e.to_string()))
+}
+
+fn show(name: &str, settings: &[String]) -> Done {
+    let model = load_model(name).map_err(|e| usage(&e.to_string()))?;
+    let config = changed(name, settings)?;
+    say(&format!("{}: {}\n", model.name, model.summary));
+    for (name, value) in numbers(&config.hardware) {
+        say(&format!("  {name:16} {value}"));
+    }
+    if let Some(timing) = config.hardware.timing {
+        say(&format!("  {:16} {}", "timing", timing_text(&timing)));
+        say("\nOn a full tile, ten error words:");
+        for figure in figures(&config.hardware, WORDS) {
+            let time = prefixed(figure.seconds, "s");
+            say(&format!("  {:28} {:>10} cycles  {time:>10}", figure.name, figure.cycles));
+        }
+    }
+    for (table, heading, unit) in [
+        (Table::Energy, "Joules an event, typical (low to high):", "J"),
+        (Table::Power, "Watts, typical (low to high):", "W"),
+        (Table::Area, "Areas, typical (low to high):", "m2"),
+    ] {
+        let constants: Vec<_> =
+            config.constants.iter().filter(|c| c.quantity.table == table).collect();
+        if !constants.is_empty() {
+            say(&format!("\n{heading}"));
+        }
+        for constant in constants {
+            say(&format!("  {:16} {}", constant.quantity.name, constant_text(constant, unit)));
+        }
+    }
+    if !config.not_simulated.is_empty() {
+        say("\nNot simulated:");
+    }
+    for (what, how) in &config.not_simulated {
+        say(&format!("  {what}: {how}"));
+    }
+    say(&format!("\n{}", model.text.trim_end()));
+    Ok(())
+}
+
+fn constant_text(constant: &Constant, unit: &str) -> String {
+    let kind = format!("{:?}", constant.kind).to_lowercase();
+    let value = match unit {
+        // a prefix on a square metre would be read wrongly
+        "m2" => {
+            let [low, typical, high] = constant.value.map(|area| (area * 1e15).round() / 1e3);
+            format!("{typical} um2 ({low} to {high})")
+        }
+        _ => bounds(constant.value, unit),
+    };
+    format!("{value:36} {kind}")
+}
+
+fn timing_text(timing: &Timing) -> String {
+    let pulses = match timing.pulse_code {
+        PulseCode::Unary => "one pulse a level",
+        PulseCode::Amplitude => "pulses of any height",
+    };
+    let verify = if timing.verify { ", each verified" } else { "" };
+    format!(
+        "{}; settle {}, convert {} x {} columns{}; {} lanes; {pulses} of {} cycles{verify}",
+        prefixed(timing.clock_khz as f64 * 1000.0, "Hz"),
+        timing.settle,
+        timing.convert,
+        timing.share,
+        if timing.overlapped { ", overlapped" } else { "" },
+        timing.lanes,
+        timing.pulse,
+    )
+}
+
+fn show_peak(args: &PeakArgs) -> Done {
+    let config = changed(&args.model, &args.settings)?;
+    let hardware = &config.hardware;
+    let tiles = args.tiles.or(hardware.tiles_max.map(|n| n as u64)).unwrap_or(1);
+    let slices = args.slices.unwrap_or_else(|| u64::from(hardware.slices()));
+    for (name, value) in [("--tiles", tiles), ("--slices", slices), ("--cells", args.cells)] {
+        if !(1..=1 << 30).contains(&value) {
+            return Err(usage(&format!("{name} is {value}, but must lie in 1..={}", 1 << 30)));
+        }
+    }
+    let Some(peak) = peak(hardware, tiles, slices, args.cells) else {
+        let message = "the model has no [timing]: give it at least hw.timing.clock_mhz";
+        return Err(usage(message));
+    };
+    if args.json {
+        let rate = |(figure, rate): &(crate::lab::price::Figure, f64)| json!({"cycles": figure.cycles, "seconds": figure.seconds, "operations_per_second": rate});
+        say(&json!({"event": "peak", "model": config.hardware_name, "tiles": tiles,
+            "slices": slices, "cells_per_weight": args.cells, "macs": peak.macs,
+            "alone": rate(&peak.alone), "back_to_back": rate(&peak.back_to_back)})
+        .to_string());
+        return Ok(());
+    }
+    say(&format!(
+        "{}: {tiles} tiles, {slices} slices, {} cells a weight, {} MACs a read",
+        config.hardware_name, args.cells, peak.macs
+    ));
+    for (name, (figure, rate)) in
+        [("one read after the other", &peak.alone), ("back to back", &peak.back_to_back)]
+    {
+        let time = prefixed(figure.seconds, "s");
+        say(&format!(
+            "  {name:26} {:>8} cycles {time:>10}  {:.4} TOPS",
+            figure.cycles,
+            rate / 1e12
+        ));
     }
     Ok(())
 }

@@ -166,6 +166,10 @@ fn done(run: &str, outcome: &Outcome) -> serde_json::Value {
         "validation_accuracy": last.and_then(|r| r.validation).map(|score| score.fraction()),
         "state_hash": last.map(|record| record.state_hash.clone()),
         "epochs": last.map(|record| record.epoch),
+        "cycles": outcome.cost.cycles,
+        "simulated_seconds": outcome.cost.seconds,
+        "joules": outcome.cost.joules,
+        "joules_assumed_share": outcome.cost.joules.map(|_| outcome.cost.assumed_share),
         "train_seconds": receipt.train_seconds,
         "images_per_second": images as f64 / receipt.train_seconds.max(1e-9),
     })

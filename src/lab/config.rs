@@ -5,15 +5,18 @@
 //! The result is a [`Config`], which can be written back as one self-contained file.
 
 mod check;
+mod chip;
 mod data;
 mod file;
 mod hardware;
 mod layers;
+mod quantity;
 
 pub use check::{Config, DataConfig, Select, TrainOn};
 pub use file::{ExperimentFile, HardwareFile};
 pub use hardware::{Model, builtin_models, load_model, model_names};
 pub use layers::{Sources, load};
+pub use quantity::{Constant, Constants, Kind, Per, QUANTITIES, Quantity, Table};
 
 /// Why a configuration cannot be used. Each message says where, what was found, what is allowed.
 #[derive(Debug, thiserror::Error)]

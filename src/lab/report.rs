@@ -20,6 +20,7 @@ pub mod text;
 #[cfg(test)]
 mod sample;
 
+use super::price::Cost;
 use super::store::record::{EpochRecord, Receipt};
 
 /// Levels of one pathway of one layer in the final state.
@@ -77,6 +78,8 @@ pub struct RunView<'a> {
     pub pictures: &'a [Picture],
     /// Names of the classes; numbers stand in for missing ones.
     pub class_names: &'a [String],
+    /// What the run cost on its chip.
+    pub cost: Option<&'a Cost>,
 }
 
 impl RunView<'_> {

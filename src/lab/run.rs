@@ -3,10 +3,14 @@
 //! A [`Session`] is a training in memory that makes records; [`train`] keeps it in a folder, [`verify()`] compares it with
 //! one. Neither prints: callers get [`Event`]s.
 
+mod profile;
+mod repriced;
 mod session;
 mod train;
 mod verify;
 
+pub use profile::{Act, Profile, StageUse, profile};
+pub use repriced::{Repriced, reprice};
 pub use session::{Machine, Session};
 pub use train::{Event, Outcome, evaluate, resume, train, view};
 pub use verify::{Verdict, verify};

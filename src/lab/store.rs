@@ -16,6 +16,7 @@
 pub mod checkpoint;
 pub mod folder;
 pub mod hash;
+pub mod ledger;
 pub mod record;
 
 /// Version of the arithmetic. It rises when an equation moves; `verify` refuses another.

@@ -207,7 +207,9 @@ mod tests {
     use super::*;
     use crate::chip::crossbar::kernel::Backend;
     use crate::chip::engine::Phase;
-    use crate::chip::hardware::{Adc, DitherBits, DitherPattern, FloorKind, Hardware, Window};
+    use crate::chip::hardware::{
+        Adc, DitherBits, DitherPattern, FloorKind, Hardware, Window, WriteScheme,
+    };
     use crate::chip::layer::{Layer, LayerSpec};
     use crate::chip::population::Wiring;
     use crate::learn::error::Centre;
@@ -236,6 +238,7 @@ mod tests {
             dither_bits: DitherBits::Zero,
             dither_pattern: DitherPattern::PerCell,
             residual_bits: ResidualBits::new(0).unwrap(),
+            scheme: WriteScheme::Rounded,
             timing: None,
         };
         let spec = LayerSpec {

@@ -141,7 +141,7 @@ mod tests {
     use super::*;
     use crate::chip::crossbar::kernel::Backend;
     use crate::chip::crossbar::layout::Layout;
-    use crate::chip::hardware::{Adc, DitherBits, DitherPattern, FloorKind, Window};
+    use crate::chip::hardware::{Adc, DitherBits, DitherPattern, FloorKind, Window, WriteScheme};
     use crate::chip::layer::{Layer, LayerSpec, Taps};
     use crate::chip::population::Wiring;
     use crate::num::fixed::{DriveBits, ErrorBits, IncrementMax, LevelBits, LutBits, ResidualBits};
@@ -168,6 +168,7 @@ mod tests {
             dither_bits: DitherBits::Eight,
             dither_pattern: DitherPattern::PerCell,
             residual_bits: ResidualBits::new(0).unwrap(),
+            scheme: WriteScheme::Rounded,
             timing: None,
         }
     }

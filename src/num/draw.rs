@@ -30,6 +30,10 @@ pub enum Site {
     Augment = 10,
     /// Fixed random error routes and feedback signs.
     Route = 11,
+    /// Pulse trains of rows.
+    RowTrain = 12,
+    /// Pulse trains of columns.
+    ColumnTrain = 13,
 }
 
 /// Bytes of one block.

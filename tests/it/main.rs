@@ -5,8 +5,10 @@
     reason = "tests fail by panicking, and look at the files of runs"
 )]
 
+mod anchors;
 mod bad_input;
 mod bench;
+mod hardware;
 mod laws;
 mod oracle;
 mod program;

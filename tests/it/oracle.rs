@@ -6,7 +6,7 @@
 use dalean::chip::crossbar::kernel::Backend;
 use dalean::chip::engine::Phase;
 use dalean::chip::hardware::{
-    Adc, AdcRange, DitherBits, DitherPattern, FloorKind, Hardware, Subtract, Window,
+    Adc, AdcRange, DitherBits, DitherPattern, FloorKind, Hardware, Subtract, Window, WriteScheme,
 };
 use dalean::chip::layer::LayerSpec;
 use dalean::chip::ledger::{During, Event};
@@ -107,6 +107,7 @@ fn hardware(s: &Value) -> Hardware {
             _ => DitherPattern::Separable,
         },
         residual_bits: ResidualBits::new(int(&s["residual_bits"])).unwrap(),
+        scheme: WriteScheme::Rounded,
         timing: None,
     }
 }

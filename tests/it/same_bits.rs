@@ -88,6 +88,9 @@ fn a_run_killed_at_any_moment_resumes_to_the_same_bits() {
         assert_eq!(hash(&ran.last()), hash(&whole), "killed after epoch {stop_after}");
         let accuracy = &ran.last()["test_accuracy"];
         assert_eq!(accuracy, &whole["test_accuracy"], "killed after epoch {stop_after}");
+        for cost in ["cycles", "joules"] {
+            assert_eq!(ran.last()[cost], whole[cost], "{cost}, killed after epoch {stop_after}");
+        }
         resumed += 1;
     }
     assert!(resumed > 0, "every run outran its kill: nothing was tested");

@@ -57,6 +57,7 @@ type Entry = unsafe extern "C" fn() -> *const Functions;
 unsafe extern "C" {
     fn ed_tile_8x8() -> *const Functions;
     fn ed_tile_16x16() -> *const Functions;
+    fn ed_tile_64x64() -> *const Functions;
 }
 
 #[link(name = "dl")]
@@ -82,6 +83,7 @@ fn functions(size: usize) -> Option<&'static Functions> {
         }
         (None, 8) => ed_tile_8x8,
         (None, 16) => ed_tile_16x16,
+        (None, 64) => ed_tile_64x64,
         _ => return None,
     };
     // SAFETY: the function takes nothing and returns the address of a constant of its model.

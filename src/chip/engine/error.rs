@@ -26,7 +26,7 @@ pub(super) const fn stride_of(samples: usize) -> usize {
 }
 
 /// Place of a gate in the packed registers of a layer.
-const fn packed_at(stride: usize, sample: usize, unit: usize) -> usize {
+pub(super) const fn packed_at(stride: usize, sample: usize, unit: usize) -> usize {
     unit / HALF_COLUMNS * HALF_COLUMNS * stride
         + sample / 4 * 64
         + unit % HALF_COLUMNS * 4

@@ -101,7 +101,9 @@ mod tests {
     use super::*;
     use crate::chip::crossbar::kernel::Backend;
     use crate::chip::engine::{Operation, Side, Write};
-    use crate::chip::hardware::{Adc, DitherBits, DitherPattern, FloorKind, Hardware, Window};
+    use crate::chip::hardware::{
+        Adc, DitherBits, DitherPattern, FloorKind, Hardware, Window, WriteScheme,
+    };
     use crate::chip::layer::{LayerSpec, Taps};
     use crate::chip::population::Wiring;
     use crate::num::fixed::{DriveBits, ErrorBits, IncrementMax, LevelBits, LutBits, ResidualBits};
@@ -135,6 +137,7 @@ mod tests {
             dither_bits: DitherBits::Eight,
             dither_pattern: DitherPattern::PerCell,
             residual_bits: ResidualBits::new(0).unwrap(),
+            scheme: WriteScheme::Rounded,
             timing: None,
         };
         let spec = LayerSpec {

@@ -21,7 +21,7 @@ use super::{Engine, Write};
 use crate::chip::crossbar::kernel::{self, Kernel, WriteCounts};
 use crate::chip::crossbar::layout::{BLOCK_ROWS, PANEL_COLUMNS};
 use crate::chip::crossbar::{Crossbar, StripMut, WriteRequest};
-use crate::chip::hardware::{PulseCode, Timing};
+use crate::chip::hardware::{PulseCode, Timing, WriteScheme};
 use crate::chip::ledger::{During, Event};
 use crate::chip::population::{Polarity, Stream};
 use crate::num::draw::{Place, Site};
@@ -39,6 +39,8 @@ impl Engine {
                 self.time(|schedule, cycles| schedule.add(cycles, layer, &samples));
             }
             Write::Program => {
+                let rounded = self.hardware.scheme == WriteScheme::Rounded;
+                assert!(rounded, "trains write one sample at a time");
                 let added = std::mem::take(pending);
                 self.program(layer, 0..added, shift);
                 // read and cleared
@@ -47,6 +49,10 @@ impl Engine {
             }
             Write::Now => {
                 assert!(*pending == 0 && samples.len() == 1, "now takes one sample");
+                if let WriteScheme::Trains { slots_log2 } = self.hardware.scheme {
+                    self.row_sums[layer] = None;
+                    return self.write_trains(layer, samples.start, shift, slots_log2);
+                }
                 self.charge_accumulate(layer, 1);
                 self.program(layer, samples.clone(), shift);
                 self.charge_time(layer, write, &samples);

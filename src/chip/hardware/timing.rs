@@ -121,6 +121,12 @@ impl Timing {
         2 * self.beat + passes * self.pass()
     }
 
+    /// Cycles of a rank-1 write: levels that rise, then levels that fall.
+    #[must_use]
+    pub const fn trains(&self, slots: u64) -> u64 {
+        2 * slots * self.pulse
+    }
+
     /// Cycles an accepted command adds.
     #[must_use]
     pub const fn accept(&self) -> u64 {

@@ -4,22 +4,16 @@ use std::collections::BTreeMap;
 use std::fmt::Display;
 
 use super::ConfigError;
-use super::file::{
-    AdcFile, AdcTable, CellFile, DataFile, DriveFile, ErrorFile, ExperimentFile, HardwareFile,
-    LearningFile, LutFile, NetworkFile, PerLayer, RangeFile, TileFile, WriteFile,
-};
-use crate::chip::hardware::{
-    Adc, AdcRange, DitherBits, DitherPattern, FloorKind, Hardware, Subtract, Window,
-};
+use super::chip;
+use super::file::{DataFile, ExperimentFile, HardwareFile, LearningFile, NetworkFile, PerLayer};
+use super::quantity::Constants;
+use crate::chip::hardware::{Adc, Hardware, WriteScheme};
 use crate::chip::layer::LayerSpec;
 use crate::chip::population::Wiring;
 use crate::learn::error::Centre;
 use crate::learn::route::Route;
 use crate::learn::rule::{Rule, UpdateMode};
-use crate::num::fixed::{
-    AdcBits, Batch, DriveBits, ErrorBits, IncrementMax, LevelBits, LutBits, OutOfRange,
-    RateMantissa, ResidualBits,
-};
+use crate::num::fixed::{Batch, OutOfRange, RateMantissa};
 use crate::num::tables::{Activation, Decay, Positive, divergence_index};
 use crate::task::classify::{Augment, Experiment};
 
@@ -89,6 +83,8 @@ pub struct Config {
     pub select: Select,
     /// The chip.
     pub hardware: Hardware,
+    /// What its events, its parts and its idling cost.
+    pub constants: Constants,
     /// What the chip does and is not simulated.
     pub not_simulated: BTreeMap<String, String>,
     /// Name of the hardware model.
@@ -96,16 +92,16 @@ pub struct Config {
     resolved: ExperimentFile,
 }
 
-fn wrong(key: &str, found: impl Display, allowed: impl Display) -> ConfigError {
+pub(super) fn wrong(key: &str, found: impl Display, allowed: impl Display) -> ConfigError {
     ConfigError::Value { key: key.into(), found: found.to_string(), allowed: allowed.to_string() }
 }
 
-fn range<T>(key: &str, result: Result<T, OutOfRange>) -> Result<T, ConfigError> {
+pub(super) fn range<T>(key: &str, result: Result<T, OutOfRange>) -> Result<T, ConfigError> {
     result.map_err(|error| ConfigError::Range { key: key.into(), error })
 }
 
 /// One of some words.
-fn word<T: Copy>(
+pub(super) fn word<T: Copy>(
     key: &str,
     value: &mut Option<String>,
     default: &str,
@@ -119,7 +115,7 @@ fn word<T: Copy>(
         .ok_or_else(|| wrong(key, format!("is \"{value}\""), format!("it is one of {}", names())))
 }
 
-fn between(key: &str, found: i64, min: i64, max: i64) -> Result<i64, ConfigError> {
+pub(super) fn between(key: &str, found: i64, min: i64, max: i64) -> Result<i64, ConfigError> {
     if (min..=max).contains(&found) {
         Ok(found)
     } else {
@@ -150,117 +146,13 @@ fn positive(key: &str, value: f64) -> Result<Positive, ConfigError> {
         .ok_or_else(|| wrong(key, format!("is {value}"), "it must lie above 0, in 1e-6..=1e6"))
 }
 
-/// Checks `[hw]` or a model file; `prefix` is put before keys in messages.
-pub(super) fn hardware(file: &HardwareFile, prefix: &str) -> Result<Hardware, ConfigError> {
-    resolve_hardware(&mut file.clone(), prefix)
-}
-
-fn resolve_hardware(file: &mut HardwareFile, prefix: &str) -> Result<Hardware, ConfigError> {
-    let key = |name: &str| format!("{prefix}{name}");
-    let cell = file.cell.get_or_insert_with(CellFile::default);
-    let bits = *cell.level_bits.get_or_insert(8);
-    let level_bits = range(&key("cell.level_bits"), LevelBits::new(bits))?;
-    let floor = *cell.floor.get_or_insert(0);
-    // the default ceiling follows the bits, so it is not written back
-    let ceiling = cell.ceiling.unwrap_or(i64::from(level_bits.level_max()));
-    let window = range(&key("cell"), Window::new(floor, ceiling, level_bits))?;
-    let floors = [("recoverable", FloorKind::Recoverable), ("absorbing", FloorKind::Absorbing)];
-    let floor_kind = word(&key("cell.floor_kind"), &mut cell.floor_kind, "recoverable", &floors)?;
-
-    let tile = file.tile.get_or_insert_with(TileFile::default);
-    let tile_rows = between(&key("tile.rows"), *tile.rows.get_or_insert(256), 1, 32_768)?;
-    let tile_columns = between(&key("tile.columns"), *tile.columns.get_or_insert(256), 1, 32_768)?;
-    let count = tile.count.map(|n| between(&key("tile.count"), n, 1, 1 << 30)).transpose()?;
-    let transposed_read = *tile.transposed_read.get_or_insert(false);
-
-    let drive = file.drive.get_or_insert_with(DriveFile::default);
-    let bits = *drive.bits.get_or_insert(8);
-    let drive_bits = range(&key("drive.bits"), DriveBits::new(bits))?;
-    let dac_bits = between(&key("drive.dac_bits"), *drive.dac_bits.get_or_insert(bits), 1, bits)?;
-
-    let adc = match file.adc.get_or_insert_with(|| AdcFile::Ideal("ideal".into())) {
-        AdcFile::Ideal(_) => Adc::Ideal,
-        AdcFile::Finite(table) => converters(table, &key)?,
-    };
-
-    let lut = file.lut.get_or_insert_with(LutFile::default);
-    let lut_bits = range(&key("lut.bits"), LutBits::new(*lut.bits.get_or_insert(10)))?;
-    let error = file.error.get_or_insert_with(ErrorFile::default);
-    let error_bits = range(&key("error.bits"), ErrorBits::new(*error.bits.get_or_insert(8)))?;
-
-    let write = file.write.get_or_insert_with(WriteFile::default);
-    let increments = *write.increment_max.get_or_insert(7);
-    let increment_max = range(&key("write.increment_max"), IncrementMax::new(increments))?;
-    let dither_bits = match *write.dither_bits.get_or_insert(8) {
-        0 => DitherBits::Zero,
-        8 => DitherBits::Eight,
-        16 => DitherBits::Sixteen,
-        other => {
-            let allowed = "it is 0 (half-up), 8 or 16";
-            return Err(wrong(&key("write.dither_bits"), format!("is {other}"), allowed));
-        }
-    };
-    let patterns = [("per_cell", DitherPattern::PerCell), ("separable", DitherPattern::Separable)];
-    let dither_pattern = word(&key("write.dither"), &mut write.dither, "per_cell", &patterns)?;
-    let bits = *write.residual_bits.get_or_insert(0);
-    let residual_bits = range(&key("write.residual_bits"), ResidualBits::new(bits))?;
-
-    let size = |n: i64| usize::try_from(n).expect("checked to be positive");
-    Ok(Hardware {
-        level_bits,
-        window,
-        floor_kind,
-        tile_rows: size(tile_rows),
-        tile_columns: size(tile_columns),
-        tiles_max: count.map(size),
-        transposed_read,
-        drive_bits,
-        dac_bits: u32::try_from(dac_bits).expect("1..=8"),
-        adc,
-        lut_bits,
-        error_bits,
-        increment_max,
-        dither_bits,
-        dither_pattern,
-        residual_bits,
-        timing: None,
-    })
-}
-
-fn converters(table: &mut AdcTable, key: &dyn Fn(&str) -> String) -> Result<Adc, ConfigError> {
-    let Some(bits) = table.bits else {
-        return Err(wrong(&key("adc.bits"), "is missing", "give 2..=16, or write adc = \"ideal\""));
-    };
-    let bits = range(&key("adc.bits"), AdcBits::new(bits))?;
-    let subtracts = [("digital", Subtract::Digital), ("current", Subtract::Current)];
-    let subtract = word(&key("adc.subtract"), &mut table.subtract, "digital", &subtracts)?;
-    let headroom = between(&key("adc.headroom"), *table.headroom.get_or_insert(1), 0, 16)?;
-    let again = [("never", false), ("epoch", true)];
-    let every_epoch = word(&key("adc.recalibrate"), &mut table.recalibrate, "never", &again)?;
-    let default = || RangeFile::Named("calibrated".into());
-    let range = match table.range.get_or_insert_with(default) {
-        RangeFile::Named(name) if name == "calibrated" => {
-            AdcRange::Calibrated { headroom: u32::try_from(headroom).expect("0..=16"), every_epoch }
-        }
-        RangeFile::Named(name) if name == "full" => AdcRange::Full,
-        RangeFile::Named(name) => {
-            let allowed = "it is \"calibrated\", \"full\" or a shift in 0..=40";
-            return Err(wrong(&key("adc.range"), format!("is \"{name}\""), allowed));
-        }
-        RangeFile::Shift(shift) => {
-            let shift = between(&key("adc.range"), *shift, 0, 40)?;
-            AdcRange::Shift(u32::try_from(shift).expect("0..=40"))
-        }
-    };
-    Ok(Adc::Finite { bits, subtract, range })
-}
-
 /// Checks a whole configuration.
 pub(super) fn config(mut file: ExperimentFile) -> Result<Config, ConfigError> {
     word("task", &mut file.task, "classify", &[("classify", ())])?;
     let seed = *file.seed.get_or_insert(1);
     let hw = file.hw.get_or_insert_with(HardwareFile::default);
-    let hardware = resolve_hardware(hw, "hw.")?;
+    let hardware = chip::resolve(hw, "hw.")?;
+    let constants = Constants::new(hw, "hw.")?;
     let hardware_name = hw.name.get_or_insert_with(|| "unnamed".into()).clone();
     let not_simulated = hw.not_simulated.clone().unwrap_or_default();
     let data = file.data.get_or_insert_with(DataFile::default);
@@ -293,6 +185,12 @@ pub(super) fn config(mut file: ExperimentFile) -> Result<Config, ConfigError> {
     if mode == UpdateMode::Online && centre == Centre::Batch {
         let allowed = "one sample has no mean; use learning.centre = \"running\" or \"none\" with mode = \"online\"";
         return Err(wrong("learning.centre", "is \"batch\"", allowed));
+    }
+
+    if mode == UpdateMode::Accumulate && hardware.scheme != WriteScheme::Rounded {
+        let allowed = "trains write one sample at a time; with hw.write.scheme = \"rank1\" use mode = \"replay\" or \
+                       \"online\"";
+        return Err(wrong("learning.mode", "is \"accumulate\"", allowed));
     }
 
     let network = file.network.get_or_insert_with(NetworkFile::default);
@@ -398,6 +296,7 @@ pub(super) fn config(mut file: ExperimentFile) -> Result<Config, ConfigError> {
         train_on,
         select,
         hardware,
+        constants,
         not_simulated,
         hardware_name,
         resolved: file,
@@ -549,6 +448,7 @@ impl Config {
                 ));
             }
         }
+        warnings.extend(self.constants.complaints());
         for (what, how) in &self.not_simulated {
             warnings.push(format!("not simulated: {what} ({how})"));
         }

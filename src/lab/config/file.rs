@@ -6,6 +6,8 @@ use std::fmt;
 use serde::de::{self, Deserializer, MapAccess, Visitor};
 use serde::{Deserialize, Serialize};
 
+use super::quantity::{AreaKey, EnergyKey, PowerKey};
+
 /// One value for all layers, or one for each.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(untagged, expecting = "a number, or a list with one number a layer")]
@@ -148,6 +150,14 @@ keys! {
         error: ErrorFile,
         /// Programming.
         write: WriteFile,
+        /// Cycles of what a tile does; without it no cycles are counted.
+        timing: TimingFile,
+        /// Joules of an event, by quantity and unit.
+        energy: BTreeMap<EnergyKey, NumberFile>,
+        /// Watts that flow whatever happens.
+        power: BTreeMap<PowerKey, NumberFile>,
+        /// Sizes of parts.
+        area: BTreeMap<AreaKey, NumberFile>,
         /// What the chip does and this program does not simulate: printed with every report.
         not_simulated: BTreeMap<String, String>,
     }
@@ -185,8 +195,16 @@ keys! {
     DriveFile {
         /// Bits of a drive code, 1..=8.
         bits: i64,
-        /// Bits a DAC applies at a time.
+        /// `voltage`, `pulse_width` or `amplitude`.
+        mode: String,
+        /// Bits a DAC applies at a time; follows from `phases` with `pulse_width`.
         dac_bits: i64,
+        /// Pulse width: time slots of a phase; default `2^dac_bits - 1`.
+        slots: i64,
+        /// Pulse width: cycles of a slot.
+        slot_cycles: i64,
+        /// Pulse width: phases a drive code is read in.
+        phases: i64,
         /// Where the numbers come from.
         source: String,
         /// `measured`, `fitted`, `assumed`.
@@ -220,6 +238,54 @@ keys! {
         dither: String,
         /// Bits of the digital remainder behind a cell.
         residual_bits: i64,
+        /// `rounded` or `rank1`.
+        scheme: String,
+        /// Slots of a train (`rank1`).
+        train_slots: i64,
+        /// Where the numbers come from.
+        source: String,
+        /// `measured`, `fitted`, `assumed`.
+        kind: String,
+    }
+    /// `[timing]`: cycles, in the words of docs/TILE.md.
+    TimingFile {
+        /// Megahertz of the clock that counts cycles.
+        clock_mhz: f64,
+        /// `T_A`: cycles to settle and sample; with `pulse_width`, cycles beside the slots of a phase.
+        settle_cycles: i64,
+        /// `T_C`: cycles of a conversion.
+        convert_cycles: i64,
+        /// `S`: columns of a bank that share a converter.
+        columns_per_adc: i64,
+        /// Whether a slice settles while the one before is converted.
+        overlap: bool,
+        /// `U`: columns looked up, multiplied or accumulated at a time.
+        lanes: i64,
+        /// `H`: cycles before the first error word arrives.
+        bus_hops: i64,
+        /// `T_W`: cycles of a pulse.
+        pulse_cycles: i64,
+        /// `unary` or `amplitude`.
+        pulses: String,
+        /// Whether every pulse is followed by a read of what it did.
+        verify: bool,
+        /// `W`: cells that can be pulsed at a time; default: a whole row of both banks.
+        write_active_max: i64,
+        /// Cycles of a digital action: 1, or the symbols of a digital clock on an optical chip.
+        beat_cycles: i64,
+        /// Where the numbers come from.
+        source: String,
+        /// `measured`, `fitted`, `assumed`.
+        kind: String,
+    }
+    /// One physical number of `[energy]`, `[power]` or `[area]`; the unit is in its key.
+    NumberFile {
+        /// The least that is credible.
+        low: f64,
+        /// What is reckoned with.
+        typical: f64,
+        /// The most that is credible.
+        high: f64,
         /// Where the numbers come from.
         source: String,
         /// `measured`, `fitted`, `assumed`.

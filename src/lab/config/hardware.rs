@@ -1,15 +1,19 @@
 //! Hardware models: the built-in ones, and files.
 
 use super::file::HardwareFile;
-use super::{ConfigError, check};
+use super::quantity::Constants;
+use super::{ConfigError, chip};
 use crate::chip::hardware::Hardware;
 
 /// The built-in models, by name, as their files are.
-const BUILTIN: [(&str, &str); 3] = [
-    ("ideal", include_str!("../../../hw_models/ideal.toml")),
-    ("prime", include_str!("../../../hw_models/prime.toml")),
-    ("isaac", include_str!("../../../hw_models/isaac.toml")),
-];
+macro_rules! models {
+    ($($name:literal)*) => {
+        [$(($name, include_str!(concat!("../../../hw_models/", $name, ".toml"))),)*]
+    };
+}
+const BUILTIN: [(&str, &str); 13] = models!(
+    "ideal" "prime" "isaac" "reram" "pcm14" "ecram" "fefet" "sram" "neurram" "hermes" "mrr" "photonic_pcm" "mzi"
+);
 
 /// A checked hardware model.
 #[derive(Debug, Clone)]
@@ -22,6 +26,8 @@ pub struct Model {
     pub text: String,
     /// The chip.
     pub hardware: Hardware,
+    /// What its events, its parts and its idling cost.
+    pub constants: Constants,
     /// What is not simulated.
     pub not_simulated: Vec<(String, String)>,
 }
@@ -101,7 +107,7 @@ fn provenance(file: &HardwareFile) -> Vec<(&'static str, Option<&str>, Option<&s
             }
         )*};
     }
-    table!(cell tile drive lut error write);
+    table!(cell tile drive lut error write timing);
     if let Some(super::file::AdcFile::Finite(table)) = &file.adc {
         all.push(("adc", table.source.as_deref(), table.kind.as_deref()));
     }
@@ -115,11 +121,14 @@ fn provenance(file: &HardwareFile) -> Vec<(&'static str, Option<&str>, Option<&s
 pub fn load_model(name: &str) -> Result<Model, ConfigError> {
     let text = model_text(name)?;
     let file = model_file(name, &text)?;
-    let hardware = check::hardware(&file, "")?;
+    let mut resolved = file.clone();
+    let hardware = chip::resolve(&mut resolved, "")?;
+    let constants = Constants::new(&file, "")?;
     Ok(Model {
         name: file.name.clone().unwrap_or_default(),
         summary: file.summary.clone().unwrap_or_default(),
         hardware,
+        constants,
         not_simulated: file.not_simulated.unwrap_or_default().into_iter().collect(),
         text,
     })
@@ -133,7 +142,10 @@ mod tests {
     fn the_built_in_models_are_valid_and_named_like_their_files() {
         let models = builtin_models();
         assert!(models.iter().map(|model| model.name.as_str()).eq(model_names()));
-        assert!(models.iter().all(|model| !model.summary.is_empty()));
+        for model in models {
+            assert!(!model.summary.is_empty() && model.hardware.timing.is_some(), "{}", model.name);
+            assert_eq!(model.constants.complaints(), [""; 0], "{}", model.name);
+        }
     }
 
     #[test]

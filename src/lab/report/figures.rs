@@ -4,6 +4,7 @@ mod accuracy;
 mod balance;
 mod configuration;
 mod confusion;
+mod energy;
 mod fields;
 mod floor;
 mod heat;
@@ -37,7 +38,7 @@ pub(super) struct Figure {
 pub(super) type Draw = for<'a, 'b> fn(&'a RunView<'b>) -> Option<Figure>;
 
 /// All figures, in the order of the page.
-pub(super) const ALL: [Draw; 13] = [
+pub(super) const ALL: [Draw; 14] = [
     accuracy::draw,
     confusion::draw,
     balance::draw,
@@ -48,6 +49,7 @@ pub(super) const ALL: [Draw; 13] = [
     histogram::draw,
     writes::draw,
     saturation::draw,
+    energy::draw,
     mistakes::draw,
     pathways::draw,
     configuration::draw,

@@ -1,9 +1,10 @@
 //! The page around the figures: key figures on top, then everything in [`figures::ALL`].
 
 use super::number::{
-    count, escape, hash_head, percent, percent_of, place, quotient, ratio, seconds,
+    count, escape, hash_head, percent, percent_of, place, quotient, ratio, seconds, short,
 };
 use super::{RunView, figures};
+use crate::lab::price::{Cost, prefixed};
 
 const STYLE: &str = include_str!("page.css");
 const SCRIPT: &str = include_str!("page.js");
@@ -130,6 +131,7 @@ fn keys(view: &RunView<'_>) -> String {
         &key("floor fraction", &percent_of(floor, cells, 1), &format!("of {} cells", count(cells)));
     out += &key("epochs", &last.epoch.to_string(), &format!("{} updates", count(last.updates)));
     out += &key("learning took", &seconds(view.receipt.train_seconds), "wall clock");
+    out += &view.cost.map_or_else(String::new, |cost| chip(cost, &key));
     let balance = last.layers.iter().map(|layer| {
         let [excite, inhibit] = layer.levels;
         let share = quotient(excite, excite.saturating_add(inhibit)).unwrap_or(0.5);
@@ -149,6 +151,22 @@ fn keys(view: &RunView<'_>) -> String {
             "<div class=\"key wide\"><div class=\"name\">E/I by layer <span>stored levels, excitation over \
              inhibition</span></div>{balance}</div>"
         );
+    }
+    out
+}
+
+/// Time and energy of the run on its chip.
+fn chip(cost: &Cost, key: &dyn Fn(&str, &str, &str) -> String) -> String {
+    let mut out = String::new();
+    if let (Some(cycles), Some(seconds)) = (cost.cycles, cost.seconds) {
+        let note = format!("{} cycles", short(cycles));
+        out += &key("time on the chip", &prefixed(seconds, "s"), &note);
+    }
+    if let Some([low, typical, high]) = cost.joules {
+        let [low, high] = [low, high].map(|joules| prefixed(joules, "J"));
+        let share = 100.0 * cost.assumed_share;
+        let note = format!("{low} to {high}; {share:.0}\u{202f}% leans on assumed constants");
+        out += &key("energy on the chip", &prefixed(typical, "J"), &note);
     }
     out
 }

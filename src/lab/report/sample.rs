@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::{Heat, Picture, RunView};
+use crate::lab::price::Cost;
 use crate::lab::store::record::{
     EpochRecord, LayerRecord, PathwayRecord, Receipt, Score, TestRecord,
 };
@@ -15,6 +16,7 @@ pub(super) struct Sample {
     pub heats: Vec<Heat>,
     pub pictures: Vec<Picture>,
     pub class_names: Vec<String>,
+    pub cost: Option<Cost>,
 }
 
 impl Sample {
@@ -31,6 +33,7 @@ impl Sample {
             heats: heats.collect(),
             pictures: vec![picture(1), picture(3)],
             class_names: vec!["zero".into(), "<one>".into()],
+            cost: None,
         }
     }
 
@@ -43,6 +46,7 @@ impl Sample {
             heats: &self.heats,
             pictures: &self.pictures,
             class_names: &self.class_names,
+            cost: self.cost.as_ref(),
         }
     }
 }
@@ -106,6 +110,7 @@ fn record(layers: &[(usize, usize, &[&str])], epoch: u32) -> EpochRecord {
         layers: layers.collect(),
         pathways,
         events: [("evaluation".into(), counts(1)), ("training".into(), counts(4))].into(),
+        cycles: Some([("training".to_owned(), 9000 * e)].into()),
         train_seconds: 1.5,
     }
 }

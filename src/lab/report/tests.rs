@@ -2,10 +2,29 @@
 
 use super::sample::Sample;
 use super::{html, page, text};
+use crate::lab::price::{Cost, Group, Missing};
 
 const DALE: &[&str] = &["pp", "np", "nn", "pn"];
 const READOUT: &[&str] = &["pp", "np"];
 const PAIR: &[&str] = &["e", "i"];
+
+/// What a run might cost.
+fn cost() -> Cost {
+    let group = |name: &str, joules| Group { name: name.into(), joules };
+    let missing = Missing { what: "holds".into(), count: Some(3), why: "<none>".into() };
+    Cost {
+        cycles: Some(1_234_567),
+        seconds: Some(0.001_234_567),
+        joules: Some([1e-9, 2e-9, 8e-9]),
+        components: vec![
+            group("conversion", [1e-9, 1.5e-9, 5e-9]),
+            group("tile_static", [0.0, 5e-10, 3e-9]),
+        ],
+        assumed_share: 0.25,
+        missing: vec![missing],
+        each: vec![("conversions", "conversion", 1e-13)],
+    }
+}
 
 /// Runs at the edges of what a report may meet.
 fn samples() -> Vec<Sample> {
@@ -32,10 +51,16 @@ fn samples() -> Vec<Sample> {
     }
     hollow.heats[0].levels.pop();
     hollow.pictures[0].values.pop();
+    let mut priced = dense();
+    priced.cost = Some(cost());
+    let mut timed = dense();
+    timed.cost = Some(Cost { joules: None, components: vec![], each: vec![], ..cost() });
     let mut colour = Sample::new(&[(193, 4, DALE)], 2, 4);
     colour.pictures.remove(0);
     vec![
         dense(),
+        priced,
+        timed,
         unfinished,
         empty,
         hollow,
@@ -161,4 +186,19 @@ fn effects_that_are_not_simulated_are_found_in_any_table() {
     let config = "[a]\nx = 1\n[a.not_simulated]\ndrift = 0.5\n";
     assert_eq!(page::not_simulated(config), [("drift".into(), "0.5".into())]);
     assert_eq!(page::not_simulated("not toml ["), []);
+}
+
+#[test]
+fn what_a_run_cost_stands_on_page_and_terminal() {
+    let mut sample = Sample::new(&[(64, 20, DALE), (20, 10, READOUT)], 3, 10);
+    sample.cost = Some(cost());
+    let page = html(&sample.view());
+    for words in ["time on the chip", "1.23 ms", "energy on the chip", "tile static", "75.0"] {
+        assert!(page.contains(words), "{words}");
+    }
+    let text = text::summary(&sample.view());
+    let line = "on the chip 1.23 M cycles, 1.23 ms, 2.00 nJ (1.00 nJ to 8.00 nJ), 25 % assumed\n";
+    assert!(text.contains(line) && text.contains("without a price: holds"), "{text}");
+    sample.cost = None;
+    assert!(!html(&sample.view()).contains("on the chip"));
 }

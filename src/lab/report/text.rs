@@ -4,6 +4,7 @@ use std::fmt::Write as _;
 
 use super::RunView;
 use super::number::{quotient, short_with};
+use crate::lab::price::{Cost, bounds, prefixed};
 use crate::lab::store::record::{EpochRecord, PathwayRecord, Score};
 
 /// Heads of the columns and how wide the columns are.
@@ -49,6 +50,9 @@ pub fn summary(view: &RunView<'_>) -> String {
     line(&mut out, "all", totals(last));
     out.push('\n');
     accuracies(&mut out, view, last);
+    if let Some(cost) = view.cost {
+        chip(&mut out, cost);
+    }
     let _ = writeln!(out, "state       {}", last.state_hash);
     out
 }
@@ -98,6 +102,25 @@ fn row(
         error,
         gate,
     ]
+}
+
+/// Cycles, seconds and joules of the run on its chip.
+fn chip(out: &mut String, cost: &Cost) {
+    let mut parts = Vec::new();
+    if let (Some(cycles), Some(seconds)) = (cost.cycles, cost.seconds) {
+        parts.push(format!("{} cycles, {}", short_with(cycles, " "), prefixed(seconds, "s")));
+    }
+    if let Some(joules) = cost.joules {
+        parts.push(bounds(joules, "J"));
+        parts.push(format!("{:.0} % assumed", 100.0 * cost.assumed_share));
+    }
+    if !parts.is_empty() {
+        let _ = writeln!(out, "on the chip {}", parts.join(", "));
+    }
+    let missing: Vec<_> = cost.missing.iter().map(|missing| &*missing.what).collect();
+    if cost.joules.is_some() && !missing.is_empty() {
+        let _ = writeln!(out, "            without a price: {}", missing.join(", "));
+    }
 }
 
 fn percent(part: u64, whole: u64) -> String {

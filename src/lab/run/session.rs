@@ -119,6 +119,13 @@ impl Session {
         }
     }
 
+    /// Reads the first training example, as an inference does.
+    pub fn read_one(&mut self) {
+        let Self { trainer, pool, train, .. } = self;
+        let (first, _) = train.clone().split_at(1);
+        let _ = pool.install(|| trainer.evaluate(&first));
+    }
+
     /// Starts recording operations; what was read before the last samples were loaded is forgotten.
     pub fn keep_tape(&mut self) {
         let _ = self.trainer.driver_mut().engine_mut().record(true);
@@ -327,6 +334,10 @@ impl Session {
         };
         let events =
             Phase::ALL.map(|phase| (phase.name().to_owned(), totals(engine.ledger(phase))));
+        let cycles = Phase::ALL.map(|phase| {
+            let cycles = engine.ledger(phase).cycles()?;
+            Some((phase.name().to_owned(), cycles.elapsed()))
+        });
         EpochRecord {
             epoch: self.trainer.epoch(),
             updates: driver.updates(),
@@ -336,6 +347,7 @@ impl Session {
             layers,
             pathways,
             events: events.into_iter().collect(),
+            cycles: cycles.into_iter().collect(),
             train_seconds,
         }
     }

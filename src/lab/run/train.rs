@@ -4,13 +4,14 @@ use std::path::Path;
 
 use super::session::chosen;
 use super::{Machine, RunError, Session};
-use crate::chip::engine::Phase;
 use crate::lab::config::{self, Config, Select, Sources};
 use crate::lab::data::{self, DataRoot, ImageShape};
+use crate::lab::price::{Cost, Plan, price};
 use crate::lab::report::{self, Heat, Picture, RunView};
 use crate::lab::store::ARITHMETIC;
 use crate::lab::store::folder::{self, RunFolder, names};
 use crate::lab::store::hash;
+use crate::lab::store::ledger::LedgerRecord;
 use crate::lab::store::record::{EpochRecord, Receipt, TestRecord};
 use crate::task::classify::{Examples, Progress};
 
@@ -47,6 +48,8 @@ pub struct Outcome {
     pub records: Vec<EpochRecord>,
     /// The summary table.
     pub summary: String,
+    /// What it cost on its chip, the final test aside.
+    pub cost: Cost,
 }
 
 /// Trains a configuration in a new folder below `root`.
@@ -237,8 +240,12 @@ impl Run<'_> {
     }
 
     fn finish(mut self) -> Result<Outcome, RunError> {
-        let ledger = ledger_json(&self.session);
-        self.folder.write(names::LEDGER, ledger.as_bytes())?;
+        let engine = self.session.trainer().driver().engine();
+        let (ledger, plan) = (LedgerRecord::of(engine), Plan::of_layers(engine.layers()));
+        self.folder.write(names::LEDGER, ledger.to_json().as_bytes())?;
+        let (hardware, constants) = (&self.config.hardware, &self.config.constants);
+        let bill = price(&ledger, &plan, hardware, constants, &[]);
+        let cost = Cost::of(&bill, &ledger, constants);
         let epoch = self.session.trainer().epoch();
         let best = chosen(self.config.select, &self.records).unwrap_or(epoch);
         let path = self.folder.path().to_path_buf();
@@ -251,11 +258,11 @@ impl Run<'_> {
         let pictures = pictures(&receipt, self.session.test_examples(), self.image);
         let view = view(self.config, &receipt, &self.records, &heats, &pictures);
         let text = self.config.to_toml();
-        let view = RunView { config: &text, ..view };
+        let view = RunView { config: &text, cost: Some(&cost), ..view };
         let summary = report::text::summary(&view);
         self.folder.write(names::REPORT, report::html(&view).as_bytes())?;
         self.folder.write_receipt(&receipt)?;
-        Ok(Outcome { receipt, records: self.records, summary })
+        Ok(Outcome { receipt, records: self.records, summary, cost })
     }
 }
 
@@ -281,7 +288,16 @@ pub fn view<'a>(
         sizes.join("-"),
         config.hardware_name
     );
-    RunView { title, config: "", receipt, epochs: records, heats, pictures, class_names: &[] }
+    RunView {
+        title,
+        config: "",
+        receipt,
+        epochs: records,
+        heats,
+        pictures,
+        class_names: &[],
+        cost: None,
+    }
 }
 
 fn heats(session: &Session) -> Vec<Heat> {
@@ -311,27 +327,4 @@ fn pictures(receipt: &Receipt, test: &Examples, image: Option<ImageShape>) -> Ve
             Some(Picture { example, truth, guess, height, width, channels, full_scale, values })
         })
         .collect()
-}
-
-/// Every count of a run, as JSON.
-fn ledger_json(session: &Session) -> String {
-    let engine = session.trainer().driver().engine();
-    let mut lines = Vec::new();
-    for phase in Phase::ALL {
-        for (layer, pathway, during, event, count) in engine.ledger(phase).entries() {
-            let pathways = engine.layers()[layer].spec.wiring.pathways();
-            let name = pathways.iter().find(|p| p.code == pathway).map_or("-", |p| p.name);
-            lines.push(serde_json::json!({
-                "phase": phase.name(),
-                "layer": layer,
-                "pathway": name,
-                "operation": during.name(),
-                "event": event.name(),
-                "count": count,
-            }));
-        }
-    }
-    let mut text = serde_json::to_string_pretty(&lines).expect("counts have a JSON form");
-    text.push('\n');
-    text
 }

@@ -1,7 +1,8 @@
 //! The state of a run as safetensors, written whole and read with suspicion.
 //!
 //! Tensors: `layer0.pp.levels` (U16, rows x columns), `.residuals` (U16), `.pruned` (U8, one byte a cell),
-//! `layer0.writes`, `layer0.adc_shifts`, `means`, `ledger.training` and so on (I64). Metadata: arithmetic version, hash of
+//! `layer0.writes`, `layer0.adc_shifts`, `means`, `ledger.training` and so on, `cycles.training` and so on where
+//! cycles are counted (I64). Metadata: arithmetic version, hash of
 //! the configuration, hash of the data, epoch, updates, state hash. What is read is checked against all of them.
 
 use std::borrow::Cow;
@@ -11,7 +12,7 @@ use safetensors::{Dtype, SafeTensors, View};
 
 use super::{ARITHMETIC, hash};
 use crate::chip::engine::Phase;
-use crate::chip::ledger::{During, Event, PATHWAYS};
+use crate::chip::ledger::{Cycles, During, Event, Ledger, PATHWAYS};
 use crate::task::classify::Trainer;
 
 /// Why a checkpoint cannot be used.
@@ -129,6 +130,10 @@ pub fn write(trainer: &Trainer, identity: Identity<'_>) -> Vec<u8> {
             }
         }
         tensors.push((format!("ledger.{}", phase.name()), numbers(counts)));
+        if let Some(cycles) = ledger.cycles() {
+            let cycles = cycles.numbers().into_iter().map(count).collect();
+            tensors.push((format!("cycles.{}", phase.name()), numbers(cycles)));
+        }
     }
     let entries = [
         ("arithmetic", ARITHMETIC.to_string()),
@@ -235,7 +240,15 @@ pub fn read(
         let layers = ledger.layers();
         let total = layers * PATHWAYS * During::ALL.len() * Event::ALL.len();
         let mut numbers = read_numbers(&file, &name, total)?.into_iter();
-        let mut fresh = crate::chip::ledger::Ledger::new(layers);
+        let mut fresh = Ledger::new(layers);
+        if let Some(cycles) = ledger.cycles() {
+            let name = format!("cycles.{}", phase.name());
+            let stored = read_numbers(&file, &name, cycles.numbers().len())?;
+            let stored = stored.into_iter().map(|number| positive(&name, number));
+            let stored = Cycles::from_numbers(layers, &stored.collect::<Result<Vec<_>, _>>()?);
+            fresh = Ledger::with_cycles(layers);
+            *fresh.cycles_mut().expect("made with them") = stored.expect("as many as there are");
+        }
         for layer in 0..layers {
             for pathway in 0..PATHWAYS {
                 let code = u8::try_from(pathway).expect("few pathways");

@@ -93,6 +93,9 @@ pub struct EpochRecord {
     pub pathways: Vec<PathwayRecord>,
     /// Ledger totals so far by phase (`training`, `calibration`, `evaluation`) and event.
     pub events: BTreeMap<String, BTreeMap<String, u64>>,
+    /// Cycles so far by phase; absent when the hardware model has no timing.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub cycles: Option<BTreeMap<String, u64>>,
     /// Wall-clock seconds of learning in this epoch: for people, never compared.
     pub train_seconds: f64,
 }

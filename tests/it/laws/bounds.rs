@@ -4,7 +4,9 @@ use std::ops::Range;
 
 use dalean::chip::crossbar::kernel::Backend;
 use dalean::chip::engine::{Engine, Operation, Side, Write};
-use dalean::chip::hardware::{Adc, DitherBits, DitherPattern, FloorKind, Hardware, Window};
+use dalean::chip::hardware::{
+    Adc, DitherBits, DitherPattern, FloorKind, Hardware, Window, WriteScheme,
+};
 use dalean::chip::layer::{CHUNK_BLOCKS, Layer, LayerSpec, SIDE_MAX, Taps};
 use dalean::chip::population::Wiring;
 use dalean::num::fixed::*;
@@ -29,6 +31,7 @@ fn hardware(level_bits: i64, residual_bits: i64) -> Hardware {
         dither_bits: DitherBits::Zero,
         dither_pattern: DitherPattern::PerCell,
         residual_bits: ResidualBits::new(residual_bits).unwrap(),
+        scheme: WriteScheme::Rounded,
         timing: None,
     }
 }

@@ -2,7 +2,7 @@
 
 use dalean::chip::hardware::{
     Adc, AdcRange, DitherBits, DitherPattern, FloorKind, Hardware, PulseCode, Subtract, Timing,
-    Window,
+    Window, WriteScheme,
 };
 use dalean::chip::layer::{LayerSpec, Taps};
 use dalean::chip::population::Wiring;
@@ -130,6 +130,7 @@ pub(crate) fn hardware(widest: usize) -> impl Strategy<Value = Hardware> {
                 dither_bits,
                 dither_pattern,
                 residual_bits: ResidualBits::new(residual_bits).unwrap(),
+                scheme: WriteScheme::Rounded,
                 timing: None,
             }
         },
@@ -232,7 +233,15 @@ pub(crate) fn timing() -> impl Strategy<Value = Timing> {
 pub(crate) fn timed_net() -> impl Strategy<Value = Net> {
     let side = || prop_oneof![4 => 1usize..=9, 1 => 10usize..=18];
     let sides = prop::collection::vec(side(), 2..=4);
-    (net(sides), timing()).prop_map(|(mut net, timing)| {
+    let trains = prop::option::weighted(0.15, 0u32..=5);
+    (net(sides), timing(), trains).prop_map(|(mut net, mut timing, trains)| {
+        if let Some(slots_log2) = trains {
+            net.hardware.scheme = WriteScheme::Trains { slots_log2 };
+            net.hardware.residual_bits = ResidualBits::new(0).unwrap();
+            timing.verify = false;
+            timing.active_max = None;
+            timing.pulse_code = PulseCode::Unary;
+        }
         net.hardware.timing = Some(timing);
         net
     })

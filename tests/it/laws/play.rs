@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use dalean::chip::crossbar::kernel::Backend;
 use dalean::chip::engine::{Calibration, Engine, Operation, Phase, Side, Write};
-use dalean::chip::hardware::Adc;
+use dalean::chip::hardware::{Adc, WriteScheme};
 use dalean::chip::layer::Layer;
 use dalean::chip::ledger::Ledger;
 
@@ -178,6 +178,9 @@ impl Script<'_> {
     }
 
     fn program(&mut self, layer: usize) {
+        if self.net.hardware.scheme != WriteScheme::Rounded {
+            return self.now(layer);
+        }
         let shift = self.shift();
         self.ops.push(Op::Update { layer, write: Write::Program, samples: 0..0, shift });
         self.pending[layer] = 0;
@@ -185,6 +188,9 @@ impl Script<'_> {
 
     /// Adds some of the samples that come next and have gates.
     fn add(&mut self, layer: usize, all: bool) {
+        if self.net.hardware.scheme != WriteScheme::Rounded {
+            return self.now(layer);
+        }
         let from = self.pending[layer];
         if !self.gates[layer].get(from).copied().unwrap_or(false) {
             if from > 0 || self.samples == 0 {

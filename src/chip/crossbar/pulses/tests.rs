@@ -7,7 +7,9 @@ use super::*;
 use crate::chip::crossbar::kernel::{Backend, Write};
 use crate::chip::crossbar::layout::PANEL_COLUMNS;
 use crate::chip::crossbar::{Crossbar, WriteRequest, Written};
-use crate::chip::hardware::{Adc, DitherBits, DitherPattern, FloorKind, Hardware, Window};
+use crate::chip::hardware::{
+    Adc, DitherBits, DitherPattern, FloorKind, Hardware, Window, WriteScheme,
+};
 use crate::num::draw::{Place, Site};
 use crate::num::fixed::{DriveBits, ErrorBits, IncrementMax, LevelBits, LutBits, ResidualBits};
 
@@ -54,6 +56,7 @@ fn hardware(case: &Case) -> Hardware {
         dither_bits: case.dither.0,
         dither_pattern: case.dither.1,
         residual_bits: ResidualBits::new(case.residual_bits).unwrap(),
+        scheme: WriteScheme::Rounded,
         timing: None,
     }
 }
@@ -83,14 +86,13 @@ fn written(backend: Backend, case: &Case, collect: Collect) -> (Crossbar, Vec<Wr
     let turned: Vec<_> =
         blocks.map(|block| block.iter().any(|&x| x != 0).then_some(block)).collect();
     let mut array = Crossbar::new(layout, &hardware);
-    let mut levels = bytes(case.seed + 2, 2 * layout.columns);
     for row in 0..layout.rows {
+        let levels = bytes(case.seed + 2 + row as u64, 2 * layout.columns);
         let window = hardware.window.floor()..=hardware.window.ceiling();
         let words = levels.as_chunks::<2>().0.iter().map(|word| u16::from_le_bytes(*word));
         let row_levels: Vec<_> =
             words.map(|word| (word % *window.end()).max(*window.start())).collect();
         array.load_row(row, &row_levels);
-        levels.rotate_left(3);
     }
     let request = WriteRequest {
         turned: &turned,

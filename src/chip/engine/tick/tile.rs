@@ -13,6 +13,7 @@ use crate::chip::hardware::PulseCode;
 mod network;
 mod read;
 mod registers;
+mod trains;
 mod write;
 
 /// Sizes a tile is built with.
@@ -131,6 +132,8 @@ pub struct More {
     pub active_max: Option<usize>,
     /// How pulses are given.
     pub pulse_code: PulseCode,
+    /// Slots of a train, where writes are coincidences of trains.
+    pub train_slots: Option<u64>,
 }
 
 impl Default for More {
@@ -147,6 +150,7 @@ impl Default for More {
             verify: false,
             active_max: None,
             pulse_code: PulseCode::Unary,
+            train_slots: None,
         }
     }
 }
@@ -433,6 +437,10 @@ pub struct Tile {
     bank_events: [BankEvents; 2],
     events: TileEvents,
     launched: Option<(Launch, Way)>,
+    /// By bank: which rows and columns fire in the slot that ends in this cycle.
+    firing: [(Vec<bool>, Vec<bool>); 2],
+    /// Cells that were pulsed by trains of this write.
+    trained: [Vec<bool>; 2],
     /// Whether the lanes have seen the last group of a sample in this cycle.
     looked_up: bool,
 }
@@ -481,6 +489,8 @@ impl Tile {
             bank_events: Default::default(),
             events: TileEvents::default(),
             launched: None,
+            firing: Default::default(),
+            trained: [vec![false; cells], vec![false; cells]],
             looked_up: false,
             size,
             config,
@@ -575,7 +585,12 @@ impl Tile {
                 self.heard.fill(0);
                 self.err = Err { busy: true, slot, ..Err::default() };
             }
-            Command::Now { slot, shift } => self.upd = update(UpdKind::Now, slot, shift),
+            Command::Now { slot, shift } => {
+                self.upd = update(UpdKind::Now, slot, shift);
+                if self.config.more.train_slots.is_some() {
+                    self.upd.phase = UpdPhase::Set;
+                }
+            }
             // the field is taken, and not used
             Command::Add { slot } => self.upd = update(UpdKind::Add, slot, 0),
             Command::Write { shift } => self.upd = update(UpdKind::Write, 0, shift),

@@ -11,13 +11,15 @@ use super::super::tile::{
     BankEvents, Command, Launch, More, Tile, TileAdc, TileConfig, TileEvents, TileSize,
 };
 use crate::chip::hardware::timing::tree_levels;
-use crate::chip::hardware::{Adc, DitherPattern, FloorKind, Hardware, Subtract, Timing};
+use crate::chip::hardware::{
+    Adc, DitherPattern, FloorKind, Hardware, Subtract, Timing, WriteScheme,
+};
 use crate::chip::layer::Layer;
 use crate::chip::ledger::During;
 use crate::chip::periphery;
 use crate::chip::population::{Stream, Wiring};
 use crate::num::draw::{Place, Site};
-use crate::num::fixed::DriveBits;
+use crate::num::fixed::{DriveBits, rsh};
 
 /// Widths that decide how many bits a memory moves.
 #[derive(Debug, Clone, Copy)]
@@ -46,6 +48,7 @@ pub(super) struct TickLayer {
     tile: [usize; 2],
     drive_bits: DriveBits,
     dither: (u32, DitherPattern),
+    slots_log2: u32,
     seed: u64,
     /// Writes of every array so far.
     writes: u64,
@@ -86,6 +89,10 @@ impl TickLayer {
             tile,
             drive_bits: hardware.drive_bits,
             dither: (hardware.dither_bits.get(), hardware.dither_pattern),
+            slots_log2: match hardware.scheme {
+                WriteScheme::Rounded => 0,
+                WriteScheme::Trains { slots_log2 } => slots_log2,
+            },
             seed,
             writes: layer.writes.first().copied().unwrap_or(0),
             tree: vec![],
@@ -323,6 +330,12 @@ impl TickLayer {
     pub(super) fn cycle(&mut self, command: Option<&Command<'_>>, words: &[i16]) {
         for tile in 0..self.tiles.len() {
             let command = command.filter(|command| self.concerns(command, tile));
+            if let Some(slot) = self.tiles[tile].slot_ends() {
+                for bank in 0..2 {
+                    let (rows, columns) = self.firing(tile, bank, slot);
+                    self.tiles[tile].fire(bank, rows, columns);
+                }
+            }
             let word = words.get(self.tiles[tile].bus_index()).copied().unwrap_or(0);
             if self.tiles[tile].dither_wanted() {
                 let [e, i] = [0, 1].map(|bank| self.draws(tile, bank));
@@ -367,6 +380,39 @@ impl TickLayer {
             }
         };
         self.tile_columns(across).map(draw).collect()
+    }
+
+    /// Which rows and columns of a bank of a tile fire in a slot of a train.
+    fn firing(&self, tile: usize, bank: usize, slot: u32) -> (Vec<bool>, Vec<bool>) {
+        let across = tile % self.grid[1];
+        let down = tile / self.grid[1] % self.grid[0];
+        let target = self.targets()[tile / (self.grid[0] * self.grid[1])];
+        let this = &self.tiles[tile];
+        let (shift, sample) = this.writing();
+        // the probability of a slot is 2^-(k + log2 slots) of drive times gate, half of it each line's
+        let total = shift + self.wiring.shift_extra() + self.slots_log2;
+        let fires = |site, rows, line: usize, amount: i64, by: u32| {
+            let place = Place {
+                seed: self.seed,
+                site,
+                layer: self.index,
+                pathway: self.codes(target)[bank],
+                sub: slot,
+                count: self.writes,
+            };
+            let chance = rsh(amount << 16, by).min(1 << 16);
+            i64::from(place.half(rows, line, 0)) < chance
+        };
+        let row = |(at, row): (usize, usize)| {
+            let amount = i64::from(this.drive(bank, sample, at)) * this.mantissa();
+            fires(Site::RowTrain, self.rows, row, amount, total - total / 2)
+        };
+        let column = |(at, column): (usize, usize)| {
+            let amount = this.bank_gate(bank, sample, at).abs();
+            fires(Site::ColumnTrain, self.columns, column, amount, total / 2)
+        };
+        let rows = self.tile_rows(down).enumerate().map(row).collect();
+        (rows, self.tile_columns(across).enumerate().map(column).collect())
     }
 
     fn tree(&mut self) {
@@ -510,6 +556,10 @@ fn config(
             verify: timing.verify,
             active_max: timing.active_max.map(small),
             pulse_code: timing.pulse_code,
+            train_slots: match hardware.scheme {
+                WriteScheme::Rounded => None,
+                WriteScheme::Trains { slots_log2 } => Some(1 << slots_log2),
+            },
         },
     }
 }

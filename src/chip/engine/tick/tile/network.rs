@@ -41,6 +41,10 @@ impl Tile {
         self.config.more.potentiation_only = potentiation_only;
     }
 
+    pub(in super::super) const fn mantissa(&self) -> i64 {
+        self.config.mantissa
+    }
+
     pub(in super::super) fn set_adc_shifts(&mut self, shifts: &[u32]) {
         self.config.more.adc_shifts = shifts.to_vec();
     }

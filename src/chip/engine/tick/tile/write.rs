@@ -68,6 +68,9 @@ impl Tile {
         if !self.upd.busy {
             return;
         }
+        if let Some(slots) = self.config.more.train_slots {
+            return self.trains(slots);
+        }
         match (self.upd.kind, self.upd.phase) {
             (UpdKind::Add, _) => {
                 if self.beat_is_over() {
@@ -260,7 +263,7 @@ impl Tile {
     }
 
     /// A pulse of a cell: one level, or as many as its amplitude says.
-    fn move_cell(&mut self, bank: usize, column: usize, by: i64) {
+    pub(super) fn move_cell(&mut self, bank: usize, column: usize, by: i64) {
         let at = self.upd.row * self.size.columns + column;
         let before = i64::from(self.level[bank][at]);
         let (floor, ceiling) = (i64::from(self.config.floor), i64::from(self.config.ceiling));

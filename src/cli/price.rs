@@ -1,0 +1,232 @@
+//! `price`, `profile`.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use serde_json::json;
+
+use super::{Done, Shared, configuration, say};
+use crate::lab::price::{Bill, Group, areas, bounds, prefixed};
+use crate::lab::run::{self, Act, Profile};
+
+/// Assumed constants named in a table.
+const NAMED: usize = 5;
+
+#[derive(Debug, Args)]
+pub(super) struct PriceArgs {
+    /// Folder of a finished run
+    run: PathBuf,
+    /// Constants of another hardware model: a built-in name or a file
+    #[arg(long, value_name = "FILE")]
+    hw: Option<String>,
+    /// One JSON object on standard output
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Debug, Args)]
+pub(super) struct ProfileArgs {
+    /// Experiment file [default: the built-in digits]
+    file: Option<PathBuf>,
+    /// Hardware model: a built-in name or a file
+    #[arg(long, value_name = "FILE")]
+    hw: Option<String>,
+    /// Change a key, such as hw.timing.lanes=8 (repeatable)
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    settings: Vec<String>,
+    /// Seed of all draws
+    #[arg(long, value_name = "N")]
+    seed: Option<u64>,
+    #[command(flatten)]
+    shared: Shared,
+}
+
+pub(super) fn price(args: &PriceArgs) -> Done {
+    let run = run::reprice(&args.run, args.hw.as_deref())?;
+    let bill = run.bill();
+    if args.json {
+        let changes: Vec<_> = run
+            .changes
+            .iter()
+            .map(|change| {
+                let events: Vec<_> = change.events.iter().map(|event| event.name()).collect();
+                json!({"key": change.key, "events": events, "time": change.time})
+            })
+            .collect();
+        let mut object = json!({"event": "price", "run": args.run.display().to_string(),
+            "made_on": run.made_on, "priced_as": run.priced_as, "changes": changes,
+            "cycles": run.ledger.elapsed()});
+        merge(&mut object, bill.to_json());
+        say(&object.to_string());
+        return Ok(());
+    }
+    say(&format!("run on {}, constants of {}", run.made_on, run.priced_as));
+    if !run.changes.is_empty() {
+        let keys: Vec<_> = run.changes.iter().map(|change| change.key).collect();
+        say(&format!(
+            "the chips differ in {}: what that touches is left out below; to count it, train on {}",
+            keys.join(", "),
+            run.priced_as
+        ));
+    }
+    if let (Some(cycles), Some(seconds)) = (run.ledger.elapsed(), bill.seconds_total()) {
+        say(&format!("time     {cycles} cycles, {}", prefixed(seconds, "s")));
+    }
+    show_energy(&bill);
+    for (heading, groups) in [
+        ("by phase", bill.by_phase()),
+        ("by operation", bill.by_operation()),
+        ("by layer", bill.by_layer()),
+        ("by pathway", bill.by_pathway()),
+    ] {
+        show_groups(heading, &groups, bill.total()[1]);
+    }
+    show_missing(&bill);
+    Ok(())
+}
+
+fn merge(object: &mut serde_json::Value, more: serde_json::Value) {
+    if let (Some(object), serde_json::Value::Object(more)) = (object.as_object_mut(), more) {
+        object.extend(more);
+    }
+}
+
+fn show_energy(bill: &Bill<'_>) {
+    say(&format!("energy   {}", bounds(bill.total(), "J")));
+    show_groups("by component", &bill.by_component(), bill.total()[1]);
+    let (share, assumed) = bill.assumed();
+    let named: Vec<_> = assumed
+        .iter()
+        .take(NAMED)
+        .map(|one| format!("{} {:.1} %", one.key, 100.0 * one.share))
+        .collect();
+    if !named.is_empty() {
+        say(&format!("{:.1} % leans on assumed constants: {}", 100.0 * share, named.join(", ")));
+    }
+}
+
+fn show_groups(heading: &str, groups: &[Group], total: f64) {
+    if groups.is_empty() {
+        return;
+    }
+    say(&format!("{heading}:"));
+    for group in groups {
+        let share = if total > 0.0 { 100.0 * group.joules[1] / total } else { 0.0 };
+        let joules = bounds(group.joules, "J");
+        say(&format!("  {:16} {share:>5.1} %  {joules}", group.name.replace('_', " ")));
+    }
+}
+
+fn show_missing(bill: &Bill<'_>) {
+    for missing in &bill.missing {
+        let count = missing.count.map_or_else(String::new, |count| format!(" ({count})"));
+        say(&format!("no price: {}{count}: {}", missing.what, missing.why));
+    }
+}
+
+pub(super) fn profile(args: &ProfileArgs) -> Done {
+    let shared = &args.shared;
+    let config = configuration(args.file.as_ref(), args.hw.as_deref(), &args.settings, args.seed)?;
+    let profile = run::profile(&config, &shared.data_root(), shared.machine()?)?;
+    if shared.json {
+        for act in &profile.acts {
+            say(&act_json(&profile, act).to_string());
+        }
+        return Ok(());
+    }
+    let tiles = profile.plan.tiles(&profile.hardware);
+    say(&format!(
+        "{} on {}: {} cells on {tiles} tiles",
+        config.data_name(),
+        config.hardware_name,
+        profile.plan.cells()
+    ));
+    for (name, area) in areas(&profile.plan, &profile.hardware, &profile.constants) {
+        let [low, typical, high] = area.map(|area| area * 1e6);
+        say(&format!("area of {name}: {typical:.3} mm2 ({low:.3} to {high:.3})"));
+    }
+    if !shared.quiet {
+        // what is not simulated is a list of its own: `hw show`
+        let warnings = profile.warnings.iter().filter(|text| !text.starts_with("not simulated"));
+        for warning in warnings {
+            say(&format!("warning: {warning}"));
+        }
+        let effects: Vec<_> =
+            config.not_simulated.keys().map(|key| key.replace('_', " ")).collect();
+        if !effects.is_empty() {
+            say(&format!("not simulated: {} (see dalean hw show)", effects.join(", ")));
+        }
+    }
+    for act in &profile.acts {
+        show_act(&profile, act);
+    }
+    Ok(())
+}
+
+/// Operations a second and a joule: a multiplication and an addition a product.
+fn rates(act: &Act, bill: &Bill<'_>) -> (Option<f64>, Option<f64>) {
+    let operations = 2.0 * act.macs.iter().sum::<u64>() as f64;
+    let joules = bill.total()[1];
+    let rate = bill.seconds_total().filter(|&s| s > 0.0).map(|seconds| operations / seconds);
+    (rate, (joules > 0.0).then(|| operations / joules))
+}
+
+fn act_json(profile: &Profile, act: &Act) -> serde_json::Value {
+    let bill = profile.bill(act);
+    let (rate, efficiency) = rates(act, &bill);
+    let stages: Vec<_> = act
+        .stages()
+        .into_iter()
+        .map(|stage| {
+            let critical = stage.critical.map(
+                |(layer, part, used)| json!({"layer": layer, "part": part.name(), "used": used}),
+            );
+            json!({"stage": stage.stage.name(), "cycles": stage.cycles, "critical": critical})
+        })
+        .collect();
+    let mut object = json!({"event": "profile", "act": act.name, "samples": act.samples,
+        "macs_read": act.macs[0], "macs_accumulated": act.macs[1],
+        "operations_per_second": rate, "operations_per_joule": efficiency,
+        "cycles": act.cycles(), "stages": stages});
+    merge(&mut object, bill.to_json());
+    object
+}
+
+fn show_act(profile: &Profile, act: &Act) {
+    let bill = profile.bill(act);
+    let samples =
+        if act.samples == 1 { "1 sample".into() } else { format!("{} samples", act.samples) };
+    say(&format!("\n{}, {samples}", act.name.to_uppercase()));
+    if let (Some(cycles), Some(seconds)) = (act.cycles(), bill.seconds_total()) {
+        let elapsed = cycles.elapsed.max(1) as f64;
+        say(&format!("time     {} cycles, {}", cycles.elapsed, prefixed(seconds, "s")));
+        for stage in act.stages() {
+            let critical = stage.critical.map_or_else(String::new, |(layer, part, used)| {
+                let share = 100.0 * used as f64 / stage.cycles as f64;
+                format!("  layer {layer} {} work {share:.0} % of it", part.name())
+            });
+            let share = 100.0 * stage.cycles as f64 / elapsed;
+            let line =
+                format!("  {:16} {share:>5.1} %  {:>9} cycles", stage.stage.name(), stage.cycles);
+            say(&format!("{line}{critical}"));
+        }
+        say("cycles at work, and share of the whole time:");
+        for (layer, this) in cycles.layers.iter().enumerate() {
+            let used = this.used.iter().filter(|(_, used)| **used > 0);
+            let used = used.map(|(part, used)| {
+                format!("{part} {used} ({:.0} %)", 100.0 * *used as f64 / elapsed)
+            });
+            say(&format!("  layer {layer:<10} {}", used.collect::<Vec<_>>().join(", ")));
+        }
+    }
+    show_energy(&bill);
+    let (rate, efficiency) = rates(act, &bill);
+    let mut line = format!("MACs     {} of reads, {} of accumulation", act.macs[0], act.macs[1]);
+    for (value, unit) in [(rate, "TOPS"), (efficiency, "TOPS/W")] {
+        if let Some(value) = value {
+            line += &format!(", {:.4} {unit}", value / 1e12);
+        }
+    }
+    say(&line);
+    show_missing(&bill);
+}

@@ -1,0 +1,353 @@
+//! From the keys of a chip to checked numbers: defaults, ranges, and what fits with what.
+
+use super::ConfigError;
+use super::check::{between, range, word, wrong};
+use super::file::{
+    AdcFile, AdcTable, CellFile, DriveFile, ErrorFile, HardwareFile, LutFile, RangeFile, TileFile,
+    TimingFile, WriteFile,
+};
+use crate::chip::hardware::{
+    Adc, AdcRange, DitherBits, DitherPattern, FloorKind, Hardware, PulseCode, Subtract, Timing,
+    Window, WriteScheme,
+};
+use crate::num::fixed::{
+    AdcBits, DriveBits, ErrorBits, IncrementMax, LevelBits, LutBits, ResidualBits,
+};
+
+/// Most cycles of one action: 0.1 s at 1 GHz.
+const CYCLES_MAX: i64 = 100_000_000;
+
+/// How a drive code is put on a row.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum DriveMode {
+    /// A voltage of `dac_bits` a slice.
+    Voltage,
+    /// A pulse whose length is the code, phase by phase; one takes so many cycles.
+    PulseWidth { phase_cycles: i64 },
+    /// The amplitude of light: one slice, and a difference of currents.
+    Amplitude,
+}
+
+/// Checks `[hw]` or a model file and writes defaults back; `prefix` is put before keys in messages.
+pub(super) fn resolve(file: &mut HardwareFile, prefix: &str) -> Result<Hardware, ConfigError> {
+    let key = |name: &str| format!("{prefix}{name}");
+    let cell = file.cell.get_or_insert_with(CellFile::default);
+    let bits = *cell.level_bits.get_or_insert(8);
+    let level_bits = range(&key("cell.level_bits"), LevelBits::new(bits))?;
+    let floor = *cell.floor.get_or_insert(0);
+    // the default ceiling follows the bits, so it is not written back
+    let ceiling = cell.ceiling.unwrap_or(i64::from(level_bits.level_max()));
+    let window = range(&key("cell"), Window::new(floor, ceiling, level_bits))?;
+    let floors = [("recoverable", FloorKind::Recoverable), ("absorbing", FloorKind::Absorbing)];
+    let floor_kind = word(&key("cell.floor_kind"), &mut cell.floor_kind, "recoverable", &floors)?;
+
+    let tile = file.tile.get_or_insert_with(TileFile::default);
+    let tile_rows = between(&key("tile.rows"), *tile.rows.get_or_insert(256), 1, 32_768)?;
+    let tile_columns = between(&key("tile.columns"), *tile.columns.get_or_insert(256), 1, 32_768)?;
+    let count = tile.count.map(|n| between(&key("tile.count"), n, 1, 1 << 30)).transpose()?;
+    let transposed_read = *tile.transposed_read.get_or_insert(false);
+
+    let drive = file.drive.get_or_insert_with(DriveFile::default);
+    let bits = *drive.bits.get_or_insert(8);
+    let drive_bits = range(&key("drive.bits"), DriveBits::new(bits))?;
+    let (mode, dac_bits) = drive_mode(drive, bits, &key)?;
+
+    let adc = match file.adc.get_or_insert_with(|| AdcFile::Ideal("ideal".into())) {
+        AdcFile::Ideal(_) => Adc::Ideal,
+        AdcFile::Finite(table) => converters(table, &key)?,
+    };
+
+    if mode == DriveMode::Amplitude
+        && matches!(adc, Adc::Finite { subtract: Subtract::Digital, .. })
+    {
+        let allowed = "light of the two banks meets in balanced photodiodes: with drive.mode = \"amplitude\" use \
+                       adc.subtract = \"current\", or adc = \"ideal\"";
+        return Err(wrong(&key("adc.subtract"), "is \"digital\"", allowed));
+    }
+
+    let lut = file.lut.get_or_insert_with(LutFile::default);
+    let lut_bits = range(&key("lut.bits"), LutBits::new(*lut.bits.get_or_insert(10)))?;
+    let error = file.error.get_or_insert_with(ErrorFile::default);
+    let error_bits = range(&key("error.bits"), ErrorBits::new(*error.bits.get_or_insert(8)))?;
+
+    let write = file.write.get_or_insert_with(WriteFile::default);
+    let increments = *write.increment_max.get_or_insert(7);
+    let increment_max = range(&key("write.increment_max"), IncrementMax::new(increments))?;
+    let dither_bits = match *write.dither_bits.get_or_insert(8) {
+        0 => DitherBits::Zero,
+        8 => DitherBits::Eight,
+        16 => DitherBits::Sixteen,
+        other => {
+            let allowed = "it is 0 (half-up), 8 or 16";
+            return Err(wrong(&key("write.dither_bits"), format!("is {other}"), allowed));
+        }
+    };
+    let patterns = [("per_cell", DitherPattern::PerCell), ("separable", DitherPattern::Separable)];
+    let dither_pattern = word(&key("write.dither"), &mut write.dither, "per_cell", &patterns)?;
+    let bits = *write.residual_bits.get_or_insert(0);
+    let residual_bits = range(&key("write.residual_bits"), ResidualBits::new(bits))?;
+
+    let scheme = scheme(write, &key, increments)?;
+    let timing = file.timing.as_mut().map(|table| timing(table, mode, &key)).transpose()?;
+    if let (WriteScheme::Trains { .. }, Some(timing)) = (scheme, timing) {
+        let limited = timing.verify || timing.active_max.is_some();
+        if limited || timing.pulse_code != PulseCode::Unary {
+            let found = "is \"rank1\" beside verified, limited or amplitude-coded pulses";
+            let allowed = "all rows and columns fire at once: leave out timing.verify, timing.write_active_max and \
+                           timing.pulses, or use write.scheme = \"rounded\"";
+            return Err(wrong(&key("write.scheme"), found, allowed));
+        }
+    }
+    let size = |n: i64| usize::try_from(n).expect("checked to be positive");
+    Ok(Hardware {
+        level_bits,
+        window,
+        floor_kind,
+        tile_rows: size(tile_rows),
+        tile_columns: size(tile_columns),
+        tiles_max: count.map(size),
+        transposed_read,
+        drive_bits,
+        dac_bits: u32::try_from(dac_bits).expect("1..=8"),
+        adc,
+        lut_bits,
+        error_bits,
+        increment_max,
+        dither_bits,
+        dither_pattern,
+        residual_bits,
+        scheme,
+        timing,
+    })
+}
+
+fn scheme(
+    write: &mut WriteFile,
+    key: &dyn Fn(&str) -> String,
+    increments: i64,
+) -> Result<WriteScheme, ConfigError> {
+    let schemes = [("rounded", false), ("rank1", true)];
+    if !word(&key("write.scheme"), &mut write.scheme, "rounded", &schemes)? {
+        return match write.train_slots {
+            None => Ok(WriteScheme::Rounded),
+            Some(slots) => {
+                let allowed = "only write.scheme = \"rank1\" has trains";
+                Err(wrong(&key("write.train_slots"), format!("is {slots}"), allowed))
+            }
+        };
+    }
+    let slots = *write.train_slots.get_or_insert(1 << increments.ilog2().min(5));
+    let most = i64::from(WriteScheme::SLOTS_MAX).min(increments);
+    if slots < 1 || slots > most || slots.count_ones() != 1 {
+        let allowed = format!(
+            "it is a power of two in 1..={most}: a cell gets at most one pulse a slot, and write.increment_max is \
+             {increments}"
+        );
+        return Err(wrong(&key("write.train_slots"), format!("is {slots}"), allowed));
+    }
+    if write.residual_bits != Some(0) {
+        let allowed = "coincidences of trains have no remainder; set it to 0";
+        return Err(wrong(&key("write.residual_bits"), "is not 0", allowed));
+    }
+    Ok(WriteScheme::Trains { slots_log2: slots.ilog2() })
+}
+
+fn converters(table: &mut AdcTable, key: &dyn Fn(&str) -> String) -> Result<Adc, ConfigError> {
+    let Some(bits) = table.bits else {
+        return Err(wrong(&key("adc.bits"), "is missing", "give 2..=16, or write adc = \"ideal\""));
+    };
+    let bits = range(&key("adc.bits"), AdcBits::new(bits))?;
+    let subtracts = [("digital", Subtract::Digital), ("current", Subtract::Current)];
+    let subtract = word(&key("adc.subtract"), &mut table.subtract, "digital", &subtracts)?;
+    let headroom = between(&key("adc.headroom"), *table.headroom.get_or_insert(1), 0, 16)?;
+    let again = [("never", false), ("epoch", true)];
+    let every_epoch = word(&key("adc.recalibrate"), &mut table.recalibrate, "never", &again)?;
+    let default = || RangeFile::Named("calibrated".into());
+    let range = match table.range.get_or_insert_with(default) {
+        RangeFile::Named(name) if name == "calibrated" => {
+            AdcRange::Calibrated { headroom: u32::try_from(headroom).expect("0..=16"), every_epoch }
+        }
+        RangeFile::Named(name) if name == "full" => AdcRange::Full,
+        RangeFile::Named(name) => {
+            let allowed = "it is \"calibrated\", \"full\" or a shift in 0..=40";
+            return Err(wrong(&key("adc.range"), format!("is \"{name}\""), allowed));
+        }
+        RangeFile::Shift(shift) => {
+            let shift = between(&key("adc.range"), *shift, 0, 40)?;
+            AdcRange::Shift(u32::try_from(shift).expect("0..=40"))
+        }
+    };
+    Ok(Adc::Finite { bits, subtract, range })
+}
+
+/// How rows are driven, and the bits of a slice.
+fn drive_mode(
+    drive: &mut DriveFile,
+    bits: i64,
+    key: &dyn Fn(&str) -> String,
+) -> Result<(DriveMode, i64), ConfigError> {
+    let names = [("voltage", 0), ("pulse_width", 1), ("amplitude", 2)];
+    let mode = word(&key("drive.mode"), &mut drive.mode, "voltage", &names)?;
+    let own =
+        [("slots", drive.slots), ("slot_cycles", drive.slot_cycles), ("phases", drive.phases)];
+    if let (0 | 2, Some((name, _))) = (mode, own.iter().find(|(_, value)| value.is_some())) {
+        let allowed = "only drive.mode = \"pulse_width\" has slots and phases; remove the key";
+        return Err(wrong(&key(&format!("drive.{name}")), "is given", allowed));
+    }
+    if mode != 1 {
+        let dac_bits = *drive.dac_bits.get_or_insert(bits);
+        let dac_bits = between(&key("drive.dac_bits"), dac_bits, 1, bits)?;
+        if mode == 2 && dac_bits != bits {
+            let allowed =
+                format!("light carries a drive code at once: it must be drive.bits, {bits}");
+            return Err(wrong(&key("drive.dac_bits"), format!("is {dac_bits}"), allowed));
+        }
+        let mode = if mode == 2 { DriveMode::Amplitude } else { DriveMode::Voltage };
+        return Ok((mode, dac_bits));
+    }
+    let phases = between(&key("drive.phases"), *drive.phases.get_or_insert(1), 1, bits)?;
+    // what follows from bits and phases is not written back, so that either can be set alone
+    let ceil = |n: i64, by: i64| (n + by - 1) / by;
+    let dac_bits = ceil(bits, phases);
+    if ceil(bits, dac_bits) != phases {
+        let allowed = format!(
+            "{bits} bits in phases of {dac_bits} take {}; use that, or change drive.bits",
+            ceil(bits, dac_bits)
+        );
+        return Err(wrong(&key("drive.phases"), format!("is {phases}"), allowed));
+    }
+    if drive.dac_bits.is_some_and(|given| given != dac_bits) {
+        let allowed =
+            format!("{bits} bits in {phases} phases are {dac_bits} a phase; remove the key");
+        return Err(wrong(&key("drive.dac_bits"), "does not fit drive.phases", allowed));
+    }
+    let most = (1i64 << dac_bits) - 1;
+    let slots = drive.slots.unwrap_or(most);
+    if !(most..=CYCLES_MAX).contains(&slots) {
+        let allowed = format!(
+            "the greatest code of a phase of {dac_bits} bits is a pulse of {most} slots; give at least {most}, or more \
+             drive.phases"
+        );
+        return Err(wrong(&key("drive.slots"), format!("is {slots}"), allowed));
+    }
+    let slot_cycles = *drive.slot_cycles.get_or_insert(1);
+    let slot_cycles = between(&key("drive.slot_cycles"), slot_cycles, 1, CYCLES_MAX / slots)?;
+    Ok((DriveMode::PulseWidth { phase_cycles: slots * slot_cycles }, dac_bits))
+}
+
+fn timing(
+    table: &mut TimingFile,
+    mode: DriveMode,
+    key: &dyn Fn(&str) -> String,
+) -> Result<Timing, ConfigError> {
+    let key = |name: &str| key(&format!("timing.{name}"));
+    let Some(clock_mhz) = table.clock_mhz else {
+        let allowed = "give the clock that counts cycles, such as clock_mhz = 1000.0; without [timing] no cycles are \
+                       counted";
+        return Err(wrong(&key("clock_mhz"), "is missing", allowed));
+    };
+    if !(0.001..=1e6).contains(&clock_mhz) {
+        let allowed = "it must lie in 0.001..=1000000 (1 kHz to 1 THz)";
+        return Err(wrong(&key("clock_mhz"), format!("is {clock_mhz}"), allowed));
+    }
+    // a phase takes its slots; what is said here comes on top of them
+    let (slots, least) = match mode {
+        DriveMode::PulseWidth { phase_cycles } => (phase_cycles, 0),
+        DriveMode::Voltage | DriveMode::Amplitude => (0, 1),
+    };
+    let count = |name: &str, value: &mut Option<i64>, least: i64, most: i64| {
+        let value = *value.get_or_insert(least);
+        between(&key(name), value, least, most).map(i64::unsigned_abs)
+    };
+    let settle = count("settle_cycles", &mut table.settle_cycles, least, CYCLES_MAX)?;
+    let pulse_codes = [("unary", PulseCode::Unary), ("amplitude", PulseCode::Amplitude)];
+    Ok(Timing {
+        clock_khz: (clock_mhz * 1000.0).round() as u64,
+        beat: count("beat_cycles", &mut table.beat_cycles, 1, 1_000_000)?,
+        settle: settle + slots.unsigned_abs(),
+        convert: count("convert_cycles", &mut table.convert_cycles, 1, CYCLES_MAX)?,
+        share: count("columns_per_adc", &mut table.columns_per_adc, 1, 32_768)?,
+        overlapped: *table.overlap.get_or_insert(false),
+        lanes: count("lanes", &mut table.lanes, 1, 32_768)?,
+        hops: count("bus_hops", &mut table.bus_hops, 0, 1_000_000)?,
+        pulse: count("pulse_cycles", &mut table.pulse_cycles, 1, CYCLES_MAX)?,
+        pulse_code: word(&key("pulses"), &mut table.pulses, "unary", &pulse_codes)?,
+        verify: *table.verify.get_or_insert(false),
+        active_max: match table.write_active_max {
+            None => None,
+            Some(cells) => {
+                Some(between(&key("write_active_max"), cells, 1, 65_536).map(i64::unsigned_abs)?)
+            }
+        },
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn chip(text: &str) -> Result<(Hardware, HardwareFile), String> {
+        let mut file: HardwareFile = toml::from_str(text).map_err(|e| e.to_string())?;
+        let hardware = resolve(&mut file, "hw.").map_err(|e| e.to_string())?;
+        Ok((hardware, file))
+    }
+
+    #[test]
+    fn a_silent_timing_is_the_shortest_there_is_and_is_written_out() {
+        assert_eq!(chip("").unwrap().0.timing, None);
+        let (hardware, file) = chip("timing.clock_mhz = 1280.5").unwrap();
+        let timing = hardware.timing.unwrap();
+        assert_eq!((timing.clock_khz, timing.beat, timing.settle), (1_280_500, 1, 1));
+        assert_eq!((timing.share, timing.lanes, timing.hops, timing.active_max), (1, 1, 0, None));
+        let text = toml::to_string(&file).unwrap();
+        for key in ["settle_cycles = 1", "overlap = false", "pulses = \"unary\"", "bus_hops = 0"] {
+            assert!(text.contains(key), "{key} in {text}");
+        }
+        assert_eq!(chip(&text).unwrap().0, hardware);
+    }
+
+    #[test]
+    fn a_phase_of_pulse_width_takes_its_slots_and_what_comes_on_top() {
+        let text = "drive = { bits = 7, mode = \"pulse_width\", slots = 128, slot_cycles = 3 }\n\
+                    timing = { clock_mhz = 1, settle_cycles = 2 }";
+        let (hardware, _) = chip(text).unwrap();
+        assert_eq!((hardware.slices(), hardware.dac_bits), (1, 7));
+        assert_eq!(hardware.timing.unwrap().settle, 3 * 128 + 2);
+        for (phases, dac_bits, slots) in [(1, 7, 127), (2, 4, 15), (3, 3, 7), (4, 2, 3), (7, 1, 1)]
+        {
+            let text = format!(
+                "drive = {{ bits = 7, mode = \"pulse_width\", phases = {phases} }}\ntiming.clock_mhz = 1"
+            );
+            let (hardware, _) = chip(&text).unwrap();
+            assert_eq!((hardware.slices(), hardware.dac_bits), (phases, dac_bits));
+            assert_eq!(hardware.timing.unwrap().settle, slots, "the greatest code fits exactly");
+        }
+    }
+
+    #[test]
+    fn mistakes_name_the_key_and_what_is_allowed() {
+        let wide = "drive.mode = \"pulse_width\"\n";
+        for (text, wanted) in [
+            ("timing.lanes = 8", "`hw.timing.clock_mhz` is missing"),
+            ("timing = { clock_mhz = 0 }", "0.001..=1000000"),
+            ("timing = { clock_mhz = 1, lanes = 0 }", "`hw.timing.lanes` is 0"),
+            ("timing = { clock_mhz = 1, settle_cycles = 0 }", "`hw.timing.settle_cycles`"),
+            ("timing = { clock_mhz = 1, pulses = \"long\" }", "unary, amplitude"),
+            ("timing = { clock_mhz = 1, write_active_max = 0 }", "write_active_max"),
+            ("drive.mode = \"light\"", "voltage, pulse_width, amplitude"),
+            ("drive.slots = 4", "only drive.mode = \"pulse_width\""),
+            (&format!("{wide}drive.slots = 254"), "pulse of 255 slots"),
+            (&format!("{wide}drive.bits = 7\ndrive.phases = 5"), "take 4"),
+            (&format!("{wide}drive.phases = 9"), "1..=8"),
+            (&format!("{wide}drive.dac_bits = 3"), "does not fit"),
+            (&format!("{wide}drive.slot_cycles = 1000000"), "slot_cycles"),
+            ("drive = { mode = \"amplitude\", dac_bits = 4 }", "light carries"),
+            ("drive.mode = \"amplitude\"\nadc = { bits = 8 }", "balanced photodiodes"),
+        ] {
+            let error = chip(text).unwrap_err();
+            assert!(error.contains(wanted), "{text}: {error}");
+        }
+        let light = "drive.mode = \"amplitude\"\nadc = { bits = 8, subtract = \"current\" }";
+        assert!(chip(light).is_ok() && chip("drive.mode = \"amplitude\"").is_ok());
+    }
+}

@@ -1,0 +1,464 @@
+//! What events, parts and idling cost: physical numbers, each with its bounds and its source.
+//!
+//! ```text
+//! [energy]
+//! conversion_pj = { low = 1.0, typical = 1.6, high = 4.0, source = "...", kind = "measured" }
+//! ```
+//!
+//! A key is the name of a quantity of [`QUANTITIES`] and a unit. The list is the only place that joins events of the
+//! ledger to keys. Beside each quantity stands the interval in which a number of this kind can lie on any chip: it is
+//! wide, and what lies outside is a slip of the unit, not an exotic device. See docs/MODEL.md, 4.6.
+
+use serde::de::{self, Deserializer};
+use serde::{Deserialize, Serialize};
+
+use super::ConfigError;
+use super::check::wrong;
+use super::file::{HardwareFile, NumberFile};
+use crate::chip::ledger::Event;
+
+/// A table of a hardware model.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Table {
+    /// Joules an event.
+    Energy,
+    /// Watts.
+    Power,
+    /// Square metres.
+    Area,
+}
+
+impl Table {
+    /// Name in files.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Energy => "energy",
+            Self::Power => "power",
+            Self::Area => "area",
+        }
+    }
+
+    /// Units of its keys, and what one is in joules, watts or square metres.
+    const fn units(self) -> &'static [(&'static str, f64)] {
+        match self {
+            Self::Energy => {
+                &[("aj", 1e-18), ("fj", 1e-15), ("pj", 1e-12), ("nj", 1e-9), ("uj", 1e-6)]
+            }
+            Self::Power => &[("nw", 1e-9), ("uw", 1e-6), ("mw", 1e-3), ("w", 1.0)],
+            Self::Area => &[("um2", 1e-12), ("mm2", 1e-6)],
+        }
+    }
+}
+
+/// What a quantity is counted by.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Per {
+    /// An event of the ledger.
+    Event(Event),
+    /// The chip.
+    Chip,
+    /// A tile in use.
+    Tile,
+    /// A column of a bank of a tile in use.
+    Column,
+    /// A cell of the network.
+    Cell,
+    /// A row driver of a bank of a tile in use.
+    Row,
+    /// A converter of a tile in use.
+    Converter,
+}
+
+/// A kind of physical number.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Quantity {
+    /// Where it is given.
+    pub table: Table,
+    /// Its key, without the unit.
+    pub name: &'static str,
+    /// What it is counted by.
+    pub per: Per,
+    /// Least and greatest credible number, in joules, watts or square metres.
+    pub sane: [f64; 2],
+    /// Why that interval.
+    pub why: &'static str,
+}
+
+const fn energy(name: &'static str, event: Event, sane: [f64; 2], why: &'static str) -> Quantity {
+    Quantity { table: Table::Energy, name, per: Per::Event(event), sane, why }
+}
+
+const fn power(name: &'static str, per: Per, sane: [f64; 2], why: &'static str) -> Quantity {
+    Quantity { table: Table::Power, name, per, sane, why }
+}
+
+const fn area(name: &'static str, per: Per, sane: [f64; 2], why: &'static str) -> Quantity {
+    Quantity { table: Table::Area, name, per, sane, why }
+}
+
+/// Every quantity a model can give. An event without a line here costs nothing by itself: it says what came of
+/// another one (a saturation, a pulse that was effective).
+pub const QUANTITIES: [Quantity; 24] = [
+    energy(
+        "dac_slice",
+        Event::DacSlices,
+        [1e-17, 1e-10],
+        "a 1-bit driver takes 0.4 pJ in 100 ns, an 8-bit one at 14 GS/s 3.6 pJ; a public table has 0.5 nJ by a missing 1e-3",
+    ),
+    energy(
+        "cell_read",
+        Event::CellReads,
+        [1e-18, 1e-10],
+        "V^2 G t lies between 0.1 V, 10 nS, 1 ns and 0.5 V, 0.2 mS, 1 us",
+    ),
+    energy("hold", Event::Holds, [1e-18, 1e-12], "C V^2 of some femtofarads"),
+    energy(
+        "conversion",
+        Event::Conversions,
+        [1e-14, 1e-10],
+        "published converters of 4 to 9 bits lie between 0.05 and 20 pJ",
+    ),
+    energy(
+        "shift_add",
+        Event::ShiftAdds,
+        [1e-16, 1e-11],
+        "an adder of 8 to 32 bits takes 1 fJ to 1 pJ",
+    ),
+    energy("look_up", Event::LookUps, [1e-16, 1e-10], "a read of a small memory"),
+    energy("multiply", Event::Multiplies, [1e-16, 1e-11], "8 x 8 bits take 10 fJ to 0.4 pJ"),
+    energy(
+        "bus_word",
+        Event::BusWords,
+        [1e-16, 1e-10],
+        "8 wires over up to centimetres, 0.1 pJ a bit and millimetre",
+    ),
+    energy(
+        "accumulate",
+        Event::Accumulates,
+        [1e-16, 1e-11],
+        "a multiplication and an addition, without the memory",
+    ),
+    energy(
+        "delta",
+        Event::DeltaComputations,
+        [1e-16, 1e-11],
+        "a shift, an addition of a random word and a clamp",
+    ),
+    energy(
+        "cell_load",
+        Event::CellLoads,
+        [1e-18, 1e-6],
+        "one gate charge, or a hundred verified pulses of phase change",
+    ),
+    energy(
+        "cell_pulse",
+        Event::PulsesAttempted,
+        [1e-18, 1e-7],
+        "from a FeFET's gate charge (35 aJ) to a phase-change pulse (29 nJ)",
+    ),
+    energy(
+        "row_pulse",
+        Event::RowPulses,
+        [1e-16, 1e-8],
+        "C V^2 of a row line and of the columns it crosses",
+    ),
+    energy(
+        "verify_read",
+        Event::VerifyReads,
+        [1e-18, 1e-9],
+        "a read of one cell with its conversion",
+    ),
+    energy(
+        "sram_bit",
+        Event::SramBits,
+        [1e-17, 1e-11],
+        "7 fJ (2 Mb at 7 nm) to 160 fJ (8 KB at 45 nm) a bit",
+    ),
+    power("static", Per::Chip, [1e-9, 1e3], "leakage, clocks and references of a chip"),
+    power("tile_static", Per::Tile, [1e-12, 1e2], "leakage and bias of a tile"),
+    power("laser", Per::Tile, [1e-6, 1e2], "light for a tile, at the wall plug"),
+    power(
+        "heater",
+        Per::Cell,
+        [1e-12, 1e-1],
+        "a micro-mechanical shifter holds with nanowatts, a thermal one with 30 mW",
+    ),
+    power(
+        "receiver",
+        Per::Column,
+        [1e-9, 1e-1],
+        "a photodiode and its amplifier take some milliwatts",
+    ),
+    area("cell", Per::Cell, [1e-16, 1e-7], "from 10 nm squared to an interferometer"),
+    area("adc", Per::Converter, [1e-12, 1e-6], "published converters take 500 to 10000 um2"),
+    area("dac", Per::Row, [1e-13, 1e-6], "a driver of one bit up to a fast 8-bit converter"),
+    area("tile", Per::Tile, [1e-12, 1e-4], "what a tile has beside cells and converters"),
+];
+
+/// Where a number comes from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Kind {
+    /// On silicon, or read from a cited source that did.
+    Measured,
+    /// Adjusted until a model met a published result.
+    Fitted,
+    /// A guess, a memory, or a number of another chip.
+    Assumed,
+}
+
+/// A physical number of a model.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Constant {
+    /// What it is.
+    pub quantity: &'static Quantity,
+    /// Its key, with the unit.
+    pub key: String,
+    /// Low, typical and high, in joules, watts or square metres.
+    pub value: [f64; 3],
+    /// Where it comes from.
+    pub source: String,
+    /// How far to trust it.
+    pub kind: Kind,
+}
+
+/// The physical numbers of a model, in the order of [`QUANTITIES`].
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Constants(Vec<Constant>);
+
+impl Constants {
+    /// Checks the three tables of a model; `prefix` is put before keys in messages.
+    ///
+    /// # Errors
+    /// When a number is incomplete, given twice, or its bounds are in the wrong order.
+    pub(super) fn new(file: &HardwareFile, prefix: &str) -> Result<Self, ConfigError> {
+        let mut all = Vec::new();
+        for (table, name, number) in numbers(file) {
+            let (quantity, unit) =
+                parse(table, name).expect("keys were checked when they were read");
+            let key = format!("{prefix}{}.{name}", table.name());
+            let missing = |part: &str| {
+                let allowed = "a physical number is { low, typical, high, source, kind }";
+                wrong(&format!("{key}.{part}"), "is missing", allowed)
+            };
+            let bound = |part, value: Option<f64>| value.ok_or_else(|| missing(part));
+            let low = bound("low", number.low)?;
+            let typical = bound("typical", number.typical)?;
+            let high = bound("high", number.high)?;
+            if !(0.0 <= low && low <= typical && typical <= high && high.is_finite()) {
+                let found = format!("has low {low}, typical {typical}, high {high}");
+                return Err(wrong(&key, found, "it must be 0 <= low <= typical <= high"));
+            }
+            let source = number.source.as_deref().unwrap_or_default().trim();
+            if source.is_empty() {
+                let allowed = "every physical number says where it comes from";
+                return Err(wrong(&format!("{key}.source"), "is missing", allowed));
+            }
+            let kind = match number.kind.as_deref() {
+                Some("measured") => Kind::Measured,
+                Some("fitted") => Kind::Fitted,
+                Some("assumed") => Kind::Assumed,
+                Some(other) => {
+                    let allowed = "it is measured, fitted or assumed";
+                    return Err(wrong(&format!("{key}.kind"), format!("is \"{other}\""), allowed));
+                }
+                None => return Err(missing("kind")),
+            };
+            all.push(Constant {
+                quantity,
+                key: format!("{}.{name}", table.name()),
+                value: [low, typical, high].map(|number| number * unit),
+                source: source.into(),
+                kind,
+            });
+        }
+        let place = |c: &Constant| QUANTITIES.iter().position(|q| q == c.quantity);
+        all.sort_by_key(place);
+        if let Some(twice) = all.windows(2).find(|two| two[0].quantity == two[1].quantity) {
+            let found = format!("is given beside `{}`", twice[0].key);
+            let allowed = "a quantity is given once, in one unit; remove one of the keys";
+            return Err(wrong(&format!("{prefix}{}", twice[1].key), found, allowed));
+        }
+        Ok(Self(all))
+    }
+
+    /// All of them.
+    pub fn iter(&self) -> impl Iterator<Item = &Constant> {
+        self.0.iter()
+    }
+
+    /// The number of a quantity, by table and name.
+    #[must_use]
+    pub fn get(&self, table: Table, name: &str) -> Option<&Constant> {
+        self.0.iter().find(|c| c.quantity.table == table && c.quantity.name == name)
+    }
+
+    /// The number of an event.
+    #[must_use]
+    pub fn of(&self, event: Event) -> Option<&Constant> {
+        self.0.iter().find(|c| c.quantity.per == Per::Event(event))
+    }
+
+    /// Numbers outside what any chip can have. 0 is never outside: a chip may lack the part.
+    #[must_use]
+    pub fn complaints(&self) -> Vec<String> {
+        let outside = self.0.iter().filter(|c| {
+            let [least, most] = c.quantity.sane;
+            c.value.iter().any(|&value| value != 0.0 && !(least..=most).contains(&value))
+        });
+        let say = |c: &Constant| {
+            let unit = c
+                .quantity
+                .table
+                .units()
+                .iter()
+                .find(|(unit, _)| c.key.ends_with(&format!("_{unit}")));
+            let (unit, worth) = unit.expect("a key ends in a unit");
+            let [low, typical, high] = c.value.map(|value| value / worth);
+            let [least, most] = c.quantity.sane.map(|value| value / worth);
+            format!(
+                "`{}` has low {low:.3e}, typical {typical:.3e}, high {high:.3e}; on any chip it lies in {least:.3e} to \
+                 {most:.3e} {unit} ({}): is the unit right?",
+                c.key, c.quantity.why
+            )
+        };
+        outside.map(say).collect()
+    }
+}
+
+/// Every number of a file with its table and key.
+pub(super) fn numbers(file: &HardwareFile) -> Vec<(Table, &str, &NumberFile)> {
+    let energy = file.energy.iter().flatten().map(|(key, n)| (Table::Energy, &*key.0, n));
+    let power = file.power.iter().flatten().map(|(key, n)| (Table::Power, &*key.0, n));
+    let area = file.area.iter().flatten().map(|(key, n)| (Table::Area, &*key.0, n));
+    energy.chain(power).chain(area).collect()
+}
+
+/// Quantity and unit of a key.
+fn parse(table: Table, key: &str) -> Option<(&'static Quantity, f64)> {
+    let (name, unit) = key.rsplit_once('_')?;
+    let &(_, worth) = table.units().iter().find(|(known, _)| *known == unit)?;
+    let quantity = QUANTITIES.iter().find(|q| q.table == table && q.name == name)?;
+    Some((quantity, worth))
+}
+
+fn read_key<'de, D: Deserializer<'de>>(table: Table, deserializer: D) -> Result<String, D::Error> {
+    let key = String::deserialize(deserializer)?;
+    if parse(table, &key).is_some() {
+        return Ok(key);
+    }
+    let names = QUANTITIES.iter().filter(|q| q.table == table).map(|q| q.name);
+    let units: Vec<_> = table.units().iter().map(|(unit, _)| format!("_{unit}")).collect();
+    let names = names.collect::<Vec<_>>().join("`, `");
+    let text = format!(
+        "unknown field `{key}`, expected one of `{names}` with a unit, {}",
+        units.join(", ")
+    );
+    Err(de::Error::custom(text))
+}
+
+macro_rules! keys_of {
+    ($($name:ident $table:ident)*) => {$(
+        /// A key of the table.
+        #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+        #[serde(transparent)]
+        pub struct $name(String);
+
+        impl<'de> Deserialize<'de> for $name {
+            fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+                read_key(Table::$table, deserializer).map(Self)
+            }
+        }
+    )*};
+}
+
+keys_of!(EnergyKey Energy PowerKey Power AreaKey Area);
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn constants(text: &str) -> Result<Constants, String> {
+        let file: HardwareFile = toml::from_str(text).map_err(|e| e.to_string())?;
+        Constants::new(&file, "").map_err(|e| e.to_string())
+    }
+
+    const SOURCE: &str = "source = \"s\", kind = \"measured\"";
+
+    #[test]
+    fn every_event_that_is_an_action_has_one_quantity() {
+        for event in Event::ALL {
+            let lines = QUANTITIES.iter().filter(|q| q.per == Per::Event(event)).count();
+            let outcome =
+                matches!(event, Event::Requested | Event::Bounded | Event::PulsesEffective)
+                    || event.name().starts_with("saturated");
+            assert_eq!(lines, usize::from(!outcome), "{event:?}");
+        }
+    }
+
+    #[test]
+    fn the_unit_is_in_the_key() {
+        for (key, joules) in [("hold_fj", 2e-15), ("hold_aj", 2e-18), ("hold_pj", 2e-12)] {
+            let text = format!("energy.{key} = {{ low = 1, typical = 2, high = 3, {SOURCE} }}");
+            let found = constants(&text).unwrap();
+            let value = found.of(Event::Holds).unwrap().value[1];
+            assert!((value / joules - 1.0).abs() < 1e-12, "{key}: {value}");
+        }
+    }
+
+    #[test]
+    fn what_is_incomplete_or_in_the_wrong_order_is_refused() {
+        for (number, wanted) in [
+            (format!("low = 1, typical = 2, {SOURCE}"), "`energy.hold_fj.high` is missing"),
+            (format!("low = 2, typical = 1, high = 3, {SOURCE}"), "low <= typical <= high"),
+            (format!("low = 1, typical = 3, high = 2, {SOURCE}"), "low <= typical <= high"),
+            (format!("low = -1, typical = 3, high = 4, {SOURCE}"), "0 <= low"),
+            (
+                "low = 1, typical = 2, high = 3, kind = \"measured\"".into(),
+                "`energy.hold_fj.source`",
+            ),
+            (
+                "low = 1, typical = 2, high = 3, source = \" \", kind = \"measured\"".into(),
+                "says where it comes from",
+            ),
+            (
+                "low = 1, typical = 2, high = 3, source = \"s\", kind = \"true\"".into(),
+                "measured, fitted or assumed",
+            ),
+            (
+                format!("low = 1, typical = 2, high = 3, sigma = 1, {SOURCE}"),
+                "unknown field `sigma`",
+            ),
+        ] {
+            let error = constants(&format!("energy.hold_fj = {{ {number} }}")).unwrap_err();
+            assert!(error.contains(wanted), "{number}: {error}");
+        }
+        let twice = format!(
+            "energy.hold_fj = {{ low = 1, typical = 2, high = 3, {SOURCE} }}\n\
+             energy.hold_pj = {{ low = 1, typical = 2, high = 3, {SOURCE} }}"
+        );
+        assert!(constants(&twice).unwrap_err().contains("given once"));
+    }
+
+    #[test]
+    fn an_unknown_key_or_unit_shows_its_line_and_what_there_is() {
+        for key in ["hold_kg", "holding_fj", "hold", "laser_mw"] {
+            let error = constants(&format!("[energy]\n{key} = {{ low = 1 }}")).unwrap_err();
+            assert!(error.contains(&format!("unknown field `{key}`")), "{error}");
+            assert!(error.contains("line 2") && error.contains("`hold`"), "{error}");
+        }
+    }
+
+    /// MNSIM's table of converters gives the 8-bit DAC 0.4992 W where 0.4992 mW is meant.
+    #[test]
+    fn a_public_table_with_a_missing_milli_is_caught() {
+        for (picojoules, caught) in [(0.4992, false), (499.2, true)] {
+            let text = format!(
+                "energy.dac_slice_pj = {{ low = {picojoules}, typical = {picojoules}, high = {picojoules}, {SOURCE} }}"
+            );
+            let complaints = constants(&text).unwrap().complaints();
+            assert_eq!(!complaints.is_empty(), caught, "{complaints:?}");
+        }
+    }
+}

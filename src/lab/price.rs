@@ -1,0 +1,24 @@
+//! What a run cost: counts x constants, cycles / clock, watts x seconds.
+//!
+//! ```text
+//! energy   = sum over events of count x joules an event  +  watts of what idles x seconds      low, typical, high
+//! seconds  = cycles / clock
+//! ```
+//!
+//! Nothing here feeds back into a run: a ledger can be priced again when constants change, or with another chip's
+//! constants as far as that chip would have done the same things ([`changes`]). Low totals add all lows, high totals
+//! all highs: bounds, not a spread. See docs/MODEL.md, 4.6.
+
+mod bill;
+mod changes;
+mod cost;
+mod peak;
+mod plan;
+mod unit;
+
+pub use bill::{Bill, Group, Idle, Line, Missing, Range, Share, price};
+pub use changes::{Change, changes};
+pub use cost::Cost;
+pub use peak::{Figure, Peak, areas, figures, peak};
+pub use plan::{Plan, PlanLayer};
+pub use unit::{bounds, prefixed};

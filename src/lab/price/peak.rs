@@ -1,0 +1,124 @@
+//! What a model says before anything runs: times of a full tile, peak rates of the whole chip, areas.
+//!
+//! ```text
+//! alone        1 + read(NS, C, 0) cycles                     one read after the other
+//! back to back 1 + read_again(NS, C) cycles                   the front end never waits
+//! TOPS         2 x tiles x (2 R C / cells a weight) / time
+//! ```
+//!
+//! A tile holds two banks of R x C cells. See docs/MODEL.md, 4.6.
+
+use super::Range;
+use super::plan::Plan;
+use crate::chip::hardware::{Hardware, Timing};
+use crate::lab::config::{Constants, Table};
+
+/// A duration on a full tile.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Figure {
+    /// What takes it.
+    pub name: &'static str,
+    /// Cycles, the accepted command included.
+    pub cycles: u64,
+    /// Seconds.
+    pub seconds: f64,
+}
+
+/// Cycles as seconds.
+fn seconds(timing: &Timing, cycles: u64) -> f64 {
+    cycles as f64 / (timing.clock_khz as f64 * 1000.0)
+}
+
+/// Durations of the operations on a full tile; `words` are on the error bus.
+#[must_use]
+pub fn figures(hardware: &Hardware, words: u64) -> Vec<Figure> {
+    let Some(timing) = hardware.timing else { return vec![] };
+    let (rows, columns) = (hardware.tile_rows as u64, hardware.tile_columns as u64);
+    let slices = u64::from(hardware.slices());
+    let accept = timing.accept();
+    let figure = |name, cycles| Figure { name, cycles, seconds: seconds(&timing, cycles) };
+    vec![
+        figure("read", accept + timing.read(slices, columns, 0)),
+        figure("next read after", accept + timing.read_again(slices, columns)),
+        figure("error words", accept + timing.error(words, columns)),
+        figure("accumulate", accept + timing.accumulate(rows, columns)),
+        figure("write, row without pulses", timing.row(0)),
+        figure("write, row with one pulse", timing.row(1)),
+        figure("write, all rows, one pulse", accept + rows * timing.row(1)),
+    ]
+}
+
+/// The most a chip can do.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Peak {
+    /// Tiles reckoned with.
+    pub tiles: u64,
+    /// Multiplications with additions of a read of all tiles.
+    pub macs: f64,
+    /// One read after the other: duration, operations a second.
+    pub alone: (Figure, f64),
+    /// Reads back to back.
+    pub back_to_back: (Figure, f64),
+}
+
+/// Peak rate of reading with `tiles` full tiles, in `slices` slices or phases, when `cells` cells make a weight.
+#[must_use]
+pub fn peak(hardware: &Hardware, tiles: u64, slices: u64, cells: u64) -> Option<Peak> {
+    let timing = hardware.timing?;
+    let (rows, columns) = (hardware.tile_rows as u64, hardware.tile_columns as u64);
+    let macs = (2 * tiles * rows * columns) as f64 / cells as f64;
+    let rate = |name, cycles| {
+        let figure = Figure { name, cycles, seconds: seconds(&timing, cycles) };
+        let rate = 2.0 * macs / figure.seconds;
+        (figure, rate)
+    };
+    Some(Peak {
+        tiles,
+        macs,
+        alone: rate("alone", timing.accept() + timing.read(slices, columns, 0)),
+        back_to_back: rate("back to back", timing.accept() + timing.read_again(slices, columns)),
+    })
+}
+
+/// Square metres of a plan's parts, by component, as far as the model gives them.
+#[must_use]
+pub fn areas(
+    plan: &Plan,
+    hardware: &Hardware,
+    constants: &Constants,
+) -> Vec<(&'static str, Range)> {
+    let given = constants.iter().filter(|c| c.quantity.table == Table::Area);
+    given
+        .map(|c| {
+            let parts = plan.parts(c.quantity.per, hardware) as f64;
+            (c.quantity.name, c.value.map(|area| area * parts))
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::lab::config::{Sources, load};
+
+    #[test]
+    fn a_peak_is_operations_of_all_tiles_over_the_time_of_a_read() {
+        let settings = [
+            "hw.timing.clock_mhz=1000",
+            "hw.timing.settle_cycles=10",
+            "hw.timing.convert_cycles=1",
+            "hw.timing.columns_per_adc=8",
+            "hw.timing.lanes=256",
+            "hw.drive.dac_bits=4",
+        ];
+        let settings = settings.map(str::to_owned);
+        let sources = Sources { settings: &settings, ..Sources::default() };
+        let hardware = load(&sources).unwrap().hardware;
+        let peak = peak(&hardware, 3, u64::from(hardware.slices()), 2).unwrap();
+        // 1 + 10 + 10 + 8 + 1 cycles alone, 1 + 20 back to back
+        assert_eq!((peak.alone.0.cycles, peak.back_to_back.0.cycles), (30, 21));
+        let operations = 2.0 * 3.0 * 65536.0;
+        assert!((peak.alone.1 / (operations / 30e-9) - 1.0).abs() < 1e-12);
+        assert_eq!(figures(&hardware, 10)[0].cycles, 30);
+    }
+}

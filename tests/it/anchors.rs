@@ -1,0 +1,87 @@
+//! Published chips: throughput from their own parameters, by the formulas of the engine.
+//!
+//! Only reading is anchored. No published chip says how long an in-place update of an unsigned crossbar takes.
+
+use dalean::chip::ledger::Event;
+use dalean::lab::config::{Config, Sources, load};
+use dalean::lab::price::{Peak, peak};
+
+fn chip(model: &str, settings: &[String]) -> Config {
+    load(&Sources { hardware: Some(model), settings, ..Sources::default() }).unwrap()
+}
+
+fn peak_of(config: &Config) -> Peak {
+    let hardware = &config.hardware;
+    let tiles = hardware.tiles_max.unwrap() as u64;
+    peak(hardware, tiles, u64::from(hardware.slices()), 2).unwrap()
+}
+
+/// How far `found` lies from `published`.
+#[track_caller]
+fn within(what: &str, found: f64, published: f64, tolerance: f64) {
+    let error = found / published - 1.0;
+    println!("{what}: {found:.4}, published {published}, {:+.2} %", 100.0 * error);
+    assert!(error.abs() <= tolerance, "{what}: {found} instead of {published}");
+}
+
+/// NeuRRAM (Wan et al., Nature 2022) at pairs of input and output bits. Inputs are signed on the chip: `n` bits have
+/// `n - 1` of magnitude, but at least 1; above 3 they are read in two phases.
+#[test]
+fn neurram_reads_as_fast_as_published() {
+    for (input_bits, output_bits, published) in [(1, 3, 2.122), (4, 6, 0.744), (8, 10, 0.264)] {
+        let magnitude = (input_bits - 1).max(1);
+        let phases = if magnitude > 3 { 2 } else { 1 };
+        let settings = [
+            format!("hw.drive.bits={magnitude}"),
+            format!("hw.drive.phases={phases}"),
+            format!("hw.adc.bits={output_bits}"),
+            format!("hw.timing.convert_cycles={}", 30 * output_bits),
+        ];
+        let config = chip("neurram", &settings);
+        let timing = config.hardware.timing.unwrap();
+        assert_eq!(timing.clock_khz, 100_000, "0.01 us a cycle");
+        let tops = peak_of(&config).alone.1 / 1e12;
+        let name = format!("NeuRRAM ({input_bits}, {output_bits}) TOPS");
+        within(&name, tops, published, 0.08);
+    }
+    // the model file is the last of these modes
+    let settings = ["hw.drive.bits=7".to_owned(), "hw.timing.convert_cycles=300".to_owned()];
+    assert_eq!(chip("neurram", &settings).hardware, chip("neurram", &[]).hardware);
+}
+
+/// HERMES (Le Gallo et al., Nature Electronics 2023), one phase.
+#[test]
+fn hermes_reads_as_fast_as_published() {
+    let config = chip("hermes", &[]);
+    let peak = peak_of(&config);
+    within("HERMES one-phase read, ns", 1e9 * peak.alone.0.seconds, 132.9, 0.01);
+    within("HERMES one-phase TOPS", peak.alone.1 / 1e12, 63.1, 0.01);
+}
+
+/// The energy of a read of a whole tile: fitted to this point, so that it shows the fit and predicts nothing.
+#[test]
+fn hermes_takes_the_power_it_was_fitted_to() {
+    let config = chip("hermes", &[]);
+    let (rows, columns) = (256.0, 256.0);
+    let counts = [
+        (Event::DacSlices, 2.0 * rows),
+        (Event::CellReads, 2.0 * rows * columns),
+        (Event::Holds, 2.0 * columns),
+        (Event::Conversions, columns),
+        (Event::ShiftAdds, columns),
+        (Event::LookUps, columns),
+    ];
+    let joules = counts.map(|(event, count)| count * config.constants.of(event).unwrap().value[1]);
+    let operations = 2.0 * rows * columns;
+    let tops_per_watt = operations / joules.iter().sum::<f64>() / 1e12;
+    within("HERMES one-phase TOPS/W", tops_per_watt, 9.76, 0.01);
+}
+
+/// ISAAC-CE (Shafiee et al., ISCA 2016): a design study, and its figure is remembered. 16,128 arrays, two of which
+/// are a tile here; eight cells make one of its weights; inputs have 16 bits, more than a drive code here.
+#[test]
+fn isaac_reads_as_fast_as_designed() {
+    let config = chip("isaac", &[]);
+    let peak = peak(&config.hardware, 16_128 / 2, 16, 8).unwrap();
+    within("ISAAC-CE TOPS (assumed)", peak.back_to_back.1 / 1e12, 40.9, 0.02);
+}
