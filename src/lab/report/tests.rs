@@ -1,8 +1,8 @@
 //! Laws of the page: well formed, nothing that is no number, all text escaped, the records' own values.
 
 use super::sample::Sample;
-use crate::lab::price::{Cost, Group, Missing};
 use super::{html, page, text};
+use crate::lab::price::{Cost, Group, Missing};
 
 const DALE: &[&str] = &["pp", "np", "nn", "pn"];
 const READOUT: &[&str] = &["pp", "np"];
@@ -59,8 +59,6 @@ fn samples() -> Vec<Sample> {
     colour.pictures.remove(0);
     vec![
         dense(),
-        priced,
-        timed,
         unfinished,
         empty,
         hollow,
@@ -70,6 +68,8 @@ fn samples() -> Vec<Sample> {
         Sample::new(&[(64, 20, PAIR), (20, 1, PAIR)], 2, 1),
         Sample::new(&[(16, 256, READOUT)], 700, 256),
         Sample::new(&[(900, 3, DALE)], 2, 30),
+        priced,
+        timed,
     ]
 }
 
