@@ -6,14 +6,38 @@ export PROPTEST_RNG_SEED="${PROPTEST_RNG_SEED:-1}" # property tests try the same
 
 step() { printf '\n== %s\n' "$*"; }
 
+# Debian's packages; false when a tool is missing and cannot be had
+tool() {
+    command -v "$1" >/dev/null && return 0
+    if [[ $(id -u) == 0 ]] && command -v apt-get >/dev/null; then
+        apt-get install -y -qq "$1" >/dev/null 2>&1 || { apt-get update -qq && apt-get install -y -qq "$1"; } >/dev/null 2>&1
+    fi
+    command -v "$1" >/dev/null
+}
+
 step cargo fmt --check
 cargo fmt --check
 
-step cargo clippy
-cargo clippy --all-targets -- -D warnings
+step the tile in SystemVerilog: three readers
+tool iverilog || true
+tool yosys || true
+rtl=()
+if tool verilator; then rtl=(--features rtl); fi
+hw_models/rtl/check.sh # says SKIPPED for what is missing
 
-step cargo test
-cargo test
+step cargo clippy "${rtl[@]}"
+cargo clippy --all-targets "${rtl[@]}" -- -D warnings
+
+step cargo test "${rtl[@]}"
+cargo test "${rtl[@]}" --lib --bins --test it --test tidy
+cargo test "${rtl[@]}" --doc
+
+if [[ ${#rtl[@]} -gt 0 ]]; then
+    step the tile in SystemVerilog against the tile in Rust
+    cargo test "${rtl[@]}" --test rtl -- --nocapture
+else
+    step "the tile in SystemVerilog against the tile in Rust: SKIPPED, no Verilator; the golden digests of \`it\` stand in"
+fi
 
 step cargo test --release --test it
 cargo test --release --test it
@@ -29,30 +53,5 @@ for example in examples/*.toml; do
     # the program that the release tests have just built
     "${CARGO_TARGET_DIR:-target}/release/dalean" train "$example" --set learning.epochs=1 --out "$runs" --quiet
 done
-
-# Debian's packages; false when a tool is missing and cannot be had
-tool() {
-    command -v "$1" >/dev/null && return 0
-    if [[ $(id -u) == 0 ]] && command -v apt-get >/dev/null; then
-        apt-get install -y -qq "$1" >/dev/null 2>&1 || { apt-get update -qq && apt-get install -y -qq "$1"; } >/dev/null 2>&1
-    fi
-    command -v "$1" >/dev/null
-}
-
-step the tile in SystemVerilog: three readers
-tool iverilog || true
-tool yosys || true
-tool verilator || true
-hw_models/rtl/check.sh # says SKIPPED for what is still missing
-
-if tool verilator; then
-    step cargo clippy --features rtl
-    cargo clippy --all-targets --features rtl -- -D warnings
-
-    step cargo test --features rtl --test rtl
-    cargo test --features rtl --test rtl -- --nocapture
-else
-    step "the tile in SystemVerilog against the tile in Rust: SKIPPED, no Verilator; the golden digests of \`it\` stand in"
-fi
 
 step all passed

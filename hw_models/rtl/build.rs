@@ -19,7 +19,7 @@ mod rtl {
     use std::process::Command;
 
     /// Rows and columns of the models.
-    const SIZES: [u32; 2] = [8, 16];
+    const SIZES: [u32; 3] = [8, 16, 64];
 
     pub(super) fn build() {
         let here = Path::new("hw_models/rtl");

@@ -6,7 +6,12 @@
 
 use std::collections::VecDeque;
 
-use dalean::chip::engine::tick::{Command, More, Tile, TileAdc, TileConfig, TileSize};
+use dalean::chip::engine::tick::{Command, Tile, TileConfig, TileSize};
+
+#[path = "tile_settings.rs"]
+mod tile_settings;
+
+pub(crate) use tile_settings::settings;
 
 /// Samples the tiles remember.
 pub(crate) const SLOTS: usize = 4;
@@ -44,329 +49,6 @@ impl Setting {
         let mut words = Words(!self.seed);
         (0..1 << self.config.lut_bits).map(|_| [words.byte(), words.byte()]).collect()
     }
-}
-
-/// The settings; more than the least of each number is tried somewhere, and most pairs of extremes.
-pub(crate) fn settings() -> Vec<Setting> {
-    let plain = |used: usize| TileConfig {
-        rows: used,
-        columns: used,
-        settle: 2,
-        convert: 1,
-        share: 1,
-        overlap: true,
-        slices: 2,
-        dac_bits: 4,
-        tree: 0,
-        lanes: used,
-        hops: 0,
-        words: 3,
-        tap_base: 0,
-        pulse: 1,
-        adc: TileAdc::Ideal,
-        lut_bits: 6,
-        lut_shift: 11,
-        error_bits: 8,
-        negate: false,
-        mantissa: 1,
-        dither_bits: 8,
-        increment_max: 7,
-        floor: 0,
-        ceiling: 255,
-        absorbing: false,
-        more: More::default(),
-    };
-    let make = |name, size, golden, shifts, config| Setting {
-        name,
-        size,
-        config,
-        golden,
-        seed: 0,
-        shifts,
-    };
-    let mut settings = vec![
-        make("plain", 8, "", [6, 14], plain(8)),
-        make(
-            "one bit slices, long settling, digital converters, no dither, stream n",
-            8,
-            "",
-            [0, 14],
-            TileConfig {
-                settle: 13,
-                share: 3,
-                slices: 8,
-                dac_bits: 1,
-                tree: 1,
-                lanes: 3,
-                hops: 1,
-                words: 1,
-                pulse: 2,
-                adc: TileAdc::Digital { bits: 8, shift: 1 },
-                lut_bits: 5,
-                negate: true,
-                dither_bits: 0,
-                increment_max: 3,
-                floor: 2,
-                ceiling: 15,
-                ..plain(8)
-            },
-        ),
-        make(
-            "slow shared converters of currents, absorbing floor",
-            8,
-            "",
-            [2, 16],
-            TileConfig {
-                settle: 1,
-                convert: 3,
-                share: 8,
-                slices: 4,
-                dac_bits: 2,
-                tree: 2,
-                lanes: 1,
-                hops: 3,
-                words: 10,
-                tap_base: 7,
-                pulse: 3,
-                adc: TileAdc::Current { bits: 5, shift: 6 },
-                error_bits: 2,
-                mantissa: 3,
-                dither_bits: 16,
-                absorbing: true,
-                ..plain(8)
-            },
-        ),
-        make(
-            "no overlap, part of the tile, absorbing floor above 0",
-            8,
-            "",
-            [0, 18],
-            TileConfig {
-                rows: 5,
-                columns: 7,
-                settle: 4,
-                convert: 2,
-                share: 3,
-                overlap: false,
-                slices: 3,
-                dac_bits: 3,
-                tree: 4,
-                lanes: 4,
-                hops: 2,
-                words: 3,
-                tap_base: 2,
-                pulse: 5,
-                adc: TileAdc::Digital { bits: 6, shift: 5 },
-                lut_bits: 4,
-                lut_shift: 12,
-                error_bits: 5,
-                negate: true,
-                mantissa: 15,
-                dither_bits: 16,
-                increment_max: 4,
-                floor: 3,
-                ceiling: 12,
-                absorbing: true,
-                ..plain(8)
-            },
-        ),
-        make(
-            "one slice, one lane: the look-up is what is slow",
-            8,
-            "",
-            [4, 15],
-            TileConfig {
-                settle: 1,
-                slices: 1,
-                dac_bits: 8,
-                tree: 3,
-                lanes: 1,
-                words: 8,
-                tap_base: 5,
-                adc: TileAdc::Current { bits: 8, shift: 9 },
-                lut_shift: 12,
-                error_bits: 9,
-                mantissa: 7,
-                increment_max: 127,
-                ceiling: 4095,
-                ..plain(8)
-            },
-        ),
-        make(
-            "a converter step nobody waits in: more share than columns",
-            8,
-            "",
-            [1, 12],
-            TileConfig {
-                rows: 8,
-                columns: 6,
-                settle: 5,
-                share: 11,
-                tree: 2,
-                lanes: 5,
-                hops: 1,
-                words: 4,
-                tap_base: 3,
-                pulse: 4,
-                adc: TileAdc::Digital { bits: 2, shift: 11 },
-                error_bits: 7,
-                negate: true,
-                mantissa: 2,
-                dither_bits: 0,
-                increment_max: 1,
-                floor: 1,
-                ceiling: 2,
-                ..plain(8)
-            },
-        ),
-        make(
-            "one cell",
-            8,
-            "",
-            [4, 16],
-            TileConfig { words: 2, tap_base: 1, tree: 1, lut_shift: 8, ceiling: 31, ..plain(1) },
-        ),
-        make(
-            "one lane and a short period, no overlap",
-            8,
-            "",
-            [5, 17],
-            TileConfig {
-                settle: 1,
-                overlap: false,
-                slices: 2,
-                lanes: 1,
-                share: 1,
-                words: 5,
-                tap_base: 4,
-                error_bits: 6,
-                negate: true,
-                mantissa: 5,
-                increment_max: 15,
-                ceiling: 63,
-                absorbing: true,
-                lut_shift: 9,
-                ..plain(8)
-            },
-        ),
-        make(
-            "large and plain",
-            16,
-            "",
-            [6, 16],
-            TileConfig { words: 10, lut_shift: 12, ..plain(16) },
-        ),
-        make(
-            "large, shared converters, three lanes, error bits 3",
-            16,
-            "",
-            [2, 12],
-            TileConfig {
-                settle: 3,
-                convert: 2,
-                share: 3,
-                slices: 3,
-                dac_bits: 3,
-                tree: 3,
-                lanes: 3,
-                hops: 3,
-                words: 3,
-                tap_base: 1,
-                pulse: 2,
-                adc: TileAdc::Digital { bits: 7, shift: 6 },
-                error_bits: 3,
-                negate: true,
-                mantissa: 9,
-                dither_bits: 16,
-                floor: 8,
-                ceiling: 127,
-                ..plain(16)
-            },
-        ),
-        make(
-            "large, part of it, more words than columns",
-            16,
-            "",
-            [0, 14],
-            TileConfig {
-                rows: 11,
-                columns: 13,
-                settle: 9,
-                convert: 1,
-                share: 8,
-                overlap: false,
-                slices: 8,
-                dac_bits: 1,
-                tree: 4,
-                lanes: 5,
-                hops: 2,
-                words: 19,
-                tap_base: 15,
-                pulse: 3,
-                adc: TileAdc::Current { bits: 6, shift: 4 },
-                lut_bits: 3,
-                lut_shift: 14,
-                error_bits: 4,
-                dither_bits: 0,
-                increment_max: 5,
-                ceiling: 15,
-                absorbing: true,
-                ..plain(16)
-            },
-        ),
-        make(
-            "large, one lane, one slice, absorbing floor",
-            16,
-            "",
-            [3, 18],
-            TileConfig {
-                settle: 1,
-                slices: 1,
-                dac_bits: 8,
-                tree: 2,
-                lanes: 1,
-                words: 1,
-                adc: TileAdc::Digital { bits: 16, shift: 3 },
-                lut_shift: 12,
-                mantissa: 4,
-                increment_max: 30,
-                floor: 100,
-                ceiling: 1000,
-                absorbing: true,
-                ..plain(16)
-            },
-        ),
-        make(
-            "large, more share than columns, five slices of which one is empty",
-            16,
-            "",
-            [2, 15],
-            TileConfig {
-                settle: 20,
-                share: 17,
-                slices: 5,
-                dac_bits: 2,
-                tree: 1,
-                lanes: 7,
-                hops: 1,
-                words: 16,
-                tap_base: 9,
-                pulse: 2,
-                adc: TileAdc::Current { bits: 10, shift: 0 },
-                lut_bits: 1,
-                lut_shift: 0,
-                negate: true,
-                dither_bits: 16,
-                increment_max: 2,
-                ceiling: 3,
-                ..plain(16)
-            },
-        ),
-    ];
-    for (setting, seed) in settings.iter_mut().zip(1..) {
-        setting.seed = seed;
-    }
-    settings
 }
 
 // --- random numbers ---
@@ -446,6 +128,8 @@ pub(crate) struct Program {
     waiting: VecDeque<Offer>,
     /// A command out of turn, withdrawn if the tile does not take it at once.
     stray: Option<Offer>,
+    /// Commands until every row in use has been loaded: before, its levels may lie outside the window.
+    unloaded: usize,
     pause: usize,
     /// What the bus carries.
     pub(crate) bus_word: i16,
@@ -462,12 +146,20 @@ impl Program {
             words: Words(setting.seed),
             waiting: VecDeque::new(),
             stray: None,
+            unloaded: 0,
             pause: 0,
             bus_word: 0,
             dither: [vec![0; setting.size], vec![0; setting.size]],
         };
-        program.load();
+        program.restart();
         program
+    }
+
+    /// The tile was reset: begins with loading again.
+    pub(crate) fn restart(&mut self) {
+        self.waiting.clear();
+        self.load();
+        self.unloaded = self.config.rows;
     }
 
     /// Chooses what the next cycle brings.
@@ -483,7 +175,7 @@ impl Program {
         if self.waiting.is_empty() {
             self.plan();
         }
-        self.stray = self.words.one_in(12).then(|| self.any());
+        self.stray = (self.unloaded == 0 && self.words.one_in(12)).then(|| self.any());
         if self.pause > 0 {
             self.pause -= 1;
         } else if self.words.one_in(40) {
@@ -503,6 +195,7 @@ impl Program {
         if self.stray.is_none() {
             self.waiting.pop_front();
         }
+        self.unloaded = self.unloaded.saturating_sub(1);
     }
 
     /// A word of the error bus: mostly of the width in use, at times wider, which saturates gates.

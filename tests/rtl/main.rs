@@ -11,7 +11,7 @@
 use std::fmt::Write;
 use std::time::Instant;
 
-use dalean::chip::engine::tick::Tile;
+use dalean::chip::engine::tick::{Command, Tile};
 use rayon::prelude::*;
 
 mod model;
@@ -90,12 +90,19 @@ fn lock_step(setting: &Setting, coverage: &mut Coverage) -> Result<u64, String> 
         tile.registers().iter().map(|(name, all)| ((*name).to_owned(), all.len())).collect();
     assert_eq!(rtl.layout, names, "both sides name the registers alike");
 
+    let at = |wanted: &str| {
+        let before = names.iter().take_while(|(name, _)| name != wanted);
+        before.map(|(_, length)| length).sum::<usize>()
+    };
+    let [conv_busy, lane_busy, front_slice] = ["conv_busy", "lane_busy", "front_slice"].map(at);
+
     for cycle in 0..CYCLES {
         place.cycle = cycle;
         if cycle > 0 && cycle % LIFE_CYCLES == 0 && cycle >= GOLDEN_CYCLES {
             cover(&tile, setting, coverage);
             rtl.reset();
             tile = fresh();
+            program.restart();
             place.accepted.push("reset".to_owned());
         }
         program.prepare();
@@ -115,6 +122,15 @@ fn lock_step(setting: &Setting, coverage: &mut Coverage) -> Result<u64, String> 
         if let Some(command) = &command {
             coverage.add(if ready { "commands accepted" } else { "commands refused" }, 1);
             if ready {
+                let forward = matches!(command, Command::Forward { .. });
+                let busy = |register: usize| u64::from(forward && rtl.registers[register] == 1);
+                coverage.add("Forward accepted while converting", busy(conv_busy));
+                coverage.add("Forward accepted while looking up", busy(lane_busy));
+                if let Command::Now { shift, .. } | Command::Write { shift } = command {
+                    let small = *shift < setting.config.dither_bits;
+                    coverage.add("writes that shift by less than the dither", small.into());
+                    coverage.add("writes that shift by more", (!small).into());
+                }
                 let text = format!("{command:?}");
                 let name = text.split([' ', '{']).next().unwrap_or_default();
                 place.accepted.push(format!("{name} at {cycle}"));
@@ -127,6 +143,8 @@ fn lock_step(setting: &Setting, coverage: &mut Coverage) -> Result<u64, String> 
         if ready {
             program.accepted();
         }
+        let slack = rtl.registers[front_slice] == i64::from(setting.config.slices);
+        coverage.add("cycles of slack", slack.into());
         let expected = numbers(&tile);
         if rtl.registers != expected {
             return Err(place.says(&difference(&rtl, &expected)));
@@ -226,7 +244,7 @@ fn rtl_and_tick_agree_in_every_register_of_every_cycle() {
     println!("{cycles} cycles in {} settings, {} s", settings.len(), start.elapsed().as_secs());
     let still: Vec<_> = total.0.iter().filter(|(_, count)| *count == 0).collect();
     assert!(still.is_empty(), "these never happened: {still:?}");
-    assert!(total.0.len() >= 2 * BANK_COUNTERS.len() + TILE_COUNTERS.len() + 11, "all are counted");
+    assert!(total.0.len() >= 2 * BANK_COUNTERS.len() + TILE_COUNTERS.len() + 16, "all are counted");
     if std::env::var_os("ED_TILE_LIBRARY").is_none() {
         assert!(cycles >= 300_000, "enough cycles");
     }

@@ -57,6 +57,7 @@ type Entry = unsafe extern "C" fn() -> *const Functions;
 unsafe extern "C" {
     fn ed_tile_8x8() -> *const Functions;
     fn ed_tile_16x16() -> *const Functions;
+    fn ed_tile_64x64() -> *const Functions;
 }
 
 #[link(name = "dl")]
@@ -73,7 +74,7 @@ fn functions(size: usize) -> Option<&'static Functions> {
             let now = 2; // RTLD_NOW
             // SAFETY: the path ends in a zero, and the library only holds a model, which does nothing when loaded.
             let library = unsafe { dlopen(path.as_ptr(), now) };
-            assert!(!library.is_null(), "{} can be loaded", path.display());
+            assert!(!library.is_null(), "{path:?} can be loaded");
             // SAFETY: the library is open, and stays so; the name ends in a zero.
             let found = unsafe { dlsym(library, c"ed_tile_8x8".as_ptr()) };
             assert!(!found.is_null(), "the library holds a tile of size 8");
@@ -82,6 +83,7 @@ fn functions(size: usize) -> Option<&'static Functions> {
         }
         (None, 8) => ed_tile_8x8,
         (None, 16) => ed_tile_16x16,
+        (None, 64) => ed_tile_64x64,
         _ => return None,
     };
     // SAFETY: the function takes nothing and returns the address of a constant of its model.
@@ -185,7 +187,7 @@ impl Rtl {
             }
             Some(Command::Add { slot }) => (inputs.op, inputs.slot) = (5, narrow(*slot)),
             Some(Command::Write { shift }) => (inputs.op, inputs.shift) = (6, *shift),
-            Some(Command::Columns) => panic!("the RTL tile reads rows only"),
+            Some(Command::Columns { .. }) => panic!("the RTL tile reads rows only"),
         }
         let [level_e, level_i, dither_e, dither_i] = &self.ports;
         assert!(self.ports.iter().all(|port| port.len() == self.columns), "ports keep their width");

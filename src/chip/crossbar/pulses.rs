@@ -183,12 +183,12 @@ impl Collector {
         else {
             return;
         };
-        let [most, least] = kernel.peaks(&gathered.extremes);
-        gathered.extremes = Extremes::new();
-        let rows = tiles[tile].rows[block * BLOCK_ROWS..].iter_mut();
-        for (row, (most, least)) in rows.zip(most.into_iter().zip(least)) {
-            *row = [most, least];
-        }
+        let peaks = kernel.peaks(&gathered.extremes);
+        gathered.extremes.most.fill(0);
+        gathered.extremes.least.fill(0);
+        let rows = block * BLOCK_ROWS..self.layout.rows.min((block + 1) * BLOCK_ROWS);
+        let live = rows.len();
+        tiles[tile].rows[rows].copy_from_slice(&peaks[..live]);
     }
 
     /// What was asked for.

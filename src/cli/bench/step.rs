@@ -20,6 +20,8 @@ const BATCH: usize = 128;
 const EPOCH: f64 = 60_000.0;
 /// Rate of the float network: so low that no unit is driven to an end, where floats become tiny and slow.
 const FLOAT_RATE: f32 = 1e-5;
+/// A chip with a clock.
+const TIMED: [&str; 2] = ["hw.timing.clock_mhz=1000.0", "hw.timing.lanes=16"];
 /// Images that are made up.
 const IMAGES: usize = 64 * BATCH;
 /// Batches of the arm that goes through whole epochs.
@@ -142,6 +144,9 @@ fn small<'a>(
     if let Some(mnist) = mnist {
         let net = Net::new(&ed, plan.best, mnist);
         entries.push(Entry { net, images: "MNIST", ..entry("ED", &[]) });
+        let net = Net::new(&settings("[256,256]", "10", &TIMED), plan.best, mnist);
+        let timed = entry("ED, its cycles counted", &[]);
+        entries.push(Entry { net, images: "MNIST", like: [false; 2], ..timed });
     }
     if let Some(pool) = several {
         entries.push(Entry { pool, ..entry("ED", &[]) });

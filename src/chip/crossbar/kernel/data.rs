@@ -237,8 +237,8 @@ impl Pulsed<'_> {
     }
 }
 
-/// Sizes of the most positive and the most negative pulses of the rows of a block.
-pub type Peaks = [[u8; BLOCK_ROWS]; 2];
+/// Sizes of the most positive and the most negative pulses of each row of a block.
+pub type Peaks = [[u8; 2]; BLOCK_ROWS];
 
 /// What one write did, summed over cells.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]

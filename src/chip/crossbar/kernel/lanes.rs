@@ -216,7 +216,7 @@ pub(super) fn peaks(extremes: &Extremes) -> Peaks {
             }
         }
     }
-    peaks
+    std::array::from_fn(|row| [peaks[0][row], peaks[1][row]])
 }
 
 /// Four rows of 16 columns out of bytes in the order of levels: a column's four rows are one word.

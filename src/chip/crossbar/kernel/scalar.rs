@@ -230,14 +230,11 @@ pub(super) fn loud(sums: &Half<i32>, write: &Write, bits: u32) -> u16 {
 }
 
 pub(super) fn peaks(extremes: &Extremes) -> Peaks {
-    let mut peaks = [[0; BLOCK_ROWS]; 2];
-    for (peaks, cells) in peaks.iter_mut().zip([&extremes.most, &extremes.least]) {
-        for (row, peak) in peaks.iter_mut().enumerate() {
-            let sizes = (0..HALF_COLUMNS).map(|column| cells[in_half(row, column)].unsigned_abs());
-            *peak = sizes.max().expect("16 columns");
-        }
-    }
-    peaks
+    let peak = |cells: &Half<i8>, row| {
+        let sizes = (0..HALF_COLUMNS).map(|column| cells[in_half(row, column)].unsigned_abs());
+        sizes.max().expect("16 columns")
+    };
+    std::array::from_fn(|row| [&extremes.most, &extremes.least].map(|cells| peak(cells, row)))
 }
 
 pub(super) fn program(

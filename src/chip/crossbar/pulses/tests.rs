@@ -86,14 +86,13 @@ fn written(backend: Backend, case: &Case, collect: Collect) -> (Crossbar, Vec<Wr
     let turned: Vec<_> =
         blocks.map(|block| block.iter().any(|&x| x != 0).then_some(block)).collect();
     let mut array = Crossbar::new(layout, &hardware);
-    let mut levels = bytes(case.seed + 2, 2 * layout.columns);
     for row in 0..layout.rows {
+        let levels = bytes(case.seed + 2 + row as u64, 2 * layout.columns);
         let window = hardware.window.floor()..=hardware.window.ceiling();
         let words = levels.as_chunks::<2>().0.iter().map(|word| u16::from_le_bytes(*word));
         let row_levels: Vec<_> =
             words.map(|word| (word % *window.end()).max(*window.start())).collect();
         array.load_row(row, &row_levels);
-        levels.rotate_left(3);
     }
     let request = WriteRequest {
         turned: &turned,

@@ -38,9 +38,14 @@ pub(super) fn take(out: &mut Pulsed<'_>, group: usize, pulses: __m512i) {
 
 #[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi,popcnt")]
 pub(super) fn peaks(extremes: &Extremes) -> Peaks {
-    let mut peaks = [[0; BLOCK_ROWS]; 2];
-    store(&mut peaks[0], fold(&extremes.most));
-    store(&mut peaks[1], fold(&extremes.least));
+    let mut peaks = [[0; 2]; BLOCK_ROWS];
+    let (most, least) = (fold(&extremes.most), fold(&extremes.least));
+    let [first, second] = peaks.as_flattened_mut().as_chunks_mut().0 else {
+        unreachable!("128 bytes")
+    };
+    store(first, side_by_side(_mm512_castsi512_si256(most), _mm512_castsi512_si256(least)));
+    let [most, least] = [most, least].map(|v| _mm512_extracti64x4_epi64::<1>(v));
+    store(second, side_by_side(most, least));
     peaks
 }
 
@@ -61,6 +66,13 @@ fn fold(cells: &Half<i8>) -> __m512i {
     }
     let [a, b, c, d] = fours;
     quarters(quarters(a, b), quarters(c, d))
+}
+
+/// Bytes in turn from `a` and `b`.
+#[inline]
+#[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi,popcnt")]
+fn side_by_side(a: __m256i, b: __m256i) -> __m512i {
+    _mm512_or_si512(_mm512_cvtepu8_epi16(a), _mm512_slli_epi16::<8>(_mm512_cvtepu8_epi16(b)))
 }
 
 /// Neighbouring quarters of `a`, then of `b`.
