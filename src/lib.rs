@@ -9,7 +9,7 @@
 //! | [`chip`] | unsigned crossbars, converters, the engine with its five operations, the event ledger |
 //! | [`learn`] | error words, routes, rules, statistics |
 //! | [`task`] | classification: examples, experiments, epochs |
-//! | [`lab`] | configuration, data sets, run folders, reports, verifying |
+//! | [`lab`] | configuration, data sets, run folders, prices, reports, verifying |
 //! | [`cli`] | arguments and messages |
 //!
 //! The equations are in docs/MODEL.md, the words in docs/GLOSSARY.md, the map in docs/ARCHITECTURE.md.

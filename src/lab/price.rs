@@ -8,6 +8,20 @@
 //! Nothing here feeds back into a run: a ledger can be priced again when constants change, or with another chip's
 //! constants as far as that chip would have done the same things ([`changes`]). Low totals add all lows, high totals
 //! all highs: bounds, not a spread. See docs/MODEL.md, 4.6.
+//!
+//! ```
+//! use dalean::lab::{config, price};
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! let sources = config::Sources { hardware: Some("hermes"), ..Default::default() };
+//! let chip = config::load(&sources)?.hardware;
+//! // 64 tiles, one phase, two cells a weight
+//! let peak = price::peak(&chip, 64, 1, 2).expect("the model has a timing");
+//! assert_eq!(peak.alone.0.cycles, 133);
+//! assert_eq!(price::prefixed(peak.alone.1, "op/s"), "63.1 Top/s");
+//! # Ok(())
+//! # }
+//! ```
 
 mod bill;
 mod changes;

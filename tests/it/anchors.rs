@@ -70,6 +70,7 @@ fn hermes_takes_the_power_it_was_fitted_to() {
         (Event::Conversions, columns),
         (Event::ShiftAdds, columns),
         (Event::LookUps, columns),
+        (Event::SramBits, 2.0 * rows * 7.0 + columns * 32.0),
     ];
     let joules = counts.map(|(event, count)| count * config.constants.of(event).unwrap().value[1]);
     let operations = 2.0 * rows * columns;

@@ -35,6 +35,11 @@ fn a_configuration_is_refused_with_key_value_and_range() {
         ("hw.write.increment_max=128", &["1..=127"]),
         ("hw.write.dither_bits=7", &["0 (half-up), 8 or 16"]),
         ("hw.tile.count=1", &["needs", "tiles of 256 x 256", "raise `hw.tile.count`"]),
+        ("hw.timing.lane=1", &["unknown field `lane`", "lanes"]),
+        ("hw.timing.lanes=0", &["`hw.timing.lanes` is 0", "1..=32768"]),
+        ("hw.drive.mode=light", &["voltage, pulse_width, amplitude"]),
+        ("hw.energy.hold_kg.low=1", &["unknown field `hold_kg`", "`hold`", "_fj"]),
+        ("hw.energy.hold_fj.low=9", &["`hw.energy.hold_fj`", "low <= typical"]),
         ("hw.model=nothing", &["cannot read nothing", "built-in models are ideal, prime, isaac"]),
         ("network.hidden=[0]", &["a layer of 0 units"]),
         ("network.hidden=[70000]", &["70000", "at most 65535"]),
@@ -61,6 +66,9 @@ fn a_configuration_is_refused_with_key_value_and_range() {
     refused(&run(dalean().args(["train", "nothing.toml"])), &["cannot read nothing.toml"]);
     refused(&run(train(out.path()).args(["--threads", "0"])), &["1..=1024"]);
     refused(&run(train(out.path()).args(["--kernel", "gpu"])), &["no kernel `gpu`", "scalar"]);
+    refused(&run(dalean().args(["price", "nothing"])), &["folder of a run"]);
+    refused(&run(dalean().args(["profile", "--hw", "nothing"])), &["cannot read nothing"]);
+    refused(&run(dalean().args(["hw", "peak", "ideal", "--cells", "0"])), &["1..=1073741824"]);
 }
 
 #[test]
@@ -100,6 +108,16 @@ fn a_damaged_run_is_refused_or_continued_never_trusted() {
         put("receipt.json", text.as_bytes());
         refused(&verify(), &["receipt.json"]);
     }
+    let price = || run(dalean().arg("price").arg(&folder));
+    assert_eq!(price().code, Some(0));
+    let count = "{\"phase\": \"training\", \"layer\": 0, \"pathway\": \"pp\", \"operation\": \"update\", \"event\": \"holds\", \"count\": -1}";
+    for text in ["", "[]", "{}", &format!("{{\"counts\": [{count}]}}"), &count.replace("-1", "1")] {
+        put("ledger.json", text.as_bytes());
+        refused(&price(), &["ledger.json"]);
+    }
+    let most = count.replace("-1", &u64::MAX.to_string());
+    put("ledger.json", format!("{{\"counts\": [{most}, {most}]}}").as_bytes());
+    assert_eq!(price().code, Some(0), "any counts have a price");
     put("receipt.json", &receipt);
     let text = String::from_utf8(config).unwrap();
     put("config.toml", text.replace("batch = 16", "batch = 8").as_bytes());

@@ -37,6 +37,24 @@ fn every_model_passes_its_check_and_trains_the_digits() {
 }
 
 #[test]
+fn the_example_of_the_documents_is_valid_and_every_quantity_is_described() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("hw_models");
+    let text = std::fs::read_to_string(folder.join("README.md")).unwrap();
+    let example = text.split("```toml\n").nth(1).unwrap().split("```").next().unwrap();
+    let out = tempfile::tempdir().unwrap();
+    let model = out.path().join("mine.toml");
+    std::fs::write(&model, example).unwrap();
+    let ran = run(dalean().args(["hw", "check"]).arg(&model));
+    assert_eq!(ran.code, Some(0), "{ran:?}");
+    for quantity in dalean::lab::config::QUANTITIES {
+        assert!(text.contains(&format!("`{}`", quantity.name)), "{}", quantity.name);
+    }
+    for name in model_names() {
+        assert!(text.contains(&format!("| `{name}` |")), "{name}");
+    }
+}
+
+#[test]
 fn a_number_off_by_a_thousand_is_refused_by_check_and_warned_of_by_train() {
     let out = tempfile::tempdir().unwrap();
     let model = out.path().join("slip.toml");

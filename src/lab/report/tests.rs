@@ -59,8 +59,6 @@ fn samples() -> Vec<Sample> {
     colour.pictures.remove(0);
     vec![
         dense(),
-        priced,
-        timed,
         unfinished,
         empty,
         hollow,
@@ -70,6 +68,8 @@ fn samples() -> Vec<Sample> {
         Sample::new(&[(64, 20, PAIR), (20, 1, PAIR)], 2, 1),
         Sample::new(&[(16, 256, READOUT)], 700, 256),
         Sample::new(&[(900, 3, DALE)], 2, 30),
+        priced,
+        timed,
     ]
 }
 
