@@ -8,7 +8,6 @@
 //! `UPD(add)`, one `UPD(write)`. All three must end with the same levels after the same number of cycles; only then
 //! are they timed.
 #![expect(
-    clippy::disallowed_methods,
     clippy::disallowed_types,
     clippy::unwrap_used,
     reason = "a race needs a clock, and what cannot be built ends it"
@@ -175,6 +174,7 @@ impl Driver {
         let mut rtl = Rtl::new(SIDE).expect("the bench builds a tile of its size");
         rtl.configure(&config, &table.collect::<Vec<_>>());
         rtl.reset();
+        assert_eq!(rtl.layout[0].0, "level_e", "levels come first");
         let mut driver = Self { rtl, cycles: 0, count: 0 };
         for row in 0..SIDE {
             let levels = [levels(0, row), levels(1, row)];
