@@ -16,3 +16,4 @@ mod rules;
 mod same_bits;
 mod tile;
 mod tile_program;
+mod trace;

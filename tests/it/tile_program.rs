@@ -19,8 +19,6 @@ pub(crate) const SLOTS: usize = 4;
 pub(crate) const TREE_MAX: usize = 4;
 /// Cycles whose registers the golden digests hold.
 pub(crate) const GOLDEN_CYCLES: u64 = 3000;
-/// Cycles between two resets.
-pub(crate) const LIFE_CYCLES: u64 = 4000;
 
 /// A tile, what it is asked to do, and what comes of it.
 pub(crate) struct Setting {

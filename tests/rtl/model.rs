@@ -161,17 +161,17 @@ impl Rtl {
             level: [std::ptr::null(); 2],
             dither: [std::ptr::null(); 2],
         };
-        for bank in 0..2 {
-            self.ports[2 + bank].copy_from_slice(dither[bank]);
+        for (port, draws) in self.ports[2..].iter_mut().zip(dither) {
+            port.copy_from_slice(draws);
         }
         match command {
             None => {}
             Some(Command::LoadWeights { row, levels }) => {
                 inputs.row = narrow(*row);
-                for bank in 0..2 {
+                for (port, levels) in self.ports[..2].iter_mut().zip(levels) {
                     // so do the columns that are not in use
-                    self.ports[bank].fill(0xabc);
-                    self.ports[bank][..levels[bank].len()].copy_from_slice(levels[bank]);
+                    port.fill(0xabc);
+                    port[..levels.len()].copy_from_slice(levels);
                 }
             }
             Some(Command::LoadDrives { row, slot, codes }) => {

@@ -52,7 +52,7 @@ pub use self::{
     conv::{ConvPlan, ConvScratch, ConvShape, ConvTurned, Image, Pixels},
     data::{
         Banks, Cells, Conversion, Dither, Drives, Extremes, Half, LookUp, Peaks, Pulsed, Scratch,
-        TOGETHER, Write, WriteCounts,
+        Single, TOGETHER, Write, WriteCounts,
     },
 };
 
@@ -168,6 +168,10 @@ trait Loops: Copy {
         dither: Dither<'_>,
     ) -> WriteCounts {
         scalar::program(cells, sums, write, dither)
+    }
+
+    fn single(self, _: Single<'_>) -> Option<WriteCounts> {
+        None
     }
 
     fn peaks(self, extremes: &Extremes) -> Peaks {
@@ -471,6 +475,21 @@ impl Kernel {
     ) -> WriteCounts {
         assert!(write.floor <= write.ceiling, "the window is not empty");
         with!(self, loops => loops.program(cells, sums, write, dither))
+    }
+
+    /// Writes a strip for one sample, all at once; `None` where a back end does not, and nothing was done.
+    ///
+    /// # Panics
+    /// When the sizes do not match.
+    pub fn single(&self, strip: Single<'_>) -> Option<WriteCounts> {
+        let halves = strip.gates.len() / (4 * HALF_COLUMNS);
+        assert_eq!(strip.gates.len(), halves * 4 * HALF_COLUMNS, "four gates a column");
+        assert_eq!(strip.low.len(), halves / 2 * strip.blocks * BLOCK_CELLS, "whole panels");
+        assert_eq!(strip.turned.len(), strip.blocks, "every block is driven or not");
+        let whole = |turned: &&[u8]| turned.len() == 4 * BLOCK_ROWS;
+        assert!(strip.turned.iter().flatten().all(whole), "64 rows");
+        assert!(strip.write.floor <= strip.write.ceiling, "the window is not empty");
+        with!(self, loops => loops.single(strip))
     }
 
     /// Sizes of the most positive and the most negative pulses of each row.

@@ -7,7 +7,7 @@
 use std::ops::Range;
 
 use super::StripMut;
-use super::kernel::{Cells, Dither, Draws, Half, Kernel, Write, WriteCounts};
+use super::kernel::{Cells, Dither, Draws, Half, Kernel, Single, Write, WriteCounts};
 use super::layout::{BLOCK_CELLS, HALF_CELLS, HALF_COLUMNS, PANEL_COLUMNS};
 use super::pulses::{Collect, Collected, Collector};
 use crate::chip::hardware::{DitherBits, DitherPattern};
@@ -62,6 +62,9 @@ impl StripMut<'_> {
         let mut sums = Sums([0; HALF_CELLS]);
         let Range { start, end } = self.panels();
         let draws = Draws::new(request.place, self.layout.rows);
+        if let Some(counts) = self.write_single(kernel, request, gates, &draws) {
+            return Written { counts, collected: Collected::Nothing };
+        }
         let columns = start * PANEL_COLUMNS..end * PANEL_COLUMNS;
         let mut collector = Collector::new(request.collect, self.layout, columns.clone());
         let mut words = Words::new(draws, columns);
@@ -105,6 +108,34 @@ impl StripMut<'_> {
             }
         }
         Written { counts, collected: collector.finish(kernel) }
+    }
+
+    /// Writes one sample at once, where that is usual.
+    fn write_single(
+        &mut self,
+        kernel: &Kernel,
+        request: &WriteRequest<'_>,
+        gates: &[i8],
+        draws: &Draws,
+    ) -> Option<WriteCounts> {
+        let plain = self.high.is_none() && self.residual.is_none() && self.pruned.is_none();
+        let bytes = (request.dither_bits, request.dither_pattern);
+        let usual = plain
+            && request.stride == 4
+            && bytes == (DitherBits::Eight, DitherPattern::PerCell)
+            && request.collect == Collect::Nothing
+            && gates.as_chunks::<4>().0.iter().all(|of| of[1..] == [0; 3]);
+        usual.then(|| {
+            kernel.single(Single {
+                low: self.low,
+                blocks: self.layout.blocks(),
+                turned: request.turned,
+                gates,
+                column: self.first * PANEL_COLUMNS,
+                draws,
+                write: &request.write,
+            })
+        })?
     }
 
     fn half(&mut self, half: usize, block: usize) -> Cells<'_> {

@@ -49,7 +49,7 @@ fn tiles([targets, downs, acrosses]: [usize; 3]) -> Vec<(usize, String)> {
 
 /// Tiles that take part: words go to the heads of columns.
 fn concerned([targets, downs, acrosses]: [usize; 3], name: &str) -> Vec<usize> {
-    let head = |tid: &usize| tid / acrosses % downs == 0;
+    let head = |tid: &usize| (tid / acrosses).is_multiple_of(downs);
     let p = |tid: &usize| tid / (downs * acrosses) == 0;
     let all = 0..targets * downs * acrosses;
     match name {

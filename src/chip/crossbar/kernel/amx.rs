@@ -22,7 +22,7 @@ use self::product::{Walk, half_block, levels_by_drives, levels_by_gates, pair};
 use super::avx512::{self, Avx512};
 use super::{
     Banks, Cells, ConvScratch, Conversion, Dither, Draws, Drives, Extremes, Half, Image, LookUp,
-    Loops, Packed, Peaks, Scratch, TOGETHER, Write, WriteCounts, apart, peak,
+    Loops, Packed, Peaks, Scratch, Single, TOGETHER, Write, WriteCounts, apart, peak,
 };
 use crate::chip::crossbar::layout::{BLOCK_CELLS, BLOCK_ROWS, HALF_CELLS, Layout, PANEL_COLUMNS};
 use crate::num::fixed::ErrorBits;
@@ -374,6 +374,10 @@ impl Loops for &Tiles {
         dither: Dither<'_>,
     ) -> WriteCounts {
         self.0.program(cells, sums, write, dither)
+    }
+
+    fn single(self, strip: Single<'_>) -> Option<WriteCounts> {
+        self.0.single(strip)
     }
 
     fn peaks(self, extremes: &Extremes) -> Peaks {

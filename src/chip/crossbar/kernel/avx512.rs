@@ -17,7 +17,7 @@ use std::ops::Range;
 
 use super::{
     Cells, ConvScratch, Conversion, Dither, Draws, Drives, Extremes, Half, Image, LookUp, Loops,
-    Packed, Peaks, Scratch, Write, WriteCounts, peak,
+    Packed, Peaks, Scratch, Single, Write, WriteCounts, peak,
 };
 use crate::chip::crossbar::layout::{BLOCK_CELLS, BLOCK_ROWS, HALF_CELLS, HALF_COLUMNS, Layout};
 use crate::num::fixed::ErrorBits;
@@ -28,6 +28,7 @@ mod dither;
 mod few;
 mod program;
 mod pulses;
+mod single;
 mod turn;
 mod units;
 
@@ -194,6 +195,10 @@ impl Loops for Avx512 {
         dither: Dither<'_>,
     ) -> WriteCounts {
         compiled!(program::program(cells, sums, write, dither))
+    }
+
+    fn single(self, strip: Single<'_>) -> Option<WriteCounts> {
+        compiled!(single::single(strip))
     }
 
     fn peaks(self, extremes: &Extremes) -> Peaks {

@@ -1,6 +1,7 @@
 //! What kernels take and give: plain data, the same for every back end.
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
+use super::chacha::Draws;
 use crate::chip::crossbar::layout::{BLOCK_ROWS, HALF_CELLS, PANEL_COLUMNS};
 
 /// Sums, or levels, of a half block. Sums lie row-major, `[64 rows][16 columns]`; levels, residuals
@@ -182,6 +183,25 @@ pub struct Cells<'a> {
     pub pruned: Option<&'a mut [u64; HALF_CELLS / 64]>,
     /// Where bounded pulses go, if they are wanted. Groups that are passed over put nothing there.
     pub pulses: Option<Pulsed<'a>>,
+}
+
+/// A strip of panels that is written for one sample, with 8-bit words of every cell.
+#[derive(Debug)]
+pub struct Single<'a> {
+    /// Levels of whole panels.
+    pub low: &'a mut [u8],
+    /// Blocks of a panel.
+    pub blocks: usize,
+    /// Drives by block, `[64 rows][4]`, in the first of four places; `None` where all are 0.
+    pub turned: &'a [Option<&'a [u8]>],
+    /// Gates, `[half][16 columns][4]`, in the first of four places.
+    pub gates: &'a [i8],
+    /// First column of the strip.
+    pub column: usize,
+    /// Words of the array.
+    pub draws: &'a Draws,
+    /// Rounding, bound and window.
+    pub write: &'a Write,
 }
 
 /// Where bounded pulses go.

@@ -297,6 +297,7 @@ fn every_tail_of_a_batch_reads_the_same() {
         check_look_up(batch, 31, 10, 7, 3);
         check_gate(batch, batch.next_multiple_of(4), 8, 9);
         check_turn(batch, batch.next_multiple_of(64), 3);
+        check_turn(batch, batch.next_multiple_of(4), 5);
     }
     check_read(2, 3, 1..1, 1);
 }

@@ -222,6 +222,21 @@ proptest! {
     }
 
     #[test]
+    fn one_sample_is_written_as_the_law(case in case(), usual: bool) {
+        let plain = Case { samples: 1, residual_bits: 0, absorbs: false, mantissa: 1, ..case };
+        let dither = (DitherBits::Eight, DitherPattern::PerCell);
+        let plain = Case { dither, level_bits: case.level_bits.min(8), ..plain };
+        for shift in 8..=24 {
+            let case = if usual { Case { shift, increment_max: 7, ..plain } } else { Case { shift, ..plain } };
+            let law = written(Backend::Scalar, &case, Collect::Nothing);
+            for backend in Backend::available() {
+                let got = written(backend, &case, Collect::Nothing);
+                prop_assert!(got == law, "{} {:?}", backend.name(), case);
+            }
+        }
+    }
+
+    #[test]
     fn peaks_of_rows_are_the_law(dense: bool, seed: u64) {
         let mut extremes = Extremes::new();
         for part in 0..2 {

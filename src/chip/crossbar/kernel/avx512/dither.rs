@@ -39,13 +39,22 @@ fn diagonals(s: &mut [__m512i; 16]) {
 /// One block of 64 bytes of 16 columns: word i of lane c.
 #[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi,popcnt")]
 fn blocks(draws: &Draws, counter: Counter, words: &mut Half<u8>) {
+    let lane = _mm512_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
+    let grown = _mm512_mullo_epi32(lane, _mm512_set1_epi32(counter.step));
+    let counter = _mm512_add_epi32(_mm512_set1_epi32(counter.first), grown);
+    for (words, v) in words.as_chunks_mut().0.iter_mut().zip(drawn(draws, counter)) {
+        store(words, v);
+    }
+}
+
+/// The blocks whose word 12 starts as `counter` says: word i of each.
+#[inline]
+#[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi,popcnt")]
+pub(super) fn drawn(draws: &Draws, counter: __m512i) -> [__m512i; 16] {
     let mut first = [_mm512_setzero_si512(); 16];
     for (first, word) in first.iter_mut().zip(draws.mixed()) {
         *first = _mm512_set1_epi32(*word);
     }
-    let lane = _mm512_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
-    let grown = _mm512_mullo_epi32(lane, _mm512_set1_epi32(counter.step));
-    let counter = _mm512_add_epi32(_mm512_set1_epi32(counter.first), grown);
     first[12] = counter;
     let mut s = first;
     quarter(&mut s, 0, 4, 8, 12);
@@ -57,11 +66,11 @@ fn blocks(draws: &Draws, counter: Counter, words: &mut Half<u8>) {
         quarter(&mut s, 3, 7, 11, 15);
         diagonals(&mut s);
     }
-    let words = words.as_chunks_mut().0.iter_mut().zip(s);
-    for (i, ((words, s), word)) in words.zip(draws.start()).enumerate() {
+    for (i, (s, word)) in s.iter_mut().zip(draws.start()).enumerate() {
         let first = if i == 12 { counter } else { _mm512_set1_epi32(*word) };
-        store(words, _mm512_add_epi32(s, first));
+        *s = _mm512_add_epi32(*s, first);
     }
+    s
 }
 
 #[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi,popcnt")]

@@ -23,7 +23,8 @@ pub(super) fn read(cells: &[u8], drives: Drives<'_>, samples: Range<usize>, out:
 #[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi,popcnt")]
 fn few<const N: usize>(cells: &[u8], drives: Drives<'_>, first: usize, out: &mut [i32]) {
     let flip = _mm512_set1_epi8(i8::MIN);
-    let mut sums = [[_mm512_setzero_si512(); 2]; N];
+    // two sums a lane: a product waits for the one before it in the same sum
+    let mut sums = [[[_mm512_setzero_si512(); 2]; N]; 2];
     for (block, cells) in cells.as_chunks::<BLOCK_CELLS>().0.iter().enumerate() {
         let x: [&[u8; 64]; N] = std::array::from_fn(|i| drives.row(block, first + i));
         let mut any = _mm512_setzero_si512();
@@ -33,25 +34,31 @@ fn few<const N: usize>(cells: &[u8], drives: Drives<'_>, first: usize, out: &mut
         let mut words = _mm512_test_epi32_mask(any, any);
         let [left, right] = [0, 1].map(|half| cells[half * HALF_CELLS..].as_chunks::<64>().0);
         while words != 0 {
-            let quad = words.trailing_zeros() as usize;
-            words &= words - 1;
-            let w = [
-                _mm512_xor_si512(load(&left[quad]), flip),
-                _mm512_xor_si512(load(&right[quad]), flip),
-            ];
-            for (x, sums) in x.iter().zip(&mut sums) {
-                let word = *x.as_chunks::<4>().0[quad].first_chunk().expect("4 drives a word");
-                let x = _mm512_set1_epi32(i32::from_le_bytes(word));
-                sums[0] = _mm512_dpbusd_epi32(sums[0], x, w[0]);
-                sums[1] = _mm512_dpbusd_epi32(sums[1], x, w[1]);
+            for sums in &mut sums {
+                if words == 0 {
+                    break;
+                }
+                let quad = words.trailing_zeros() as usize;
+                words &= words - 1;
+                let w = [
+                    _mm512_xor_si512(load(&left[quad]), flip),
+                    _mm512_xor_si512(load(&right[quad]), flip),
+                ];
+                for (x, sums) in x.iter().zip(sums) {
+                    let word = *x.as_chunks::<4>().0[quad].first_chunk().expect("4 drives a word");
+                    let x = _mm512_set1_epi32(i32::from_le_bytes(word));
+                    sums[0] = _mm512_dpbusd_epi32(sums[0], x, w[0]);
+                    sums[1] = _mm512_dpbusd_epi32(sums[1], x, w[1]);
+                }
             }
         }
     }
     let rows = out.as_chunks_mut::<32>().0;
-    for (i, (sums, out)) in sums.iter().zip(rows).enumerate() {
+    for (i, out) in rows.iter_mut().enumerate().take(N) {
         let flipped = _mm512_set1_epi32(128 * drive_sum(drives, first + i));
-        for (sum, out) in sums.iter().zip(out.as_chunks_mut::<16>().0) {
-            store_sums(out, _mm512_add_epi32(*sum, flipped));
+        for (half, out) in out.as_chunks_mut::<16>().0.iter_mut().enumerate() {
+            let sum = _mm512_add_epi32(sums[0][i][half], sums[1][i][half]);
+            store_sums(out, _mm512_add_epi32(sum, flipped));
         }
     }
 }

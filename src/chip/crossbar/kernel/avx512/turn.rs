@@ -68,6 +68,9 @@ fn dwords(v: &mut [__m512i; 16]) {
 /// See [`super::super::Kernel::turn`].
 #[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi,popcnt")]
 pub(super) fn turn(codes: &[u8], stride: usize, turned: &mut [u8]) {
+    if let (4, Ok(codes)) = (stride, <&[u8; 64]>::try_from(codes)) {
+        return one(codes, turned);
+    }
     let codes = codes.as_chunks::<64>().0;
     for first in (0..stride).step_by(64) {
         // [16 rows of codes][sample quad]
@@ -97,5 +100,20 @@ pub(super) fn turn(codes: &[u8], stride: usize, turned: &mut [u8]) {
                 }
             }
         }
+    }
+}
+
+/// One sample: each code is the first of four bytes.
+#[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi,popcnt")]
+fn one(codes: &[u8; 64], turned: &mut [u8]) {
+    let v = load(codes);
+    let sixteens = [
+        _mm512_castsi512_si128(v),
+        _mm512_extracti32x4_epi32::<1>(v),
+        _mm512_extracti32x4_epi32::<2>(v),
+        _mm512_extracti32x4_epi32::<3>(v),
+    ];
+    for (turned, codes) in turned.as_chunks_mut().0.iter_mut().zip(sixteens) {
+        store(turned, _mm512_cvtepu8_epi32(codes));
     }
 }

@@ -182,7 +182,7 @@ pub(super) fn look_up(
 
 #[inline]
 #[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi,popcnt")]
-fn store_bytes(bytes: &mut [u8; 16], v: __m128i) {
+pub(super) fn store_bytes(bytes: &mut [u8; 16], v: __m128i) {
     // SAFETY: the reference covers the 16 bytes that an unaligned store writes.
     unsafe { _mm_storeu_si128(bytes.as_mut_ptr().cast(), v) }
 }

@@ -140,7 +140,7 @@ impl Tile {
     fn compute(&mut self, dither: [&[u16]; 2]) {
         self.peak_set = 0;
         self.peak_reset = 0;
-        for bank in 0..2 {
+        for (bank, draws) in dither.into_iter().enumerate() {
             for column in 0..self.config.columns {
                 let at = self.upd.row * self.size.columns + column;
                 let sum = match self.upd.kind {
@@ -150,7 +150,7 @@ impl Tile {
                     }
                     UpdKind::Write | UpdKind::Add => std::mem::take(&mut self.sum[bank][at]),
                 };
-                let word = dither[bank].get(column).copied().unwrap_or(0);
+                let word = draws.get(column).copied().unwrap_or(0);
                 let pulses = self.bounded(bank, at, sum * self.config.mantissa, word);
                 self.pulse[bank][column] = pulses;
                 self.peak_set = self.peak_set.max(pulses);
