@@ -78,7 +78,7 @@ fn a_damaged_run_is_refused_or_continued_never_trusted() {
     let keep = |name: &str| std::fs::read(folder.join(name)).unwrap();
     let (checkpoint, receipt) = (keep("checkpoint.safetensors"), keep("receipt.json"));
     let running = String::from_utf8(receipt.clone()).unwrap().replace("finished", "running");
-    let config = keep("config.toml");
+    let (config, metrics) = (keep("config.toml"), keep("metrics.jsonl"));
     let resume = || run(dalean().args(["train", "--resume"]).arg(&folder));
     let put = |name: &str, bytes: &[u8]| std::fs::write(folder.join(name), bytes).unwrap();
 
@@ -108,6 +108,7 @@ fn a_damaged_run_is_refused_or_continued_never_trusted() {
         put("receipt.json", text.as_bytes());
         refused(&verify(), &["receipt.json"]);
     }
+    put("metrics.jsonl", &metrics);
     let price = || run(dalean().arg("price").arg(&folder));
     assert_eq!(price().code, Some(0));
     let count = "{\"phase\": \"training\", \"layer\": 0, \"pathway\": \"pp\", \"operation\": \"update\", \"event\": \"holds\", \"count\": -1}";
