@@ -49,7 +49,7 @@ fn a_tile_or_an_update_that_is_not_there_is_said() {
     for (arguments, code, said) in [
         (&["--tile", "0,p,9,0"][..], 1, "2 target streams"),
         (&["--tile", "7,p,0,0"], 1, "layers are 0..2"),
-        (&["--update", "100000"], 1, "the training has no update 100000"),
+        (&["--update", "100000"], 1, "the training has no update"),
         (&["--tile", "p"], 2, "layer,stream,row,column"),
     ] {
         let mut command = dalean();

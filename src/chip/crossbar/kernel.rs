@@ -489,6 +489,8 @@ impl Kernel {
         let whole = |turned: &&[u8]| turned.len() == 4 * BLOCK_ROWS;
         assert!(strip.turned.iter().flatten().all(whole), "64 rows");
         assert!(strip.write.floor <= strip.write.ceiling, "the window is not empty");
+        let rows = strip.peaks.as_ref().map_or(0, |rows| rows.len().div_ceil(BLOCK_ROWS));
+        assert!(rows == 0 || rows == strip.blocks, "peaks of all rows");
         with!(self, loops => loops.single(strip))
     }
 

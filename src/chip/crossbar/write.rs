@@ -9,7 +9,7 @@ use std::ops::Range;
 use super::StripMut;
 use super::kernel::{Cells, Dither, Draws, Half, Kernel, Single, Write, WriteCounts};
 use super::layout::{BLOCK_CELLS, HALF_CELLS, HALF_COLUMNS, PANEL_COLUMNS};
-use super::pulses::{Collect, Collected, Collector};
+use super::pulses::{Collect, Collected, Collector, RowPeaks};
 use crate::chip::hardware::{DitherBits, DitherPattern};
 use crate::num::draw::Place;
 
@@ -62,8 +62,8 @@ impl StripMut<'_> {
         let mut sums = Sums([0; HALF_CELLS]);
         let Range { start, end } = self.panels();
         let draws = Draws::new(request.place, self.layout.rows);
-        if let Some(counts) = self.write_single(kernel, request, gates, &draws) {
-            return Written { counts, collected: Collected::Nothing };
+        if let Some(written) = self.write_single(kernel, request, gates, &draws) {
+            return written;
         }
         let columns = start * PANEL_COLUMNS..end * PANEL_COLUMNS;
         let mut collector = Collector::new(request.collect, self.layout, columns.clone());
@@ -110,6 +110,14 @@ impl StripMut<'_> {
         Written { counts, collected: collector.finish(kernel) }
     }
 
+    /// No peaks yet of the tile that all columns of the strip lie in, if they lie in one.
+    fn one_tile(&self, tile_columns: usize) -> Option<RowPeaks> {
+        let Range { start, end } = self.panels();
+        let last = (end * PANEL_COLUMNS).min(self.layout.columns) - 1;
+        let tile = start * PANEL_COLUMNS / tile_columns;
+        (last / tile_columns == tile).then(|| RowPeaks::new(tile, self.layout.rows))
+    }
+
     /// Writes one sample at once, where that is usual.
     fn write_single(
         &mut self,
@@ -117,25 +125,33 @@ impl StripMut<'_> {
         request: &WriteRequest<'_>,
         gates: &[i8],
         draws: &Draws,
-    ) -> Option<WriteCounts> {
+    ) -> Option<Written> {
         let plain = self.high.is_none() && self.residual.is_none() && self.pruned.is_none();
         let bytes = (request.dither_bits, request.dither_pattern);
         let usual = plain
             && request.stride == 4
             && bytes == (DitherBits::Eight, DitherPattern::PerCell)
-            && request.collect == Collect::Nothing
             && gates.as_chunks::<4>().0.iter().all(|of| of[1..] == [0; 3]);
-        usual.then(|| {
-            kernel.single(Single {
-                low: self.low,
-                blocks: self.layout.blocks(),
-                turned: request.turned,
-                gates,
-                column: self.first * PANEL_COLUMNS,
-                draws,
-                write: &request.write,
-            })
-        })?
+        if !usual {
+            return None;
+        }
+        let mut peaks = match request.collect {
+            Collect::Nothing => None,
+            Collect::Peaks { tile_columns } => Some(self.one_tile(tile_columns)?),
+            Collect::Pulses => return None,
+        };
+        let counts = kernel.single(Single {
+            low: self.low,
+            blocks: self.layout.blocks(),
+            turned: request.turned,
+            gates,
+            column: self.first * PANEL_COLUMNS,
+            draws,
+            write: &request.write,
+            peaks: peaks.as_mut().map(|peaks| &mut peaks.rows[..]),
+        })?;
+        let collected = peaks.map_or(Collected::Nothing, |peaks| Collected::Peaks(vec![peaks]));
+        Some(Written { counts, collected })
     }
 
     fn half(&mut self, half: usize, block: usize) -> Cells<'_> {

@@ -45,12 +45,17 @@ impl Passes {
     ) -> Self {
         let mut passes = Self { busy: 0, by_target: [0; 2] };
         match pulses {
-            None => passes.add(hardware, timing, Stream::P, vec![0; layer.layout.rows]),
+            None => passes.add(timing, Stream::P, layer.layout.rows.min(hardware.tile_rows), 0),
             Some(Pulses::Peaks(tiles)) => {
                 for tile in tiles {
-                    let rows = tile.peaks.rows.iter();
-                    let rows = rows.map(|row| row.map(|p| timing.passes(p.into())).iter().sum());
-                    passes.add(hardware, timing, tile.target, rows.collect());
+                    for rows in tile.peaks.rows.chunks(hardware.tile_rows) {
+                        let peaks = rows.as_flattened().iter();
+                        let sum: u32 = match timing.pulse_code {
+                            PulseCode::Unary => peaks.map(|&peak| u32::from(peak)).sum(),
+                            PulseCode::Amplitude => peaks.map(|&peak| u32::from(peak > 0)).sum(),
+                        };
+                        passes.add(timing, tile.target, rows.len(), sum.into());
+                    }
                 }
             }
             Some(Pulses::Every(arrays)) => {
@@ -58,7 +63,9 @@ impl Passes {
                     let banks = layer.spec.wiring.banks(target).map(|at| &arrays[at][..]);
                     for first in (0..layer.layout.columns).step_by(hardware.tile_columns) {
                         let rows = limited(hardware, timing, layer, banks, first);
-                        passes.add(hardware, timing, target, rows);
+                        for rows in rows.chunks(hardware.tile_rows) {
+                            passes.add(timing, target, rows.len(), rows.iter().sum());
+                        }
                     }
                 }
             }
@@ -66,12 +73,10 @@ impl Passes {
         passes
     }
 
-    /// Takes a column of tiles along, given the passes of every row.
-    fn add(&mut self, hardware: &Hardware, timing: Timing, target: Stream, rows: Vec<u64>) {
-        for tile in rows.chunks(hardware.tile_rows) {
-            self.busy = self.busy.max(tile.iter().map(|&row| timing.row(row)).sum());
-        }
-        self.by_target[target.index()] += rows.iter().sum::<u64>();
+    /// Takes a tile along, given the passes of all its rows.
+    fn add(&mut self, timing: Timing, target: Stream, rows: usize, passes: u64) {
+        self.busy = self.busy.max(timing.rows(rows as u64, passes));
+        self.by_target[target.index()] += passes;
     }
 }
 

@@ -101,6 +101,24 @@ impl Round {
     }
 }
 
+/// Makes a run of rounds begin at a sample; its place. Samples are at most as many as there are rounds.
+fn split(rounds: &mut Vec<(usize, Round)>, sample: usize) -> usize {
+    let mut start = 0;
+    for at in 0..rounds.len() {
+        let (count, round) = rounds[at];
+        if sample == start {
+            return at;
+        }
+        if sample < start + count {
+            rounds[at].0 = sample - start;
+            rounds.insert(at + 1, (start + count - sample, round));
+            return at + 1;
+        }
+        start += count;
+    }
+    rounds.len()
+}
+
 #[derive(Debug, Clone)]
 enum Segment {
     Nothing,
@@ -111,7 +129,8 @@ enum Segment {
         again: u64,
     },
     Rounds {
-        rounds: Vec<Round>,
+        /// Neighbouring samples whose rounds are alike: how many, and the round of each.
+        rounds: Vec<(usize, Round)>,
         /// Whether something was read from its columns.
         columns: bool,
         /// By layer: samples written so far lie below; and the last one of any layer.
@@ -203,7 +222,11 @@ impl Schedule {
     }
 
     /// The rounds in progress, or new ones.
-    fn rounds(&mut self, cycles: &mut Cycles, samples: &Range<usize>) -> &mut [Round] {
+    fn rounds(
+        &mut self,
+        cycles: &mut Cycles,
+        samples: &Range<usize>,
+    ) -> impl Iterator<Item = &mut Round> {
         if !matches!(self.segment, Segment::Rounds { .. }) {
             self.settle(cycles);
             let written = vec![0; self.shapes.len()];
@@ -212,10 +235,13 @@ impl Schedule {
         let Segment::Rounds { rounds, .. } = &mut self.segment else {
             unreachable!("just made");
         };
-        if rounds.len() < samples.end {
-            rounds.resize(samples.end, Round::NEW);
+        let there: usize = rounds.iter().map(|(count, _)| count).sum();
+        if there < samples.end {
+            rounds.push((samples.end - there, Round::NEW));
         }
-        &mut rounds[samples.clone()]
+        let first = split(rounds, samples.start);
+        let end = split(rounds, samples.end);
+        rounds[first..end].iter_mut().map(|(_, round)| round)
     }
 
     /// `ERR`; `shared`: its words are those of the one before.
@@ -328,10 +354,10 @@ impl Schedule {
                 cycles.pass(Stage::Forward, latency + (samples - 1) * again);
             }
             Segment::Rounds { rounds, .. } => {
-                for mut round in rounds {
+                for (count, mut round) in rounds {
                     round.close();
                     for (stage, passed) in Stage::ALL.into_iter().zip(round.passed) {
-                        cycles.pass(stage, passed);
+                        cycles.pass(stage, passed * count as u64);
                     }
                 }
             }

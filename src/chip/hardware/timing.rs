@@ -115,10 +115,10 @@ impl Timing {
         self.pulse + if self.verify { self.settle + self.conversion() } else { 0 }
     }
 
-    /// Cycles of a row that takes so many passes: compute, pulses, turn around.
+    /// Cycles of rows that take so many passes together: compute, pulses, turn around.
     #[must_use]
-    pub const fn row(&self, passes: u64) -> u64 {
-        2 * self.beat + passes * self.pass()
+    pub const fn rows(&self, rows: u64, passes: u64) -> u64 {
+        2 * self.beat * rows + passes * self.pass()
     }
 
     /// Cycles of a rank-1 write: levels that rise, then levels that fall.
@@ -131,16 +131,6 @@ impl Timing {
     #[must_use]
     pub const fn accept(&self) -> u64 {
         self.beat
-    }
-
-    /// Passes of the pulses of one polarity, given the most pulses of a cell, when nothing limits how many cells
-    /// pulse at a time.
-    #[must_use]
-    pub const fn passes(&self, peak: u64) -> u64 {
-        match self.pulse_code {
-            PulseCode::Unary => peak,
-            PulseCode::Amplitude => (peak > 0) as u64,
-        }
     }
 }
 
@@ -186,9 +176,7 @@ mod tests {
     #[test]
     fn a_verified_pulse_is_read() {
         let verified = Timing { verify: true, ..TIMING };
-        assert_eq!((TIMING.row(3), verified.row(3)), (2 + 15, 2 + 3 * (5 + 26)));
-        let amplitude = Timing { pulse_code: PulseCode::Amplitude, ..TIMING };
-        assert_eq!([0, 1, 7].map(|peak| amplitude.passes(peak)), [0, 1, 1]);
+        assert_eq!((TIMING.rows(1, 3), verified.rows(2, 3)), (2 + 15, 4 + 3 * (5 + 26)));
     }
 
     #[test]

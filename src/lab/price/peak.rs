@@ -42,9 +42,9 @@ pub fn figures(hardware: &Hardware, words: u64) -> Vec<Figure> {
         figure("next read after", accept + timing.read_again(slices, columns)),
         figure("error words", accept + timing.error(words, columns)),
         figure("accumulate", accept + timing.accumulate(rows, columns)),
-        figure("write, row without pulses", timing.row(0)),
-        figure("write, row with one pulse", timing.row(1)),
-        figure("write, all rows, one pulse", accept + rows * timing.row(1)),
+        figure("write, row without pulses", timing.rows(1, 0)),
+        figure("write, row with one pulse", timing.rows(1, 1)),
+        figure("write, all rows, one pulse", accept + timing.rows(rows, rows)),
     ]
 }
 

@@ -202,6 +202,8 @@ pub struct Single<'a> {
     pub draws: &'a Draws,
     /// Rounding, bound and window.
     pub write: &'a Write,
+    /// Peaks of all rows over the columns of the strip, where they are asked for; 0 before.
+    pub peaks: Option<&'a mut [[u8; 2]]>,
 }
 
 /// Where bounded pulses go.

@@ -228,10 +228,12 @@ proptest! {
         let plain = Case { dither, level_bits: case.level_bits.min(8), ..plain };
         for shift in 8..=24 {
             let case = if usual { Case { shift, increment_max: 7, ..plain } } else { Case { shift, ..plain } };
-            let law = written(Backend::Scalar, &case, Collect::Nothing);
-            for backend in Backend::available() {
-                let got = written(backend, &case, Collect::Nothing);
-                prop_assert!(got == law, "{} {:?}", backend.name(), case);
+            for collect in [Collect::Nothing, Collect::Peaks { tile_columns: 256 }, Collect::Peaks { tile_columns: 40 }] {
+                let law = written(Backend::Scalar, &case, collect);
+                for backend in Backend::available() {
+                    let got = written(backend, &case, collect);
+                    prop_assert!(got == law, "{} {:?} {:?}", backend.name(), collect, case);
+                }
             }
         }
     }

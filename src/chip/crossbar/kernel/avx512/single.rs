@@ -15,9 +15,10 @@
 use std::arch::x86_64::*;
 
 use super::dither::drawn;
+use super::pulses::{peaks as fold_rows, take};
 use super::units::store_bytes;
 use super::{as_bytes, load, load_sums, store, store_sums};
-use crate::chip::crossbar::kernel::{Single, WriteCounts};
+use crate::chip::crossbar::kernel::{Extremes, Pulsed, Single, WriteCounts};
 use crate::chip::crossbar::layout::{BLOCK_CELLS, BLOCK_ROWS, HALF_CELLS, HALF_COLUMNS};
 
 /// Half blocks side by side of the widest strip taken.
@@ -52,7 +53,7 @@ struct Rounding {
 /// See [`super::super::Kernel::single`].
 #[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi,popcnt")]
 pub(super) fn single(strip: Single<'_>) -> Option<WriteCounts> {
-    let Single { low, blocks, turned, gates, column, draws, write } = strip;
+    let Single { low, blocks, turned, gates, column, draws, write, mut peaks } = strip;
     let (Ok(floor), Ok(ceiling)) = (u8::try_from(write.floor), u8::try_from(write.ceiling)) else {
         return None;
     };
@@ -81,6 +82,7 @@ pub(super) fn single(strip: Single<'_>) -> Option<WriteCounts> {
     let mut words = Words([[0; ROOM]; 16]);
     let mut counters = [0i32; ROOM];
     let (mut requested, mut attempted, mut effective) = (zero, zero, zero);
+    let mut extremes = peaks.is_some().then(Extremes::new);
     for (block, turned) in turned.iter().enumerate() {
         let Some(turned) = turned else { continue };
         let drives = Drives::new(turned);
@@ -122,6 +124,9 @@ pub(super) fn single(strip: Single<'_>) -> Option<WriteCounts> {
                 let pulses =
                     pulses(drives.even[group], drives.odd[group], gates.twice, word, rounding);
                 let before = load(&low[group]);
+                if let Some(extremes) = &mut extremes {
+                    take(&mut Pulsed::Most(extremes), group, pulses);
+                }
                 let level = _mm512_adds_epi8(_mm512_xor_si512(before, rounding.flip), pulses);
                 let level =
                     _mm512_max_epi8(_mm512_min_epi8(level, rounding.ceiling), rounding.floor);
@@ -135,6 +140,14 @@ pub(super) fn single(strip: Single<'_>) -> Option<WriteCounts> {
             // 16 groups of pulses up to 15 fit a byte
             attempted = _mm512_add_epi64(attempted, _mm512_sad_epu8(sizes, zero));
             requested = _mm512_add_epi64(requested, _mm512_sad_epu8(pulsed, zero));
+        }
+        if let (Some(rows), Some(extremes)) = (&mut peaks, &mut extremes)
+            && columns > 0
+        {
+            let rows = rows.chunks_mut(BLOCK_ROWS).nth(block).expect("blocks hold the rows");
+            let most = fold_rows(extremes);
+            rows.copy_from_slice(&most[..rows.len()]);
+            *extremes = Extremes::new();
         }
     }
     let [requested, attempted, effective] = [requested, attempted, effective]
