@@ -98,6 +98,29 @@ fault "3 write counts are not restored" src/lab/store/checkpoint.rs \
     '*writes = positive(&name, number)?;' 'positive(&name, number)?;' laws::runs
 fault "3 a draw depends on the tile" $update \
     'layer: index,' 'layer: index + (hardware.tile_rows & 1) as u16,' laws::runs
+schedule=src/chip/engine/schedule.rs
+timing=src/chip/hardware/timing.rs
+fault "4 layers wait for one another" $schedule \
+    '*again = (*again).max(front);' '*again += front;' laws::law_4
+fault "4 updates one after the other" $schedule \
+    'self.longest = self.longest.max(cycles);' 'self.longest += cycles;' laws::law_4
+fault "4 all words are shared" $schedule \
+    'round.join(Doing::Hearing, layer, one, !shared);' \
+    'round.join(Doing::Hearing, layer, one, false);' laws::law_4
+fault "4 samples are written in any order" $schedule \
+    '*columns || sample < written[layer] || sample < *last' \
+    '*columns || sample < written[layer]' laws::law_4
+fault "4 a row does not turn around" $timing \
+    '2 * self.beat * rows + passes * self.pass()' 'self.beat * rows + passes * self.pass()' laws::law_4
+fault "4 verifying takes no time" $timing \
+    'self.pulse + if self.verify { self.settle + self.conversion() } else { 0 }' \
+    'self.pulse' laws::law_4
+fault "4 slow lanes hold nothing up" $timing \
+    'if front > lanes { front } else { lanes }' 'if front > lanes { front } else { front }' laws::law_4
+fault "4 trains fire in one phase" $timing \
+    '2 * slots * self.pulse' 'slots * self.pulse' laws::law_4
+fault "4 the current has no limit" src/chip/engine/passes.rs \
+    'u64::from(cells).div_ceil(together)' 'u64::from(cells.min(1)) * together.min(1)' laws::law_4
 fault "5 a tile loses its last row" $read \
     'codes[to..].fill(0);' 'codes[to - 1..].fill(0);' laws::product
 fault "5 transposed banks add" src/chip/engine/columns.rs \

@@ -7,19 +7,19 @@
 
 use std::ops::Range;
 
-use super::super::tile::{
-    BankEvents, Command, Launch, More, Tile, TileAdc, TileConfig, TileEvents, TileSize,
-};
+use super::super::tile::{BankEvents, Command, Launch, Tile, TileEvents, TileSize};
 use crate::chip::hardware::timing::tree_levels;
-use crate::chip::hardware::{
-    Adc, DitherPattern, FloorKind, Hardware, Subtract, Timing, WriteScheme,
-};
+use crate::chip::hardware::{DitherPattern, Hardware, Timing, WriteScheme};
 use crate::chip::layer::Layer;
 use crate::chip::ledger::During;
 use crate::chip::periphery;
 use crate::chip::population::{Stream, Wiring};
-use crate::num::draw::{Place, Site};
-use crate::num::fixed::{DriveBits, rsh};
+use crate::num::fixed::DriveBits;
+
+mod build;
+mod draws;
+
+use build::config;
 
 /// Widths that decide how many bits a memory moves.
 #[derive(Debug, Clone, Copy)]
@@ -347,74 +347,6 @@ impl TickLayer {
         self.tree();
     }
 
-    /// The draws of the row that a tile is about to write.
-    fn draws(&self, tile: usize, bank: usize) -> Vec<u16> {
-        let across = tile % self.grid[1];
-        let down = tile / self.grid[1] % self.grid[0];
-        let target = self.targets()[tile / (self.grid[0] * self.grid[1])];
-        let row = down * self.tile[0] + self.tiles[tile].dither_row();
-        let place = Place {
-            seed: self.seed,
-            site: Site::WriteDither,
-            layer: self.index,
-            pathway: self.codes(target)[bank],
-            sub: 0,
-            count: self.writes,
-        };
-        let (bits, pattern) = self.dither;
-        let word = |place: &Place, rows, row, column| match bits {
-            0 => 0,
-            8 => {
-                let mut bytes = [0; 64];
-                place.bytes(rows, column, row / 64, &mut bytes);
-                u16::from(bytes[row % 64])
-            }
-            _ => place.half(rows, row, column),
-        };
-        let draw = |column| match pattern {
-            DitherPattern::PerCell => word(&place, self.rows, row, column),
-            DitherPattern::Separable => {
-                let down = word(&Place { sub: 1, ..place }, self.rows, row, 0);
-                // numbered as one column
-                down ^ word(&Place { sub: 2, ..place }, self.columns, column, 0)
-            }
-        };
-        self.tile_columns(across).map(draw).collect()
-    }
-
-    /// Which rows and columns of a bank of a tile fire in a slot of a train.
-    fn firing(&self, tile: usize, bank: usize, slot: u32) -> (Vec<bool>, Vec<bool>) {
-        let across = tile % self.grid[1];
-        let down = tile / self.grid[1] % self.grid[0];
-        let target = self.targets()[tile / (self.grid[0] * self.grid[1])];
-        let this = &self.tiles[tile];
-        let (shift, sample) = this.writing();
-        // the probability of a slot is 2^-(k + log2 slots) of drive times gate, half of it each line's
-        let total = shift + self.wiring.shift_extra() + self.slots_log2;
-        let fires = |site, rows, line: usize, amount: i64, by: u32| {
-            let place = Place {
-                seed: self.seed,
-                site,
-                layer: self.index,
-                pathway: self.codes(target)[bank],
-                sub: slot,
-                count: self.writes,
-            };
-            let chance = rsh(amount << 16, by).min(1 << 16);
-            i64::from(place.half(rows, line, 0)) < chance
-        };
-        let row = |(at, row): (usize, usize)| {
-            let amount = i64::from(this.drive(bank, sample, at)) * this.mantissa();
-            fires(Site::RowTrain, self.rows, row, amount, total - total / 2)
-        };
-        let column = |(at, column): (usize, usize)| {
-            let amount = this.bank_gate(bank, sample, at).abs();
-            fires(Site::ColumnTrain, self.columns, column, amount, total / 2)
-        };
-        let rows = self.tile_rows(down).enumerate().map(row).collect();
-        (rows, self.tile_columns(across).enumerate().map(column).collect())
-    }
-
     fn tree(&mut self) {
         self.tree.iter_mut().for_each(|entry| entry.0 -= 1);
         while self.tree.first().is_some_and(|entry| entry.0 == 0) {
@@ -491,75 +423,5 @@ impl TickLayer {
             all.push((target, banks, events));
         }
         all
-    }
-}
-
-/// Configuration of one tile of a layer.
-fn config(
-    hardware: &Hardware,
-    timing: Timing,
-    layer: &Layer,
-    target: Stream,
-    rows: &Range<usize>,
-    columns: &Range<usize>,
-) -> TileConfig {
-    let small = |number: u64| usize::try_from(number).expect("configured sizes are small");
-    let shifts = layer.adc_shifts.get(target.index()).cloned().unwrap_or_default();
-    let first = shifts.first().copied().unwrap_or(0);
-    let adc = match hardware.adc {
-        Adc::Ideal => TileAdc::Ideal,
-        Adc::Finite { bits, subtract: Subtract::Digital, .. } => {
-            TileAdc::Digital { bits: bits.get(), shift: first }
-        }
-        Adc::Finite { bits, subtract: Subtract::Current, .. } => {
-            TileAdc::Current { bits: bits.get(), shift: first }
-        }
-    };
-    let taps = &layer.taps;
-    let own = taps.words.chunks_exact(taps.per_unit).skip(columns.start).take(columns.len());
-    let own = own.map(|words| words.iter().map(|&word| usize::from(word)).collect());
-    TileConfig {
-        rows: rows.len(),
-        columns: columns.len(),
-        settle: timing.settle,
-        convert: timing.convert,
-        share: small(timing.share),
-        overlap: timing.overlapped,
-        slices: hardware.slices(),
-        dac_bits: hardware.dac_bits,
-        tree: 0,
-        lanes: small(timing.lanes),
-        hops: small(timing.hops),
-        words: taps.width,
-        tap_base: 0,
-        pulse: timing.pulse,
-        adc,
-        lut_bits: hardware.lut_bits.get(),
-        lut_shift: layer.lut.shift,
-        error_bits: hardware.error_bits.get(),
-        negate: target == Stream::N,
-        mantissa: 1,
-        dither_bits: hardware.dither_bits.get(),
-        increment_max: hardware.increment_max.get().into(),
-        floor: hardware.window.floor(),
-        ceiling: hardware.window.ceiling(),
-        absorbing: hardware.floor_kind == FloorKind::Absorbing,
-        more: More {
-            adc_shifts: shifts,
-            tree_outside: true,
-            taps: own.collect(),
-            tap_shift: taps.shift,
-            beat: timing.beat,
-            potentiation_only: false,
-            shift_extra: layer.spec.wiring.shift_extra(),
-            residual_bits: hardware.residual_bits.get(),
-            verify: timing.verify,
-            active_max: timing.active_max.map(small),
-            pulse_code: timing.pulse_code,
-            train_slots: match hardware.scheme {
-                WriteScheme::Rounded => None,
-                WriteScheme::Trains { slots_log2 } => Some(1 << slots_log2),
-            },
-        },
     }
 }

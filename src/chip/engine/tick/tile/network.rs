@@ -122,35 +122,3 @@ impl Tile {
         (std::mem::take(&mut self.bank_events), std::mem::take(&mut self.events))
     }
 }
-
-impl BankEvents {
-    pub(in super::super) const fn merge(&mut self, more: &Self) {
-        self.cell_loads += more.cell_loads;
-        self.dac_slices += more.dac_slices;
-        self.cell_reads += more.cell_reads;
-        self.holds += more.holds;
-        self.conversions += more.conversions;
-        self.shift_adds += more.shift_adds;
-        self.accumulates += more.accumulates;
-        self.delta_computations += more.delta_computations;
-        self.requested += more.requested;
-        self.bounded += more.bounded;
-        self.pulses_attempted += more.pulses_attempted;
-        self.pulses_effective += more.pulses_effective;
-        self.saturated_conversions += more.saturated_conversions;
-        self.verify_reads += more.verify_reads;
-    }
-}
-
-impl TileEvents {
-    /// Adds another tile's; words on the bus are heard by all, and counted where `bus` says so.
-    pub(in super::super) const fn merge(&mut self, more: &Self, bus: bool) {
-        self.look_ups += more.look_ups;
-        self.saturated_look_ups += more.saturated_look_ups;
-        self.bus_words += if bus { more.bus_words } else { 0 };
-        self.multiplies += more.multiplies;
-        self.saturated_gates += more.saturated_gates;
-        self.row_pulses += more.row_pulses;
-        self.saturated_errors += more.saturated_errors;
-    }
-}

@@ -1,0 +1,79 @@
+//! From hardware and a layer's plan to the configuration of each of its tiles.
+#![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
+
+use std::ops::Range;
+
+use super::super::super::tile::{More, TileAdc, TileConfig};
+use crate::chip::hardware::{Adc, FloorKind, Hardware, Subtract, Timing, WriteScheme};
+use crate::chip::layer::Layer;
+use crate::chip::population::Stream;
+
+/// Configuration of one tile of a layer.
+pub(super) fn config(
+    hardware: &Hardware,
+    timing: Timing,
+    layer: &Layer,
+    target: Stream,
+    rows: &Range<usize>,
+    columns: &Range<usize>,
+) -> TileConfig {
+    let small = |number: u64| usize::try_from(number).expect("configured sizes are small");
+    let shifts = layer.adc_shifts.get(target.index()).cloned().unwrap_or_default();
+    let first = shifts.first().copied().unwrap_or(0);
+    let adc = match hardware.adc {
+        Adc::Ideal => TileAdc::Ideal,
+        Adc::Finite { bits, subtract: Subtract::Digital, .. } => {
+            TileAdc::Digital { bits: bits.get(), shift: first }
+        }
+        Adc::Finite { bits, subtract: Subtract::Current, .. } => {
+            TileAdc::Current { bits: bits.get(), shift: first }
+        }
+    };
+    let taps = &layer.taps;
+    let own = taps.words.chunks_exact(taps.per_unit).skip(columns.start).take(columns.len());
+    let own = own.map(|words| words.iter().map(|&word| usize::from(word)).collect());
+    TileConfig {
+        rows: rows.len(),
+        columns: columns.len(),
+        settle: timing.settle,
+        convert: timing.convert,
+        share: small(timing.share),
+        overlap: timing.overlapped,
+        slices: hardware.slices(),
+        dac_bits: hardware.dac_bits,
+        tree: 0,
+        lanes: small(timing.lanes),
+        hops: small(timing.hops),
+        words: taps.width,
+        tap_base: 0,
+        pulse: timing.pulse,
+        adc,
+        lut_bits: hardware.lut_bits.get(),
+        lut_shift: layer.lut.shift,
+        error_bits: hardware.error_bits.get(),
+        negate: target == Stream::N,
+        mantissa: 1,
+        dither_bits: hardware.dither_bits.get(),
+        increment_max: hardware.increment_max.get().into(),
+        floor: hardware.window.floor(),
+        ceiling: hardware.window.ceiling(),
+        absorbing: hardware.floor_kind == FloorKind::Absorbing,
+        more: More {
+            adc_shifts: shifts,
+            tree_outside: true,
+            taps: own.collect(),
+            tap_shift: taps.shift,
+            beat: timing.beat,
+            potentiation_only: false,
+            shift_extra: layer.spec.wiring.shift_extra(),
+            residual_bits: hardware.residual_bits.get(),
+            verify: timing.verify,
+            active_max: timing.active_max.map(small),
+            pulse_code: timing.pulse_code,
+            train_slots: match hardware.scheme {
+                WriteScheme::Rounded => None,
+                WriteScheme::Trains { slots_log2 } => Some(1 << slots_log2),
+            },
+        },
+    }
+}

@@ -1,0 +1,159 @@
+//! Sizes and configuration registers of a tile: docs/TILE.md, 1.
+#![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
+
+use crate::chip::hardware::PulseCode;
+
+/// Sizes a tile is built with.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct TileSize {
+    /// Rows.
+    pub rows: usize,
+    /// Columns.
+    pub columns: usize,
+    /// Samples it remembers.
+    pub slots: usize,
+    /// Stages of the adder tree there are registers for.
+    pub tree_max: usize,
+}
+
+/// What converts a column.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum TileAdc {
+    /// Lossless.
+    Ideal,
+    /// Each bank on its own.
+    Digital {
+        /// Width of a code.
+        bits: u32,
+        /// `ash`, by slice.
+        shift: u32,
+    },
+    /// The difference of the banks.
+    Current {
+        /// Width of a code.
+        bits: u32,
+        /// `ash`, by slice.
+        shift: u32,
+    },
+}
+
+/// Configuration registers. What docs/TILE.md lists comes first.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct TileConfig {
+    /// Rows in use.
+    pub rows: usize,
+    /// Columns in use.
+    pub columns: usize,
+    /// `T_A`.
+    pub settle: u64,
+    /// `T_C`.
+    pub convert: u64,
+    /// `S`.
+    pub share: usize,
+    /// Whether a slice settles while the one before is converted.
+    pub overlap: bool,
+    /// `NS`.
+    pub slices: u32,
+    /// Bits of a slice.
+    pub dac_bits: u32,
+    /// `T_tree`.
+    pub tree: usize,
+    /// `U`.
+    pub lanes: usize,
+    /// `H`.
+    pub hops: usize,
+    /// `CE`.
+    pub words: usize,
+    /// Word of the first column.
+    pub tap_base: usize,
+    /// `T_W`.
+    pub pulse: u64,
+    /// Converters; a slice may have a shift of its own, see `adc_shifts`.
+    pub adc: TileAdc,
+    /// Width of the table's index.
+    pub lut_bits: u32,
+    /// `lsh`.
+    pub lut_shift: u32,
+    /// Width of an error word.
+    pub error_bits: u32,
+    /// Whether units are of stream n and latch the negated word.
+    pub negate: bool,
+    /// Rate mantissa.
+    pub mantissa: i64,
+    /// D.
+    pub dither_bits: u32,
+    /// Bound of the pulses.
+    pub increment_max: i64,
+    /// Least level.
+    pub floor: u16,
+    /// Greatest level.
+    pub ceiling: u16,
+    /// Floor kind.
+    pub absorbing: bool,
+    /// What only networks of tiles have.
+    pub more: More,
+}
+
+/// What a tile of a network has beyond docs/TILE.md; the default is none of it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct More {
+    /// Shift of each slice; empty: the converter's own.
+    pub adc_shifts: Vec<u32>,
+    /// Whether accumulators leave the tile for a tree outside.
+    pub tree_outside: bool,
+    /// Words a column adds; empty: the modulo tap.
+    pub taps: Vec<Vec<usize>>,
+    /// Shift of the sum of more than one word.
+    pub tap_shift: u32,
+    /// Cycles of a digital action.
+    pub beat: u64,
+    /// Whether only potentiating gates count: positive ones in bank e, negative ones in bank i.
+    pub potentiation_only: bool,
+    /// Added to the shift of a write.
+    pub shift_extra: u32,
+    /// Fractional bits of the remainder behind a cell.
+    pub residual_bits: u32,
+    /// Whether each pulse is followed by a read.
+    pub verify: bool,
+    /// Cells that can be pulsed at a time.
+    pub active_max: Option<usize>,
+    /// How pulses are given.
+    pub pulse_code: PulseCode,
+    /// Slots of a train, where writes are coincidences of trains.
+    pub train_slots: Option<u64>,
+}
+
+impl Default for More {
+    fn default() -> Self {
+        Self {
+            adc_shifts: vec![],
+            tree_outside: false,
+            taps: vec![],
+            tap_shift: 0,
+            beat: 1,
+            potentiation_only: false,
+            shift_extra: 0,
+            residual_bits: 0,
+            verify: false,
+            active_max: None,
+            pulse_code: PulseCode::Unary,
+            train_slots: None,
+        }
+    }
+}
+
+impl TileConfig {
+    /// `conv`.
+    pub(super) const fn conversion(&self) -> u64 {
+        self.share as u64 * self.convert
+    }
+
+    /// Cycles of a slice.
+    pub(super) fn period(&self) -> u64 {
+        if self.overlap {
+            self.settle.max(self.conversion())
+        } else {
+            self.settle + self.conversion()
+        }
+    }
+}
