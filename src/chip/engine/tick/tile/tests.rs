@@ -1,6 +1,7 @@
 //! Two-sided timing: not ready one cycle before, ready on the cycle.
 
 use super::*;
+use crate::chip::hardware::PulseCode;
 
 const SIZE: TileSize = TileSize { rows: 3, columns: 5, slots: 2, tree_max: 4 };
 
