@@ -86,7 +86,8 @@ pub fn active<'a>(pulses: impl IntoIterator<Item = &'a i8>, bound: u8) -> Vec<[u
 
 impl Engine {
     /// What is told of the pulses of each write that follows.
-    pub const fn set_collect(&mut self, collect: Collect) {
+    #[cfg(test)]
+    const fn set_collect(&mut self, collect: Collect) {
         self.collect = collect;
     }
 

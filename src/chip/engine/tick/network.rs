@@ -122,12 +122,6 @@ impl Network {
         &self.layers[layer].backward
     }
 
-    /// Cycles played so far.
-    #[must_use]
-    pub const fn clock(&self) -> u64 {
-        self.clock
-    }
-
     /// Starts keeping what every layer did when.
     pub fn keep_spans(&mut self) {
         self.watch.keep_spans();
