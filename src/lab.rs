@@ -6,4 +6,5 @@ pub mod price;
 pub mod report;
 pub mod run;
 pub mod store;
+pub mod table;
 pub mod wave;

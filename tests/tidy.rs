@@ -22,7 +22,7 @@ const HOUSE: [(&str, &[&str]); 6] = [
     ("chip", &["hardware", "ledger", "periphery", "crossbar", "population", "layer", "engine"]),
     ("learn", &["error", "route", "statistics", "rule", "driver"]),
     ("task", &["classify"]),
-    ("lab", &["data", "config", "store", "price", "report", "run", "wave"]),
+    ("lab", &["data", "config", "store", "price", "wave", "table", "report", "run", "sweep"]),
     ("cli", &["progress", "data", "hw", "run", "price", "trace", "bench"]),
 ];
 

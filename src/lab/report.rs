@@ -15,6 +15,7 @@ mod image;
 mod number;
 mod page;
 mod scale;
+pub mod sweep;
 pub mod text;
 
 #[cfg(test)]

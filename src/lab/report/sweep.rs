@@ -1,0 +1,71 @@
+//! The page of a sweep and its figures: what it needs to know.
+
+use crate::lab::table::Table;
+
+/// Everything the page of a sweep shows. Nothing here opens a file or reads a clock.
+#[derive(Debug, Clone)]
+pub struct SweepView<'a> {
+    /// Name of the sweep: letters, digits, `-`.
+    pub name: &'a str,
+    /// Heading of the page.
+    pub title: &'a str,
+    /// What it asks and what it shows: paragraphs of plain text, an empty line between them.
+    pub about: &'a str,
+    /// One row a planned point, axes first; rows of points that are not finished have no results. The column `run`
+    /// (text, role `Name`) is the page-relative address of the run's own report.
+    pub table: &'a Table,
+    /// The axes, in the order of the sweep file.
+    pub axes: &'a [Axis],
+    /// What the figures show unless the reader chooses otherwise.
+    pub figures: Figures,
+    /// Points that cannot be run, with the reason.
+    pub refused: &'a [Refused],
+    /// What runs on these chips leave out: `key = text`, from `[not_simulated]`.
+    pub not_simulated: &'a [String],
+    /// Version of this program.
+    pub version: &'a str,
+}
+
+/// One axis of a sweep; its column in the table has the same name.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Axis {
+    /// Name of the column.
+    pub name: String,
+    /// Words for people.
+    pub label: String,
+    /// Whether the values are numbers.
+    pub number: bool,
+    /// Whether steps between numbers are ratios.
+    pub log: bool,
+    /// Values as the sweep file orders them, as [`crate::lab::table::Values::text`] gives them; empty when numbers
+    /// were drawn from a range.
+    pub order: Vec<String>,
+}
+
+/// Which columns the figures show at first; each is the name of a column of the table.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Figures {
+    /// Abscissa of the curves: an axis.
+    pub x: String,
+    /// Ordinate of the curves, colour of the heat map: a result.
+    pub y: String,
+    /// One curve each: an axis.
+    pub series: Option<String>,
+    /// One panel each: an axis.
+    pub panel: Option<String>,
+    /// The two axes of the heat map.
+    pub heat: Option<[String; 2]>,
+    /// What a Pareto front sets against `y`, less is better: a result.
+    pub cost: Option<String>,
+}
+
+/// A point that cannot be run.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Refused {
+    /// Number of the point, from 1.
+    pub point: usize,
+    /// Axis values in words.
+    pub what: String,
+    /// Why.
+    pub why: String,
+}
