@@ -23,6 +23,7 @@ mod hw;
 mod price;
 mod progress;
 mod run;
+mod sweep;
 mod trace;
 
 /// What stops a command.
@@ -70,6 +71,8 @@ enum Command {
     Eval(run::EvalArgs),
     /// Do a run again and compare every state hash
     Verify(run::VerifyArgs),
+    /// Carry out many runs from one file, and keep them in a store
+    Sweep(sweep::SweepArgs),
     /// Say what one update and one inference cost: cycles, critical parts, energy
     Profile(price::ProfileArgs),
     /// Price a finished run: joules and seconds, with its own constants or another chip's
@@ -167,7 +170,8 @@ fn configuration(
             (path.display().to_string(), text)
         }
     };
-    let sources = Sources { experiment: Some((&name, &text)), hardware: hw, settings, seed };
+    let experiment = Some((&*name, &*text));
+    let sources = Sources { experiment, hardware: hw, settings, seed, ..Sources::default() };
     config::load(&sources).map_err(|error| usage(&error.to_string()))
 }
 
@@ -186,6 +190,7 @@ pub fn main() -> ExitCode {
         Command::Train(args) => run::train(&args),
         Command::Eval(args) => run::eval(&args),
         Command::Verify(args) => run::verify(&args),
+        Command::Sweep(args) => sweep::execute(&args),
         Command::Profile(args) => price::profile(&args),
         Command::Price(args) => price::price(&args),
         Command::Data(command) => data::execute(&command),

@@ -66,7 +66,7 @@ impl From<RunError> for Failure {
 }
 
 /// Set when the user asks to stop; the run then ends after the batch in progress.
-fn stop_flag() -> Arc<AtomicBool> {
+pub(super) fn stop_flag() -> Arc<AtomicBool> {
     let flag = Arc::new(AtomicBool::new(false));
     let set = Arc::clone(&flag);
     // a second request ends the process at once

@@ -12,7 +12,7 @@ mod verify;
 pub use profile::{Act, Profile, StageUse, profile};
 pub use repriced::{Repriced, reprice};
 pub use session::{Machine, Session};
-pub use train::{Event, Outcome, evaluate, resume, train, view};
+pub use train::{Event, Keeping, Outcome, carry_on, evaluate, resume, train, view};
 pub use verify::{Verdict, verify};
 
 use crate::chip::layer::PlanError;

@@ -81,7 +81,7 @@ pub(super) fn draw(view: &RunView<'_>) -> Option<Figure> {
             "Compared with the start, as a share of the layer's cells. Above zero: cells that left \
                   the floor. Below: cells that reached it."
                 .into(),
-        body: legend.unwrap_or_default() + &body,
+        body: legend.unwrap_or_default() + body.as_str(),
         wide: true,
     })
 }
