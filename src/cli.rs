@@ -19,10 +19,12 @@ use crate::lab::run::Machine;
 
 mod bench;
 mod data;
+mod export;
 mod hw;
 mod price;
 mod progress;
 mod run;
+mod store;
 mod sweep;
 mod trace;
 
@@ -73,6 +75,11 @@ enum Command {
     Verify(run::VerifyArgs),
     /// Carry out many runs from one file, and keep them in a store
     Sweep(sweep::SweepArgs),
+    /// Write the table of a sweep as CSV, JSON or Parquet
+    Export(export::ExportArgs),
+    /// List, merge and mend stores of runs
+    #[command(subcommand)]
+    Store(store::StoreCommand),
     /// Say what one update and one inference cost: cycles, critical parts, energy
     Profile(price::ProfileArgs),
     /// Price a finished run: joules and seconds, with its own constants or another chip's
@@ -191,6 +198,8 @@ pub fn main() -> ExitCode {
         Command::Eval(args) => run::eval(&args),
         Command::Verify(args) => run::verify(&args),
         Command::Sweep(args) => sweep::execute(&args),
+        Command::Export(args) => export::execute(&args),
+        Command::Store(command) => store::execute(&command),
         Command::Profile(args) => price::profile(&args),
         Command::Price(args) => price::price(&args),
         Command::Data(command) => data::execute(&command),

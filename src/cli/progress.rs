@@ -199,6 +199,12 @@ impl SweepMeter {
     }
 }
 
+/// A number that nobody could have known before.
+pub(super) fn moment() -> u64 {
+    let since = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH);
+    since.map_or(0, |since| since.subsec_nanos().into())
+}
+
 /// `1:02:03`, `2:03` or `3 s`.
 pub(super) fn clock(time: Duration) -> String {
     let seconds = time.as_secs();
