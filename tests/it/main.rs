@@ -14,6 +14,7 @@ mod oracle;
 mod program;
 mod rules;
 mod same_bits;
+mod sweep;
 mod tile;
 mod tile_program;
 mod trace;

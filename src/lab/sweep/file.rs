@@ -225,7 +225,7 @@ mod tests {
     fn what_is_not_said_follows() {
         let sweep = sweep(GRID).unwrap();
         assert_eq!((sweep.name.as_str(), sweep.title.as_str()), ("a-b", "a-b"));
-        assert_eq!(sweep.seeds, []);
+        assert!(sweep.seeds.is_empty());
         let Figures { x, y, series, panel, heat, cost } = sweep.figures;
         assert_eq!((x.as_str(), y.as_str()), ("level_bits", "test_accuracy"));
         assert_eq!((series.as_deref(), panel, cost), (Some("rule"), None, None));

@@ -1,0 +1,232 @@
+//! Sweeps: nothing lost, nothing doubled, whatever is killed, shared, cut up or full.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::process::{Command, Stdio};
+use std::time::Duration;
+
+use serde_json::Value;
+
+use super::program::{Ran, dalean, run};
+
+const SWEEP: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/golden/sweep.toml");
+const RUNS: usize = 12;
+
+fn sweep(store: &Path) -> Command {
+    let mut command = dalean();
+    command.args(["sweep", SWEEP, "--json", "--store"]).arg(store);
+    command
+}
+
+/// The table as CSV.
+fn table(store: &Path) -> String {
+    let ran = run(dalean().arg("export").arg(store));
+    assert_eq!(ran.code, Some(0), "{ran:?}");
+    ran.stdout
+}
+
+fn events(ran: &Ran, name: &str) -> Vec<Value> {
+    let all = ran.stdout.lines().map(|line| serde_json::from_str::<Value>(line).unwrap());
+    all.filter(|event| event["event"] == name).collect()
+}
+
+/// A sweep that nothing disturbed, and its table.
+fn undisturbed() -> (tempfile::TempDir, Ran, String) {
+    let store = tempfile::tempdir().unwrap();
+    let ran = run(&mut sweep(store.path()));
+    assert_eq!(ran.code, Some(0), "{ran:?}");
+    let table = table(store.path());
+    (store, ran, table)
+}
+
+fn folders(store: &Path) -> usize {
+    let groups = std::fs::read_dir(store.join("runs")).unwrap();
+    groups.map(|group| std::fs::read_dir(group.unwrap().path()).unwrap().count()).sum()
+}
+
+#[test]
+fn a_sweep_fills_its_table_and_is_not_done_again() {
+    let (store, ran, table) = undisturbed();
+    let done = ran.last();
+    assert_eq!((&done["event"], &done["finished"]), (&"done".into(), &RUNS.into()));
+    let runs = events(&ran, "run");
+    assert_eq!(runs.len(), RUNS);
+    assert_eq!((table.lines().count(), folders(store.path())), (RUNS + 1, RUNS));
+    let head = table.lines().next().unwrap();
+    assert!(head.starts_with("point,bits,rule,seed,test_accuracy,"), "{head}");
+    // the table says what `train` says of the same configuration
+    let settings = ["data.set=optdigits", "network.hidden=[16]", "network.alpha=4", "learning.batch=64",
+        "learning.epochs=3", "learning.rule=bp", "learning.rate=10", "hw.cell.level_bits=4"];
+    let empty = store.path().join("empty.toml");
+    std::fs::write(&empty, "").unwrap();
+    let mut train = dalean();
+    train.arg("train").arg(&empty).args(["--json", "--seed", "2", "--out"]).arg(store.path());
+    settings.iter().for_each(|setting| drop(train.args(["--set", setting])));
+    let trained = run(&mut train).last();
+    let wanted = |event: &&Value| event["values"] == serde_json::json!([4, "bp"]) && event["seed"] == 2;
+    let same = runs.iter().find(wanted).unwrap();
+    assert_eq!(same["state_hash"], trained["state_hash"]);
+    assert_eq!(same["results"]["test_accuracy"], trained["test_accuracy"]);
+    assert_eq!(same["results"]["cycles"], trained["cycles"]);
+    // a second time there is nothing to do
+    let again = run(&mut sweep(store.path()));
+    assert_eq!((again.code, events(&again, "run").len()), (Some(0), 0), "{again:?}");
+    let dry = run(sweep(store.path()).arg("--dry-run")).last();
+    assert_eq!((&dry["finished"], &dry["todo"]), (&RUNS.into(), &0.into()));
+    // one more bit: only what is new is run
+    let more = std::fs::read_to_string(SWEEP).unwrap().replace("[2, 4, 8]", "[2, 4, 6, 8]");
+    let file = store.path().join("more.toml");
+    std::fs::write(&file, more).unwrap();
+    let grown = run(dalean().arg("sweep").arg(&file).args(["--json", "--store"]).arg(store.path()));
+    assert_eq!((events(&grown, "run").len(), grown.last()["finished"].as_u64()), (4, Some(16)));
+}
+
+#[test]
+fn killed_ten_times_with_two_processes_the_table_is_that_of_an_undisturbed_sweep() {
+    let (_, _, wanted) = undisturbed();
+    let store = tempfile::tempdir().unwrap();
+    let start = || {
+        sweep(store.path()).stdout(Stdio::piped()).stderr(Stdio::null()).spawn().expect("the program starts")
+    };
+    let mut killed = 0;
+    for number in 0..10u64 {
+        let mut children = [start(), start()];
+        // an odd mixture of moments: planning, first runs, between runs
+        let moment = 15 + number * number * 7 % 230;
+        std::thread::sleep(Duration::from_millis(moment));
+        for child in &mut children {
+            killed += usize::from(child.try_wait().unwrap().is_none());
+            child.kill().unwrap();
+            child.wait().unwrap();
+        }
+    }
+    assert!(killed >= 6, "only {killed} processes were still at work when they were killed");
+    let pair = [start(), start()];
+    let pair = pair.map(|child| Ran::from(child.wait_with_output().unwrap()));
+    for ran in &pair {
+        assert_eq!((ran.code, ran.last()["finished"].as_u64()), (Some(0), Some(RUNS as u64)), "{ran:?}");
+    }
+    assert_eq!(table(store.path()), wanted);
+    assert_eq!(folders(store.path()), RUNS);
+}
+
+#[test]
+fn two_processes_share_a_store_without_doing_a_run_twice() {
+    let (_, _, wanted) = undisturbed();
+    let store = tempfile::tempdir().unwrap();
+    let start = || sweep(store.path()).args(["--threads", "1"]).stdout(Stdio::piped()).spawn().unwrap();
+    let pair = [start(), start()].map(|child| Ran::from(child.wait_with_output().unwrap()));
+    let mut done = BTreeMap::new();
+    for ran in &pair {
+        assert_eq!(ran.code, Some(0), "{ran:?}");
+        for event in events(ran, "run") {
+            if event["elsewhere"] == false {
+                *done.entry(event["key"].to_string()).or_insert(0) += 1;
+            }
+        }
+    }
+    assert_eq!(done.len(), RUNS);
+    assert!(done.values().all(|times| *times == 1), "{done:?}");
+    assert_eq!(table(store.path()), wanted);
+}
+
+#[test]
+fn shards_in_stores_of_their_own_merge_into_the_whole() {
+    let (_, _, wanted) = undisturbed();
+    let root = tempfile::tempdir().unwrap();
+    let parts = ["1/3", "2/3", "3/3"].map(|shard| {
+        let store = root.path().join(shard.replace('/', "of"));
+        let ran = run(sweep(&store).args(["--shard", shard]));
+        assert_eq!((ran.code, ran.last()["runs"].as_u64()), (Some(0), Some(4)), "{ran:?}");
+        store
+    });
+    let whole = root.path().join("whole");
+    let merge = |from: &[&Path]| run(dalean().args(["store", "merge", "--json"]).arg(&whole).args(from));
+    let ran = merge(&parts.each_ref().map(AsRef::as_ref));
+    assert_eq!(ran.code, Some(0), "{ran:?}");
+    assert_eq!(table(&whole), wanted);
+    assert_eq!(merge(&[&parts[0]]).last()["shared"], 4);
+    // the index is made again from the folders
+    std::fs::remove_file(whole.join("index.sqlite")).unwrap();
+    let ran = run(dalean().args(["store", "index", "--json"]).arg(&whole));
+    assert_eq!(ran.last()["finished"], RUNS, "{ran:?}");
+    let ran = run(&mut sweep(&whole));
+    assert_eq!((ran.code, events(&ran, "run").len()), (Some(0), 0), "{ran:?}");
+    assert_eq!(table(&whole), wanted);
+    // a run that says something else is not merged in silence
+    let key = wanted.lines().nth(1).unwrap().rsplit(',').nth(1).unwrap();
+    let receipt = parts[0].join("runs").join(&key[..2]).join(key).join("metrics.jsonl");
+    let text = std::fs::read_to_string(&receipt).unwrap();
+    let at = text.rfind("\"state_hash\":\"").unwrap() + 14;
+    let forged = format!("{}{}{}", &text[..at], "0".repeat(64), &text[at + 64..]);
+    std::fs::write(&receipt, forged).unwrap();
+    let ran = merge(&[&parts[0]]);
+    assert_eq!(ran.code, Some(1), "{ran:?}");
+    assert!(ran.stderr.contains("one of the two machines is wrong"), "{ran:?}");
+}
+
+#[test]
+fn a_sample_of_a_store_is_done_again_and_lies_are_found() {
+    let (store, _, _) = undisturbed();
+    let verify = |count: &str| {
+        let path = store.path();
+        run(dalean().arg("verify").arg(path).args(["--json", "--sample", count, "--sample-seed", "1"]))
+    };
+    let ran = verify("3");
+    assert_eq!((ran.code, ran.last()["runs"].as_u64()), (Some(0), Some(3)), "{ran:?}");
+    // an index that flatters
+    let index = rusqlite::Connection::open(store.path().join("index.sqlite")).unwrap();
+    let text = "UPDATE run SET row = replace(row, '\"test_accuracy\":0.', '\"test_accuracy\":1.')";
+    assert_eq!(index.execute(text, []).unwrap(), RUNS);
+    drop(index);
+    let ran = verify("1");
+    assert_eq!(ran.code, Some(4), "{ran:?}");
+    assert!(ran.stderr.contains("the row of run"), "{ran:?}");
+}
+
+/// A limit on the size of files stands for a full disk.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_full_disk_stops_a_sweep_that_goes_on_later() {
+    let (_, _, wanted) = undisturbed();
+    let store = tempfile::tempdir().unwrap();
+    for room in [1, 9, 25] {
+        let line = format!("ulimit -f {room}; trap '' XFSZ; exec \"$0\" sweep \"$2\" --json --store \"$1\"");
+        let mut command = Command::new("bash");
+        command.arg("-c").arg(line).arg(env!("CARGO_BIN_EXE_dalean")).arg(store.path()).arg(SWEEP);
+        let ran = run(&mut command);
+        assert_eq!(ran.code, Some(1), "{room}: {ran:?}");
+        assert!(ran.stderr.contains("free some space"), "{room}: {ran:?}");
+    }
+    let ran = run(&mut sweep(store.path()));
+    assert_eq!(ran.code, Some(0), "{ran:?}");
+    assert_eq!(table(store.path()), wanted);
+}
+
+#[test]
+fn exports_agree() {
+    let (store, _, csv) = undisturbed();
+    let out = store.path().join("table.json");
+    let ran = run(dalean().arg("export").arg(store.path()).arg("--out").arg(&out));
+    assert_eq!(ran.code, Some(0), "{ran:?}");
+    let json: Value = serde_json::from_str(&std::fs::read_to_string(&out).unwrap()).unwrap();
+    let mut reader = csv::Reader::from_reader(csv.as_bytes());
+    let names = reader.headers().unwrap().clone();
+    for (record, object) in reader.records().zip(json.as_array().unwrap()) {
+        for (name, cell) in names.iter().zip(&record.unwrap()) {
+            let wanted = match &object[name] {
+                Value::Null => String::new(),
+                Value::String(text) => text.clone(),
+                number => number.as_f64().unwrap().to_string(),
+            };
+            assert_eq!(cell, wanted, "{name}");
+        }
+    }
+    let out = store.path().join("table.parquet");
+    let ran = run(dalean().arg("export").arg(store.path()).arg("--out").arg(&out));
+    assert!(std::fs::read(&out).unwrap().starts_with(b"PAR1"), "{ran:?}");
+    let ran = run(dalean().arg("export").arg(store.path()).args(["--sweep", "other"]));
+    assert!(ran.code == Some(1) && ran.stderr.contains("it has small"), "{ran:?}");
+    let ran = run(dalean().arg("export").arg(store.path().join("nowhere")));
+    assert!(ran.code == Some(1) && ran.stderr.contains("is no store"), "{ran:?}");
+}
