@@ -119,7 +119,7 @@ pub fn setting_table(setting: &str) -> Result<toml::Table, ConfigError> {
 }
 
 /// Lays `over` on top of `under`: tables merge, everything else is replaced.
-fn overlay(under: &mut toml::Table, over: toml::Table) {
+pub fn overlay(under: &mut toml::Table, over: toml::Table) {
     for (key, value) in over {
         match (under.get_mut(&key), value) {
             (Some(toml::Value::Table(under)), toml::Value::Table(over)) => overlay(under, over),

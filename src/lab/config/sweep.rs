@@ -30,6 +30,16 @@ pub enum ScalarFile {
     Text(String),
 }
 
+/// Which key an axis varies.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(untagged, expecting = "a key, or a list of keys that all get the value")]
+pub enum KeyFile {
+    /// One.
+    One(String),
+    /// All of these, the same value.
+    All(Vec<String>),
+}
+
 macro_rules! keys {
     ($($(#[$doc:meta])* $name:ident { $($(#[$field_doc:meta])* $field:ident: $kind:ty,)* })*) => {$(
         $(#[$doc])*
@@ -67,12 +77,12 @@ keys! {
     }
     /// `[[axis]]`: either `key` with `values` or with `from` and `to`, or cases.
     AxisFile {
-        /// Name of its column; default: the last part of `key`.
+        /// Name of its column; default: the last part of the first `key`.
         name: String,
         /// Words for people; default: the name.
         label: String,
-        /// The key that is varied.
-        key: String,
+        /// The key that is varied, or several that get the same value.
+        key: KeyFile,
         /// Its values.
         values: Vec<ScalarFile>,
         /// The least value.

@@ -3,8 +3,8 @@
 use serde::{Deserialize, Serialize};
 
 use super::SweepError;
-use crate::lab::config::setting;
-use crate::lab::config::sweep::{AxisFile, CaseFile, ScalarFile};
+use crate::lab::config::sweep::{AxisFile, CaseFile, KeyFile, ScalarFile};
+use crate::lab::config::{overlay, setting};
 
 /// Most values of one axis.
 const VALUES_MAX: usize = 100_000;
@@ -82,7 +82,7 @@ enum Source {
     /// A list.
     List(Vec<Choice>),
     /// Any number between two.
-    Range { key: String, from: f64, to: f64, whole: bool },
+    Range { keys: Vec<String>, from: f64, to: f64, whole: bool },
 }
 
 /// An axis, checked.
@@ -101,7 +101,12 @@ impl Axis {
     /// Checks an axis. `sampled`: points are drawn, so a range needs no steps.
     pub(super) fn new(file: AxisFile, sampled: bool) -> Result<Self, SweepError> {
         let AxisFile { name, label, key, values, from, to, scale, steps, case } = file;
-        let last = key.as_ref().and_then(|key| key.rsplit('.').next()).map(str::to_owned);
+        let keys = key.map(|key| match key {
+            KeyFile::One(key) => vec![key],
+            KeyFile::All(keys) => keys,
+        });
+        let first = keys.as_ref().and_then(|keys| keys.first());
+        let last = first.and_then(|key| key.rsplit('.').next()).map(str::to_owned);
         let name = name.or(last).unwrap_or_default();
         let wrong = |what: &str, allowed: &str| SweepError::axis(&name, what, allowed);
         let starts = name.starts_with(|c: char| c.is_ascii_lowercase());
@@ -116,12 +121,12 @@ impl Axis {
             Some("log") => true,
             Some(_) => return Err(wrong("has an unknown `scale`", "use linear or log")),
         };
-        let source = match (key, values, from.zip(to), case) {
-            (Some(key), Some(values), None, None) => Source::List(
-                values.into_iter().map(|value| choice(&key, value.into())).collect(),
+        let source = match (keys, values, from.zip(to), case) {
+            (Some(keys), Some(values), None, None) => Source::List(
+                values.into_iter().map(|value| choice(&keys, value.into())).collect(),
             ),
-            (Some(key), None, Some((from, to)), None) => {
-                range(key, &from.into(), &to.into(), log, steps, sampled)
+            (Some(keys), None, Some((from, to)), None) => {
+                range(keys, &from.into(), &to.into(), log, steps, sampled)
                     .map_err(|(what, allowed)| wrong(what, allowed))?
             }
             (None, None, None, Some(cases)) => {
@@ -170,20 +175,21 @@ impl Axis {
                 let at = ((part * list.len() as f64) as usize).min(list.len() - 1);
                 list[at].clone()
             }
-            Source::Range { key, from, to, whole: true } => {
+            Source::Range { keys, from, to, whole: true } => {
                 // each whole number has an equal share of the way, bent when steps are ratios
                 let value = bend(*from, *to + 1.0, self.log, part).floor().clamp(*from, *to);
-                choice(key, Value::Whole(value as i64))
+                choice(keys, Value::Whole(value as i64))
             }
-            Source::Range { key, from, to, whole: false } => {
-                choice(key, Value::Real(round(bend(*from, *to, self.log, part))))
+            Source::Range { keys, from, to, whole: false } => {
+                choice(keys, Value::Real(round(bend(*from, *to, self.log, part))))
             }
         }
     }
 }
 
-fn choice(key: &str, value: Value) -> Choice {
-    let keys = setting(key, value.to_toml());
+fn choice(names: &[String], value: Value) -> Choice {
+    let mut keys = toml::Table::new();
+    names.iter().for_each(|name| overlay(&mut keys, setting(name, value.to_toml())));
     Choice { value, keys }
 }
 
@@ -206,7 +212,7 @@ fn round(value: f64) -> f64 {
 }
 
 fn range(
-    key: String,
+    keys: Vec<String>,
     from: &Value,
     to: &Value,
     log: bool,
@@ -225,10 +231,10 @@ fn range(
     }
     let Some(steps) = steps else {
         return if sampled {
-            Ok(Source::Range { key, from, to, whole })
+            Ok(Source::Range { keys, from, to, whole })
         } else if whole && !log {
             let values = (from as i64..=to as i64).take(VALUES_MAX + 1);
-            Ok(Source::List(values.map(|value| choice(&key, Value::Whole(value))).collect()))
+            Ok(Source::List(values.map(|value| choice(&keys, Value::Whole(value))).collect()))
         } else {
             Err(("has no `steps`", "say how many values a grid takes from `from` to `to`"))
         };
@@ -241,7 +247,7 @@ fn range(
         let value = bend(from, to, log, f64::from(step) / f64::from(steps - 1));
         let value = if whole { Value::Whole(value.round() as i64) } else { Value::Real(round(value)) };
         if list.last().is_none_or(|last| last.value != value) {
-            list.push(choice(&key, value));
+            list.push(choice(&keys, value));
         }
     }
     Ok(Source::List(list))
@@ -273,6 +279,8 @@ mod tests {
         let one = axis("key = 'hw.cell.level_bits'\nvalues = [3]", false).unwrap();
         assert_eq!((one.name.as_str(), one.label.as_str()), ("level_bits", "level bits"));
         assert_eq!(toml::to_string(&one.list()[0].keys).unwrap(), "[hw.cell]\nlevel_bits = 3\n");
+        let two = axis("key = ['a.b', 'a.c']\nvalues = [3]", false).unwrap();
+        assert_eq!(toml::to_string(&two.list()[0].keys).unwrap(), "[a]\nb = 3\nc = 3\n");
     }
 
     #[test]
@@ -307,6 +315,7 @@ mod tests {
             ("key = 'a'\nfrom = 0\nto = 2\nscale = 'log'", "above 0"),
             ("key = 'a'\nfrom = 'x'\nto = 2", "words"),
             ("key = 'a-b'\nvalues = [1]", "give it a `name`"),
+            ("key = []\nvalues = [1]", "give it a `name`"),
         ] {
             let error = axis(text, false).unwrap_err();
             assert!(error.contains(wanted), "{text}: {error}");
