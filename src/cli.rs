@@ -22,6 +22,7 @@ mod data;
 mod hw;
 mod price;
 mod progress;
+mod report;
 mod run;
 mod trace;
 
@@ -74,6 +75,8 @@ enum Command {
     Profile(price::ProfileArgs),
     /// Price a finished run: joules and seconds, with its own constants or another chip's
     Price(price::PriceArgs),
+    /// Draw the page of a run again, from what is in its folder
+    Report(report::ReportArgs),
     /// Show and fetch data sets
     #[command(subcommand)]
     Data(data::DataCommand),
@@ -188,6 +191,7 @@ pub fn main() -> ExitCode {
         Command::Verify(args) => run::verify(&args),
         Command::Profile(args) => price::profile(&args),
         Command::Price(args) => price::price(&args),
+        Command::Report(args) => report::execute(&args),
         Command::Data(command) => data::execute(&command),
         Command::Hw(command) => hw::execute(&command),
         Command::Trace(args) => trace::execute(&args),

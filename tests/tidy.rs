@@ -23,7 +23,7 @@ const HOUSE: [(&str, &[&str]); 6] = [
     ("learn", &["error", "route", "statistics", "rule", "driver"]),
     ("task", &["classify"]),
     ("lab", &["data", "config", "store", "price", "wave", "table", "report", "run", "sweep"]),
-    ("cli", &["progress", "data", "hw", "run", "price", "trace", "bench"]),
+    ("cli", &["progress", "data", "hw", "run", "report", "price", "trace", "bench"]),
 ];
 
 /// Wings that know no floats, clocks, hash maps, environment or files.

@@ -1,6 +1,8 @@
 //! Line charts as inline SVG: axes, lines, bars, labels at the line ends, and bands the pointer reads values from.
 //! Colours and type come from the page's style sheet.
 
+mod margin;
+
 use std::fmt::Write as _;
 
 use super::number::{escape, place};
