@@ -21,13 +21,6 @@ pub(super) fn dashed(name: &str) -> bool {
     name.ends_with('n')
 }
 
-/// The style-sheet colour of a layer; colours return after six layers.
-pub(super) fn layer(layer: usize) -> &'static str {
-    const LAYERS: [&str; 6] =
-        ["var(--a)", "var(--b)", "var(--c)", "var(--d)", "var(--e)", "var(--f)"];
-    LAYERS[layer % LAYERS.len()]
-}
-
 /// Dark violet through green to yellow: anchors at equal steps of lightness, straight lines between.
 const ANCHORS: [[f64; 3]; 10] = [
     [68.0, 1.0, 84.0],

@@ -7,7 +7,9 @@ use crate::lab::report::number::{escape, place};
 use crate::lab::report::scale::Axis;
 
 /// Space between the plot and its margin.
-const GAP: f64 = 14.0;
+const GAP: f64 = 26.0;
+/// Space that the text of a tick takes.
+const TICK: f64 = 34.0;
 
 impl Chart {
     /// A picture between two values of each axis, one pixel a cell.
@@ -34,8 +36,13 @@ impl Chart {
     /// The axis of the margin.
     pub(in crate::lab::report) fn margin(&mut self, axis: &Axis) {
         let (base, top) = (self.base(), self.top);
+        let mut free = f64::NEG_INFINITY;
         for (tick, text) in &axis.ticks {
             let x = self.across(axis, *tick);
+            if x < free {
+                continue;
+            }
+            free = x + TICK;
             self.segment("grid", x, top, x, base);
             self.text("tick middle", x, base + 17.0, text);
         }
@@ -60,7 +67,8 @@ impl Chart {
         let [left, top, wide, high] = [left, top, wide, base - top].map(place);
         let _ = write!(
             self.body,
-            "<rect x=\"{left}\" y=\"{top}\" width=\"{wide}\" height=\"{high}\" fill=\"{colour}\" fill-opacity=\"0.85\"/>"
+            "<rect x=\"{left}\" y=\"{top}\" width=\"{wide}\" height=\"{high}\" fill=\"{colour}\" fill-opacity=\"0.85\" \
+             shape-rendering=\"crispEdges\"/>"
         );
     }
 

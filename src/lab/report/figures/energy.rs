@@ -7,7 +7,7 @@ use crate::lab::config::Kind;
 use crate::lab::price::{Cost, Group, prefixed};
 use crate::lab::report::RunView;
 use crate::lab::report::chart::{Chart, Series};
-use crate::lab::report::number::{escape, float, percent, place, size};
+use crate::lab::report::number::{escape, float, percent, place, share, size};
 use crate::lab::report::scale::{Axis, round};
 
 /// Components drawn as lines, each with its own colour and dashes.
@@ -35,7 +35,7 @@ pub(super) fn draw(view: &RunView<'_>) -> Option<Figure> {
     let table =
         |&(name, groups): &(&str, &Vec<Group>)| groups_table(name, groups, joules[1], &scale);
     // the two halves of the figure come out about as long as one another
-    let (left, right) = (cuts[..2].iter().map(table), cuts[2..].iter().map(table));
+    let (left, right) = (cuts[..1].iter().map(table), cuts[1..].iter().map(table));
     let (left, right) = (left.collect::<String>(), right.collect::<String>());
     let [low, typical, high] = joules.map(|joules| prefixed(joules, "J"));
     let missing: Vec<_> = cost.missing.iter().map(|one| one.what.replace('_', " ")).collect();
@@ -66,13 +66,16 @@ pub(super) fn draw(view: &RunView<'_>) -> Option<Figure> {
 fn lines(view: &RunView<'_>, cost: &Cost) -> String {
     let events = cost.components.iter().filter_map(|group| {
         let each = cost.each.iter().find(|(_, component, _)| *component == group.name)?;
-        Some((group.name.replace('_', " "), each.0, each.2))
+        let counts = per_epoch(view, "training", each.0);
+        // what only happens before the first update is no line
+        let some = counts.iter().any(|&(_, count)| count > 0);
+        some.then(|| (group.name.replace('_', " "), counts, each.2))
     });
     let series: Vec<Series> = events
         .zip(LINES)
-        .map(|((name, event, joules), (hue, dashed))| {
-            let counts = per_epoch(view, "training", event).into_iter();
-            let points = counts.map(|(epoch, count)| (epoch, 1e12 * joules * float(count)));
+        .map(|((name, counts, joules), (hue, dashed))| {
+            let points =
+                counts.into_iter().map(|(epoch, count)| (epoch, 1e12 * joules * float(count)));
             Series::new(&name, hue, points.collect()).dashed(dashed)
         })
         .collect();
@@ -129,14 +132,14 @@ impl Decades {
     }
 }
 
-const WIDTH: f64 = 150.0;
+const WIDTH: f64 = 128.0;
 const HEIGHT: f64 = 16.0;
 
 fn groups_table(name: &str, groups: &[Group], total: f64, scale: &Decades) -> String {
     let mut rows = String::new();
     for group in groups {
         let [low, typical, high] = group.joules;
-        let share = if total > 0.0 { percent(typical / total, 1) } else { "–".into() };
+        let part = if total > 0.0 { share(typical / total) } else { "–".into() };
         let [a, b, c] = group.joules.map(|joules| place(scale.place(joules)));
         let bounds = format!(
             "<svg class=\"bounds\" viewBox=\"0 0 {WIDTH} {HEIGHT}\" width=\"{WIDTH}\" height=\"{HEIGHT}\" aria-hidden=\"true\">\
@@ -147,7 +150,7 @@ fn groups_table(name: &str, groups: &[Group], total: f64, scale: &Decades) -> St
         let _ = write!(
             rows,
             "<tr><th scope=\"row\">{}</th><td>{bounds}</td><td>{low}</td><td><b>{typical}</b></td><td>{high}</td>\
-             <td>{share}</td></tr>",
+             <td>{part}</td></tr>",
             escape(&group.name.replace('_', " "))
         );
     }
@@ -177,7 +180,7 @@ fn constants(cost: &Cost) -> String {
              <td>{kind}</td></tr>",
             escape(&one.key),
             place(100.0 * one.share),
-            percent(one.share, 1)
+            share(one.share)
         );
     }
     if rows.is_empty() {

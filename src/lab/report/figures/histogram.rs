@@ -19,8 +19,9 @@ pub(super) fn draw(view: &RunView<'_>) -> Option<Figure> {
     for layer in view.layers() {
         let scale = LevelScale::of(view, layer);
         // One margin for the whole layer.
-        let shares = of_layer(last, layer)
-            .flat_map(|one| one.histogram.iter().map(|&n| drawn_percent(n, one.cells)));
+        let ends = [first, last].into_iter().flat_map(|record| of_layer(record, layer));
+        let shares =
+            ends.flat_map(|one| one.histogram.iter().map(|&n| drawn_percent(n, one.cells)));
         let high = shares.fold(0.0, f64::max);
         let charts = of_layer(last, layer).map(|now| {
             let mean = ratio(quotient(now.levels, now.cells));
@@ -91,7 +92,7 @@ fn chart(view: &RunView<'_>, now: &PathwayRecord, scale: &LevelScale, high: f64)
     x.scale =
         Scale { curve: Curve::Linear, from: f64::from(from) - half, to: f64::from(to) + half };
     let top = scale.edge(scale.bins);
-    let mut chart = Chart::new(540.0, 250.0, 172.0, x, Axis::levels(top, "level"));
+    let mut chart = Chart::new(540.0, 250.0, 184.0, x, Axis::levels(top, "level"));
     if let Some(uri) = strip(&arrays, scale.bins) {
         chart.picture((f64::from(from) - half, f64::from(to) + half), (0.0, top), &uri);
     }

@@ -10,8 +10,8 @@ use crate::lab::report::{Picture, RunView, colour};
 const PAIRS: usize = 6;
 /// Pictures of each.
 const EACH: usize = 4;
-/// Other pictures drawn at most.
-const OTHERS: usize = 24;
+/// Other pictures drawn at most: a row, or more where there are no confusions to draw.
+const OTHERS: [usize; 2] = [12, 36];
 
 pub(super) fn draw(view: &RunView<'_>) -> Option<Figure> {
     let confusions = view.receipt.test.as_ref().map(|test| test.confusions()).unwrap_or_default();
@@ -42,7 +42,7 @@ pub(super) fn draw(view: &RunView<'_>) -> Option<Figure> {
     }
     let others = view.pictures.iter().filter(|picture| !drawn.contains(&picture.example));
     let others: String = others
-        .take(OTHERS)
+        .take(OTHERS[usize::from(pairs.is_empty())])
         .filter_map(|picture| tile(view, picture, &pair(view, picture.truth, picture.guess)))
         .collect();
     if pairs.is_empty() && others.is_empty() {

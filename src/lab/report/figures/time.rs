@@ -1,14 +1,13 @@
 //! Where the cycles go: phases, stages of training, parts of layers.
 
+use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
 use super::Figure;
 use crate::chip::ledger::{During, Part};
 use crate::lab::price::{prefixed, stages};
 use crate::lab::report::RunView;
-use crate::lab::report::number::{
-    count, escape, float, percent, percent_of, place, quotient, short,
-};
+use crate::lab::report::number::{count, escape, float, percent_of, place, quotient, share, short};
 use crate::lab::store::ledger::{CyclesRecord, LayerCycles};
 
 /// The phase that is taken apart.
@@ -28,8 +27,8 @@ pub(super) fn draw(view: &RunView<'_>) -> Option<Figure> {
         .iter()
         .map(|(name, cycles)| row(&escape(name), cycles.elapsed, elapsed, &time, ""))
         .collect();
-    let mut left = table("Phase", "of the run", "", &rows);
-    let mut right = String::new();
+    let phases_table = table("Phase", "of the run", "", &rows);
+    let (mut busy, mut below) = (String::new(), String::new());
     let mut each = String::new();
     if let Some(training) = phases.get(TRAINING).filter(|training| training.elapsed > 0) {
         let rows: String = stages(training)
@@ -42,8 +41,11 @@ pub(super) fn draw(view: &RunView<'_>) -> Option<Figure> {
                 row(stage.stage.name(), stage.cycles, training.elapsed, &time, &critical)
             })
             .collect();
-        left += &table("Stage of training", "of training", "most at work", &rows);
-        right = matrices(training);
+        let names = During::ALL.map(|during| during.name());
+        busy = matrix("A layer is busy with", training, &names, &|layer| &layer.busy);
+        below = table("Stage of training", "of training", "most at work, of the stage", &rows);
+        let names = Part::ALL.map(|part| part.name());
+        below += &matrix("Parts of a layer at work", training, &names, &|layer| &layer.used);
         if let Some(updates) = view.last().map(|last| last.updates).filter(|&updates| updates > 0) {
             let cycles = training.elapsed / updates;
             each = format!(
@@ -63,7 +65,9 @@ pub(super) fn draw(view: &RunView<'_>) -> Option<Figure> {
             prefixed(seconds, "s"),
             short(elapsed)
         ),
-        body: format!("<div class=\"halves\"><div>{left}</div><div>{right}</div></div>"),
+        body: format!(
+            "<div class=\"halves\"><div>{phases_table}</div><div>{busy}</div></div>{below}"
+        ),
         wide: true,
     })
 }
@@ -79,35 +83,26 @@ fn table(what: &str, whole: &str, more: &str, rows: &str) -> String {
 }
 
 fn row(name: &str, part: u64, whole: u64, time: &dyn Fn(u64) -> String, more: &str) -> String {
-    let share = quotient(part, whole).unwrap_or(0.0);
+    let fraction = quotient(part, whole).unwrap_or(0.0);
     let more = if more.is_empty() { String::new() } else { format!("<td>{more}</td>") };
     format!(
         "<tr><th scope=\"row\">{name}</th><td class=\"meter\"><i style=\"width:{}%\"></i></td><td>{}</td><td>{}</td>\
          <td>{}</td>{more}</tr>",
-        place(100.0 * share),
-        percent(share, 1),
+        place(100.0 * fraction),
+        share(fraction),
         short(part),
         time(part)
     )
 }
 
-/// Layers down; operations and parts across.
-fn matrices(training: &CyclesRecord) -> String {
-    let busy = During::ALL.map(|during| during.name());
-    let used = Part::ALL.map(|part| part.name());
-    let of_busy = |layer: &LayerCycles, name: &str| layer.busy.get(name).copied().unwrap_or(0);
-    let of_used = |layer: &LayerCycles, name: &str| layer.used.get(name).copied().unwrap_or(0);
-    matrix("A layer is busy with", training, &busy, &of_busy)
-        + &matrix("Its parts at work", training, &used, &of_used)
-}
-
-/// Shares of the time of training; columns in which nothing happened are left out.
+/// Layers down, shares of the time of training; columns in which nothing happened are left out.
 fn matrix(
     heading: &str,
     training: &CyclesRecord,
     names: &[&str],
-    of: &dyn Fn(&LayerCycles, &str) -> u64,
+    of: &dyn Fn(&LayerCycles) -> &BTreeMap<String, u64>,
 ) -> String {
+    let of = |layer: &LayerCycles, name: &str| of(layer).get(name).copied().unwrap_or(0);
     let names: Vec<&str> = names
         .iter()
         .copied()
@@ -122,12 +117,12 @@ fn matrix(
     for (at, layer) in training.layers.iter().enumerate() {
         let _ = write!(rows, "<tr><th scope=\"row\">layer {at}</th>");
         for name in &names {
-            let share = quotient(of(layer, name), training.elapsed).unwrap_or(0.0);
-            let text = if share > 0.0 { percent(share, 1) } else { "–".into() };
+            let part = quotient(of(layer, name), training.elapsed).unwrap_or(0.0);
+            let text = if part > 0.0 { share(part) } else { "–".into() };
             let _ = write!(
                 rows,
                 "<td class=\"shade\" style=\"--share:{}%\">{text}</td>",
-                place(60.0 * share.min(1.0))
+                place(60.0 * part.min(1.0))
             );
         }
         rows += "</tr>";

@@ -30,7 +30,7 @@ pub(super) fn charts(view: &RunView<'_>) -> Vec<Option<String>> {
         let mut x = Axis::epochs(first, last);
         x.scale.from -= 2.0 * half;
         x.scale.to += 2.0 * half;
-        let mut chart = Chart::new(372.0, 270.0, 16.0, x, y);
+        let mut chart = Chart::new(372.0, 270.0, 100.0, x, y);
         let mut tips = Vec::new();
         for (record, births, deaths, cells) in sums(layer) {
             let epoch = f64::from(record.epoch);
@@ -59,6 +59,12 @@ pub(super) fn charts(view: &RunView<'_>) -> Vec<Option<String>> {
             ));
         }
         chart.rule(0.0, "");
+        let end = sums(layer).last().into_iter();
+        chart.beside(end.flat_map(|(_, births, deaths, cells)| {
+            let half = |count: u64| drawn_percent(count, cells) / 2.0;
+            [(half(births), "births", births), (-half(deaths), "deaths", deaths)]
+                .map(|(at, name, count)| (at, format!("{name} {}", percent_of(count, cells, 1))))
+        }));
         chart.tips(&tips);
         Some(chart.finish(&format!("Births and deaths in layer {layer} over epochs")))
     });
