@@ -52,23 +52,25 @@ impl Chart {
         self.text("label middle", x, self.height - 6.0, &axis.label);
     }
 
-    /// A bar of the margin over an interval of the vertical axis.
-    pub(in crate::lab::report) fn margin_bar(
+    /// Bars of the margin, each over an interval of the vertical axis.
+    pub(in crate::lab::report) fn margin_bars(
         &mut self,
         axis: &Axis,
-        y: (f64, f64),
-        value: f64,
+        bars: impl Iterator<Item = ((f64, f64), f64)>,
         colour: &str,
     ) {
-        let (left, right) = (self.across(axis, axis.scale.from), self.across(axis, value));
-        let (base, top) = (self.y(y.0), self.y(y.1));
-        // too thin to be seen, but there
-        let wide = if value > 0.0 { (right - left).max(0.6) } else { 0.0 };
-        let [left, top, wide, high] = [left, top, wide, base - top].map(place);
+        let from = self.across(axis, axis.scale.from);
+        let left = place(from);
+        let mut path = String::new();
+        for ((low, high), value) in bars.filter(|(_, value)| *value > 0.0) {
+            // at least wide enough to be seen
+            let right = place(self.across(axis, value).max(from + 0.6));
+            let (base, top) = (place(self.y(low)), place(self.y(high)));
+            let _ = write!(path, "M{left} {base}H{right}V{top}H{left}z");
+        }
         let _ = write!(
             self.body,
-            "<rect x=\"{left}\" y=\"{top}\" width=\"{wide}\" height=\"{high}\" fill=\"{colour}\" fill-opacity=\"0.85\" \
-             shape-rendering=\"crispEdges\"/>"
+            "<path d=\"{path}\" fill=\"{colour}\" fill-opacity=\"0.85\" shape-rendering=\"crispEdges\"/>"
         );
     }
 

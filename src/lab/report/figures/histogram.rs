@@ -151,10 +151,9 @@ fn margin(
         drawn_percent(one.histogram.get(bin).copied().unwrap_or(0), one.cells)
     };
     let gap = if scale.bins > 40 { 0.0 } else { 0.06 * scale.width };
-    for bin in 0..scale.bins {
-        let ends = (scale.edge(bin) + gap, scale.edge(bin + 1) - gap);
-        chart.margin_bar(&axis, ends, share(now, bin), hue(now));
-    }
+    let bars = (0..scale.bins)
+        .map(|bin| ((scale.edge(bin) + gap, scale.edge(bin + 1) - gap), share(now, bin)));
+    chart.margin_bars(&axis, bars, hue(now));
     let first =
         view.epochs.first().filter(|first| view.last().map(|r| r.epoch) != Some(first.epoch));
     let then = first.and_then(|first| same(first, now));
