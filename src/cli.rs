@@ -19,11 +19,14 @@ use crate::lab::run::Machine;
 
 mod bench;
 mod data;
+mod export;
 mod hw;
 mod price;
 mod progress;
 mod report;
 mod run;
+mod store;
+mod sweep;
 mod trace;
 
 /// What stops a command.
@@ -71,6 +74,13 @@ enum Command {
     Eval(run::EvalArgs),
     /// Do a run again and compare every state hash
     Verify(run::VerifyArgs),
+    /// Carry out many runs from one file, and keep them in a store
+    Sweep(sweep::SweepArgs),
+    /// Write the table of a sweep as CSV, JSON or Parquet
+    Export(export::ExportArgs),
+    /// List, merge and mend stores of runs
+    #[command(subcommand)]
+    Store(store::StoreCommand),
     /// Say what one update and one inference cost: cycles, critical parts, energy
     Profile(price::ProfileArgs),
     /// Price a finished run: joules and seconds, with its own constants or another chip's
@@ -170,7 +180,8 @@ fn configuration(
             (path.display().to_string(), text)
         }
     };
-    let sources = Sources { experiment: Some((&name, &text)), hardware: hw, settings, seed };
+    let experiment = Some((&*name, &*text));
+    let sources = Sources { experiment, hardware: hw, settings, seed, ..Sources::default() };
     config::load(&sources).map_err(|error| usage(&error.to_string()))
 }
 
@@ -189,6 +200,9 @@ pub fn main() -> ExitCode {
         Command::Train(args) => run::train(&args),
         Command::Eval(args) => run::eval(&args),
         Command::Verify(args) => run::verify(&args),
+        Command::Sweep(args) => sweep::execute(&args),
+        Command::Export(args) => export::execute(&args),
+        Command::Store(command) => store::execute(&command),
         Command::Profile(args) => price::profile(&args),
         Command::Price(args) => price::price(&args),
         Command::Report(args) => report::execute(&args),

@@ -6,5 +6,6 @@ pub mod price;
 pub mod report;
 pub mod run;
 pub mod store;
+pub mod sweep;
 pub mod table;
 pub mod wave;

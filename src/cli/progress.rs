@@ -112,8 +112,110 @@ impl Meter {
     }
 }
 
+/// Shows how far a sweep is.
+#[derive(Debug)]
+pub(super) struct SweepMeter {
+    bar: Option<ProgressBar>,
+    quiet: bool,
+    started: Instant,
+    last_line: Instant,
+    done: f64,
+    total: f64,
+    finished: usize,
+    runs: usize,
+}
+
+impl SweepMeter {
+    /// A meter; silent when `quiet`.
+    pub(super) fn new(quiet: bool) -> Self {
+        let now = Instant::now();
+        let bar = (!quiet && std::io::stderr().is_terminal()).then(|| {
+            let bar = ProgressBar::new(0);
+            let style = ProgressStyle::with_template("{bar:30} {pos}/{len} runs  {msg}");
+            bar.set_style(style.expect("a valid template"));
+            bar
+        });
+        Self {
+            bar,
+            quiet,
+            started: now,
+            last_line: now,
+            done: 0.0,
+            total: 0.0,
+            finished: 0,
+            runs: 0,
+        }
+    }
+
+    /// Notes what there is to do.
+    pub(super) fn start(&mut self, finished: usize, todo: usize, work: f64) {
+        (self.finished, self.runs, self.total) = (finished, finished + todo, work);
+        self.started = Instant::now();
+        if let Some(bar) = &self.bar {
+            bar.set_length(self.runs as u64);
+            bar.set_position(finished as u64);
+        }
+        if finished > 0 {
+            self.line(&format!("{finished} of {} runs are finished already", self.runs));
+        }
+    }
+
+    fn to_go(&self) -> String {
+        let seconds = self.started.elapsed().as_secs_f64();
+        if self.done <= 0.0 || seconds < 1.0 {
+            return "...".into();
+        }
+        let left = (self.total - self.done).max(0.0) / self.done * seconds;
+        clock(Duration::from_secs_f64(left.min(1e9)))
+    }
+
+    /// Notes work done.
+    pub(super) fn work(&mut self, work: f64) {
+        self.done += work;
+        if let Some(bar) = &self.bar {
+            bar.set_message(format!("{} to go", self.to_go()));
+        } else if !self.quiet && self.last_line.elapsed() >= Duration::from_secs(LINE_SECONDS) {
+            self.last_line = Instant::now();
+            eprintln!("{}/{} runs, {} to go", self.finished, self.runs, self.to_go());
+        }
+    }
+
+    /// Notes a finished run.
+    pub(super) fn finished(&mut self, what: &str) {
+        self.finished += 1;
+        if let Some(bar) = &self.bar {
+            bar.set_position(self.finished as u64);
+        }
+        self.line(&format!("{:>5}/{}  {what}", self.finished, self.runs));
+    }
+
+    /// Prints a line above the bar.
+    pub(super) fn line(&mut self, line: &str) {
+        self.last_line = Instant::now();
+        match &self.bar {
+            _ if self.quiet => {}
+            Some(bar) => bar.println(line),
+            None => eprintln!("{line}"),
+        }
+    }
+
+    /// Takes the bar away and gives the seconds since the start.
+    pub(super) fn finish(&self) -> f64 {
+        if let Some(bar) = &self.bar {
+            bar.finish_and_clear();
+        }
+        self.started.elapsed().as_secs_f64()
+    }
+}
+
+/// A number that nobody could have known before.
+pub(super) fn moment() -> u64 {
+    let since = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH);
+    since.map_or(0, |since| since.subsec_nanos().into())
+}
+
 /// `1:02:03`, `2:03` or `3 s`.
-fn clock(time: Duration) -> String {
+pub(super) fn clock(time: Duration) -> String {
     let seconds = time.as_secs();
     match (seconds / 3600, seconds / 60 % 60, seconds % 60) {
         (0, 0, s) => format!("{s} s"),

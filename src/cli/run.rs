@@ -9,8 +9,10 @@ use serde_json::json;
 
 use super::progress::Meter;
 use super::{Done, Failure, Shared, configuration, environment, say};
-use crate::lab::run::{self, Event, Outcome, RunError, Verdict};
+use crate::lab::run::{self, Event, Machine, Outcome, RunError, Verdict};
+use crate::lab::store::index::Store;
 use crate::lab::store::record::TestRecord;
+use crate::lab::sweep::{self, Sampled};
 
 #[derive(Debug, Args)]
 pub(super) struct TrainArgs {
@@ -45,11 +47,17 @@ pub(super) struct EvalArgs {
 
 #[derive(Debug, Args)]
 pub(super) struct VerifyArgs {
-    /// Folder of a run
+    /// Folder of a run, or a store
     run: PathBuf,
     /// Compare only the first N epochs
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", conflicts_with = "sample")]
     epochs: Option<u32>,
+    /// A store: draw N of its finished runs and do them again
+    #[arg(long, value_name = "N")]
+    sample: Option<usize>,
+    /// Which runs are drawn [default: from the clock, and printed]
+    #[arg(long, value_name = "N", requires = "sample")]
+    sample_seed: Option<u64>,
     #[command(flatten)]
     shared: Shared,
 }
@@ -66,7 +74,7 @@ impl From<RunError> for Failure {
 }
 
 /// Set when the user asks to stop; the run then ends after the batch in progress.
-fn stop_flag() -> Arc<AtomicBool> {
+pub(super) fn stop_flag() -> Arc<AtomicBool> {
     let flag = Arc::new(AtomicBool::new(false));
     let set = Arc::clone(&flag);
     // a second request ends the process at once
@@ -205,6 +213,9 @@ pub(super) fn verify(args: &VerifyArgs) -> Done {
     let shared = &args.shared;
     let stop = stop_flag();
     let machine = shared.machine()?;
+    if let Some(count) = args.sample {
+        return sample(args, count, machine, &stop);
+    }
     let total = args.epochs.unwrap_or(0);
     let mut meter = Meter::new(shared.quiet || shared.json, total);
     let verdict =
@@ -232,4 +243,53 @@ pub(super) fn verify(args: &VerifyArgs) -> Done {
             message: format!("{what} differs: the run says {wanted}, this machine finds {found}"),
         }),
     }
+}
+
+/// Does some runs of a store again.
+fn sample(args: &VerifyArgs, count: usize, machine: Machine, stop: &AtomicBool) -> Done {
+    let shared = &args.shared;
+    let store = Store::existing(&args.run)?;
+    // whoever made the store shall not know which runs will be looked at
+    let seed = args.sample_seed.unwrap_or_else(|| super::progress::moment());
+    let mut same = 0;
+    let mut different = None;
+    let mut on_run = |number: usize, sampled: &Sampled| match &sampled.verdict {
+        Verdict::Same { epochs, state_hash, .. } => {
+            same += 1;
+            if shared.json {
+                say(&json!({"event": "run", "key": sampled.key, "verified": true, "state_hash": state_hash})
+                    .to_string());
+            } else if !shared.quiet {
+                say(&format!(
+                    "{number:>4}/{count}  {}  {epochs} state hashes are the same",
+                    sampled.key
+                ));
+            }
+        }
+        Verdict::Different { what, wanted, found } => {
+            let text = format!(
+                "run {}: {what} differs: the store says {wanted}, this machine finds {found}",
+                sampled.key
+            );
+            if shared.json {
+                say(&json!({"event": "run", "key": sampled.key, "verified": false, "message": text}).to_string());
+            }
+            eprintln!("{text}");
+            different.get_or_insert(text);
+        }
+    };
+    let mut go_on = |_| !stop.load(Ordering::SeqCst);
+    let root = shared.data_root();
+    let runs = sweep::sample(&store, count, seed, &root, machine, &mut on_run, &mut go_on)?;
+    if let Some(message) = different {
+        return Err(Failure { code: 4, message });
+    }
+    let again = format!("--sample {count} --sample-seed {seed}");
+    if shared.json {
+        say(&json!({"event": "done", "verified": true, "runs": runs, "sample_seed": seed})
+            .to_string());
+    } else {
+        say(&format!("verified: {same} runs drawn with {again} give the same bits"));
+    }
+    Ok(())
 }

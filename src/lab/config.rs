@@ -7,15 +7,16 @@
 mod check;
 mod chip;
 mod data;
-mod file;
+pub mod file;
 mod hardware;
 mod layers;
 mod quantity;
+pub mod sweep;
 
 pub use check::{Config, DataConfig, Select, TrainOn};
 pub use file::{ExperimentFile, HardwareFile};
 pub use hardware::{Model, builtin_models, load_model, model_names};
-pub use layers::{Sources, load};
+pub use layers::{Overlay, Sources, load, setting, setting_table};
 pub use quantity::{Constant, Constants, Kind, Per, QUANTITIES, Quantity, Table};
 
 /// Why a configuration cannot be used. Each message says where, what was found, what is allowed.

@@ -14,7 +14,7 @@ pub use profile::{Act, Profile, profile};
 pub use report::{ReportMade, report};
 pub use repriced::{Repriced, reprice};
 pub use session::{Machine, Session};
-pub use train::{Event, Outcome, evaluate, resume, train};
+pub use train::{Event, Keeping, Outcome, carry_on, evaluate, resume, train};
 pub use verify::{Verdict, verify};
 
 use crate::chip::layer::PlanError;

@@ -10,12 +10,16 @@
 //! report.html             for people
 //! ```
 //!
+//! Many runs make a store: folders named by what decides their result ([`address`]), and an index ([`index`]).
+//!
 //! Every file is written beside its place and moved into it, records before the checkpoint, so that a run that is
 //! killed is loadable up to its last finished epoch.
 
+pub mod address;
 pub mod checkpoint;
 pub mod folder;
 pub mod hash;
+pub mod index;
 pub mod ledger;
 pub mod record;
 

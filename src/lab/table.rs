@@ -3,6 +3,10 @@
 //! A column is an axis of the sweep, the seed, a result, or a name (keys, hashes, links). Cells may be missing: a run
 //! that is not finished has axes and no results.
 
+mod write;
+
+pub use write::{Format, WriteError};
+
 /// What a column's numbers are measured in; says how to print them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Unit {

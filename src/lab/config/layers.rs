@@ -1,4 +1,4 @@
-//! Laying texts over one another: built-in defaults, experiment file, hardware model, `--hw`, `--set`.
+//! Laying texts over one another: built-in defaults, hardware model, experiment file, a sweep's keys, `--set`, `--hw`.
 
 use super::file::{ExperimentFile, HardwareFile};
 use super::{Config, ConfigError, check, hardware};
@@ -8,12 +8,23 @@ use super::{Config, ConfigError, check, hardware};
 pub struct Sources<'a> {
     /// Name and text of the experiment file.
     pub experiment: Option<(&'a str, &'a str)>,
+    /// What a sweep sets, weakest first.
+    pub overlays: &'a [Overlay<'a>],
     /// `--hw`: model name or path.
     pub hardware: Option<&'a str>,
     /// `--set key=value`, in order.
     pub settings: &'a [String],
     /// `--seed`.
     pub seed: Option<u64>,
+}
+
+/// Keys that a sweep sets.
+#[derive(Debug, Clone, Copy)]
+pub struct Overlay<'a> {
+    /// Who sets them, for messages.
+    pub place: &'a str,
+    /// The keys.
+    pub table: &'a toml::Table,
 }
 
 /// Reads and checks a configuration.
@@ -25,6 +36,10 @@ pub fn load(sources: &Sources<'_>) -> Result<Config, ConfigError> {
     if let Some((name, text)) = sources.experiment {
         let _: ExperimentFile = parse(name, text)?;
         overlay(&mut table, parse(name, text)?);
+    }
+    for Overlay { place, table: over } in sources.overlays {
+        let _: ExperimentFile = table_of(place, over)?;
+        overlay(&mut table, (*over).clone());
     }
     for setting in sources.settings {
         overlay(&mut table, setting_table(setting)?);
@@ -57,19 +72,41 @@ pub fn load(sources: &Sources<'_>) -> Result<Config, ConfigError> {
     overlay(&mut hw, own);
     hw.remove("model");
     table.insert("hw".into(), toml::Value::Table(hw));
-    let file: ExperimentFile = table.try_into().map_err(|e: toml::de::Error| {
-        ConfigError::Text { place: "configuration".into(), error: e.to_string() }
-    })?;
-    check::config(file)
+    check::config(table_of("configuration", &table)?)
 }
 
-fn parse<T: serde::de::DeserializeOwned>(place: &str, text: &str) -> Result<T, ConfigError> {
+/// A table as what its keys mean.
+fn table_of(place: &str, table: &toml::Table) -> Result<ExperimentFile, ConfigError> {
+    let error =
+        |e: toml::de::Error| ConfigError::Text { place: place.into(), error: e.to_string() };
+    table.clone().try_into().map_err(error)
+}
+
+/// One key with its value as a table: `hw.cell.level_bits` and 4 make `{ hw = { cell = { level_bits = 4 } } }`.
+#[must_use]
+pub fn setting(key: &str, value: toml::Value) -> toml::Table {
+    let mut parts = key.rsplit('.');
+    let last = parts.next().unwrap_or(key);
+    let mut table = toml::Table::from_iter([(last.to_owned(), value)]);
+    for part in parts {
+        table = toml::Table::from_iter([(part.to_owned(), toml::Value::Table(table))]);
+    }
+    table
+}
+
+pub(super) fn parse<T: serde::de::DeserializeOwned>(
+    place: &str,
+    text: &str,
+) -> Result<T, ConfigError> {
     toml::from_str(text)
         .map_err(|e| ConfigError::Text { place: place.into(), error: e.to_string() })
 }
 
 /// `key=value` as a table: the value as TOML, or as a bare word.
-fn setting_table(setting: &str) -> Result<toml::Table, ConfigError> {
+///
+/// # Errors
+/// When it is no setting, or its key is unknown.
+pub fn setting_table(setting: &str) -> Result<toml::Table, ConfigError> {
     let Some((key, value)) = setting.split_once('=') else {
         return Err(ConfigError::Value {
             key: format!("--set {setting}"),

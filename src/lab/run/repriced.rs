@@ -1,12 +1,13 @@
 //! Pricing a finished run, with its own chip's constants or with another's.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 
 use super::RunError;
 use super::train::read_config;
 use crate::chip::hardware::Hardware;
 use crate::lab::config::{Constants, load_model};
-use crate::lab::price::{Bill, Change, Plan, changes, price};
+use crate::lab::price::{Bill, Change, Cost, Plan, changes, price};
 use crate::lab::store::folder::{self, FolderError, names};
 use crate::lab::store::ledger::LedgerRecord;
 
@@ -21,6 +22,8 @@ pub struct Repriced {
     pub changes: Vec<Change>,
     /// What was counted.
     pub ledger: LedgerRecord,
+    /// What the chip that made the run does and this program does not simulate.
+    pub not_simulated: BTreeMap<String, String>,
     plan: Plan,
     hardware: Hardware,
     constants: Constants,
@@ -41,12 +44,14 @@ pub fn reprice(path: &Path, other: Option<&str>) -> Result<Repriced, RunError> {
     };
     let plan = Plan::of_records(&record.pathways);
     let (made_on, run) = (config.hardware_name.clone(), config.hardware);
+    let not_simulated = config.not_simulated;
     Ok(match other {
         None => Repriced {
             priced_as: made_on.clone(),
             made_on,
             changes: vec![],
             ledger,
+            not_simulated,
             plan,
             hardware: run,
             constants: config.constants,
@@ -58,6 +63,7 @@ pub fn reprice(path: &Path, other: Option<&str>) -> Result<Repriced, RunError> {
                 priced_as: model.name,
                 changes: changes(&run, &model.hardware),
                 ledger,
+                not_simulated,
                 plan,
                 hardware: model.hardware,
                 constants: model.constants,
@@ -71,5 +77,11 @@ impl Repriced {
     #[must_use]
     pub fn bill(&self) -> Bill<'_> {
         price(&self.ledger, &self.plan, &self.hardware, &self.constants, &self.changes)
+    }
+
+    /// Its totals.
+    #[must_use]
+    pub fn cost(&self) -> Cost {
+        Cost::of(&self.bill(), &self.ledger, &self.constants)
     }
 }

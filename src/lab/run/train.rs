@@ -1,11 +1,16 @@
 //! Training in a folder, and continuing.
+#![expect(
+    clippy::disallowed_types,
+    reason = "how often files are written may depend on the clock; what a run gives does not"
+)]
 
 use std::path::Path;
+use std::time::{Duration, Instant};
 
 use super::session::chosen;
 use super::{Machine, RunError, Session};
 use crate::lab::config::{self, Config, Select, Sources};
-use crate::lab::data::{self, DataRoot, ImageShape};
+use crate::lab::data::{self, DataRoot, ImageShape, Loaded};
 use crate::lab::price::Cost;
 use crate::lab::store::ARITHMETIC;
 use crate::lab::store::folder::{self, RunFolder, names};
@@ -38,6 +43,20 @@ pub enum Event<'a> {
     Warning(&'a str),
 }
 
+/// Which files a run leaves, and how much work it may lose when it is killed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Keeping {
+    /// Whether the states stay when the run is finished. Without them nobody can `eval` it, and its page has no levels.
+    pub states: bool,
+    /// Epochs that end within this time of the last checkpoint are not written down one by one.
+    pub every: Duration,
+}
+
+impl Keeping {
+    /// Everything, after every epoch.
+    pub const ALL: Self = Self { states: true, every: Duration::ZERO };
+}
+
 /// A finished run.
 #[derive(Debug)]
 pub struct Outcome {
@@ -68,8 +87,7 @@ pub fn train(
     let name = format!("{}-{}-seed{}", config.data_name(), config.rule_name(), config.seed);
     let folder = RunFolder::create(root, &name)?;
     folder.write(names::CONFIG, config.to_toml().as_bytes())?;
-    let run = Run { config, folder, machine, description, image, session, records: vec![] };
-    run.carry_out(on_event)
+    Run::new(config, folder, machine, (description, image), session).carry_out(on_event)
 }
 
 /// Continues a run from its last finished epoch.
@@ -87,27 +105,63 @@ pub fn resume(
     let loaded = data::load(&config.source()?, data_root)?;
     let (description, image) = (loaded.description.clone(), loaded.image);
     let mut session = Session::new(&config, loaded, machine)?;
-    let mut records = vec![];
-    if path.join(names::CHECKPOINT).exists() {
-        if let Ok(receipt) = folder::read_receipt(path) {
-            if receipt.status == "finished" {
-                return Err(RunError::Finished { path: path.display().to_string() });
-            }
-            check_receipt(&receipt, &session)?;
+    let records = restored(&mut session, path)?;
+    let run = Run::new(&config, folder, machine, (description, image), session);
+    Run { records, ..run }.carry_out(on_event)
+}
+
+/// Carries a run out in a folder that the caller holds: new, or from where it was left. A damaged state is thrown away.
+///
+/// # Errors
+/// When something does not fit, the disk refuses, the run is finished, or the caller stops it.
+pub fn carry_on(
+    config: &Config,
+    loaded: &Loaded,
+    folder: RunFolder,
+    machine: Machine,
+    keeping: Keeping,
+    on_event: &mut (dyn FnMut(Event<'_>) -> bool + Send),
+) -> Result<Outcome, RunError> {
+    let mut session = Session::new(config, loaded.clone(), machine)?;
+    let text = config.to_toml();
+    let begun = folder::read_text(folder.path(), names::CONFIG).is_ok_and(|found| found == text);
+    let records = if begun { restored(&mut session, folder.path()) } else { Ok(vec![]) };
+    let records = match records {
+        Ok(records) => records,
+        Err(error @ RunError::Finished { .. }) => return Err(error),
+        Err(_) => {
+            session = Session::new(config, loaded.clone(), machine)?;
+            vec![]
         }
-        restore(&mut session, path, names::CHECKPOINT)?;
-        records = folder::read_metrics(path)?;
-        let finished = session.trainer().epoch() as usize;
-        if records.len() <= finished {
-            let found = format!("has {} records, but epoch {finished} is finished", records.len());
-            return Err(
-                folder::FolderError::Content { path: path.join(names::METRICS), found }.into()
-            );
-        }
-        records.truncate(finished + 1);
+    };
+    if !begun {
+        folder.write(names::CONFIG, text.as_bytes())?;
     }
-    let run = Run { config: &config, folder, machine, description, image, session, records };
-    run.carry_out(on_event)
+    let about = (loaded.description.clone(), loaded.image);
+    let run = Run::new(config, folder, machine, about, session);
+    Run { records, keeping, ..run }.carry_out(on_event)
+}
+
+/// Brings a session to the last finished epoch on disk; none of it when there is no checkpoint.
+fn restored(session: &mut Session, path: &Path) -> Result<Vec<EpochRecord>, RunError> {
+    if !path.join(names::CHECKPOINT).exists() {
+        return Ok(vec![]);
+    }
+    if let Ok(receipt) = folder::read_receipt(path) {
+        if receipt.status == "finished" {
+            return Err(RunError::Finished { path: path.display().to_string() });
+        }
+        check_receipt(&receipt, session)?;
+    }
+    restore(session, path, names::CHECKPOINT)?;
+    let mut records = folder::read_metrics(path)?;
+    let finished = session.trainer().epoch() as usize;
+    if records.len() <= finished {
+        let found = format!("has {} records, but epoch {finished} is finished", records.len());
+        return Err(folder::FolderError::Content { path: path.join(names::METRICS), found }.into());
+    }
+    records.truncate(finished + 1);
+    Ok(records)
 }
 
 /// The configuration a run was made with.
@@ -168,9 +222,37 @@ struct Run<'a> {
     image: Option<ImageShape>,
     session: Session,
     records: Vec<EpochRecord>,
+    keeping: Keeping,
+    /// When files were written last.
+    written: Instant,
+    /// The best state so far and its epoch, while it is not on disk.
+    best: Option<(u32, Vec<u8>)>,
 }
 
-impl Run<'_> {
+impl<'a> Run<'a> {
+    fn new(
+        config: &'a Config,
+        folder: RunFolder,
+        machine: Machine,
+        (description, image): (String, Option<ImageShape>),
+        session: Session,
+    ) -> Self {
+        let (written, keeping) = (Instant::now(), Keeping::ALL);
+        let records = vec![];
+        Self {
+            config,
+            folder,
+            machine,
+            description,
+            image,
+            session,
+            records,
+            keeping,
+            written,
+            best: None,
+        }
+    }
+
     fn carry_out(
         mut self,
         on_event: &mut (dyn FnMut(Event<'_>) -> bool + Send),
@@ -208,15 +290,27 @@ impl Run<'_> {
     fn keep(&mut self, record: EpochRecord) -> Result<(), RunError> {
         self.records.push(record);
         let epoch = self.session.trainer().epoch();
-        let state = self.session.checkpoint();
         let best = chosen(self.config.select, &self.records);
-        if self.config.select == Select::BestValidation && best == Some(epoch) {
+        let is_best = self.config.select == Select::BestValidation && best == Some(epoch);
+        let due = self.written.elapsed() >= self.keeping.every;
+        if !is_best && !due {
+            return Ok(());
+        }
+        let state = self.session.checkpoint();
+        if is_best {
+            self.best = Some((epoch, state.clone()));
+        }
+        if !due {
+            return Ok(());
+        }
+        if let Some((epoch, state)) = self.best.take() {
             self.folder.write(&RunFolder::best_name(epoch), &state)?;
         }
         self.folder.write_metrics(&self.records)?;
         self.folder.write(names::CHECKPOINT, &state)?;
         self.folder.write_receipt(&self.receipt("running", None))?;
         self.folder.tidy(best);
+        self.written = Instant::now();
         Ok(())
     }
 
@@ -240,13 +334,19 @@ impl Run<'_> {
 
     fn finish(mut self) -> Result<Outcome, RunError> {
         let ledger = LedgerRecord::of(self.session.trainer().driver().engine());
+        self.folder.write_metrics(&self.records)?;
         self.folder.write(names::LEDGER, ledger.to_json().as_bytes())?;
         let cost = super::report::cost(self.config, &ledger, &self.records);
         let epoch = self.session.trainer().epoch();
         let best = chosen(self.config.select, &self.records).unwrap_or(epoch);
         let path = self.folder.path().to_path_buf();
         if best != epoch {
-            restore(&mut self.session, &path, &RunFolder::best_name(best))?;
+            match self.best.take() {
+                Some((_, state)) => self.session.restore(&state).map_err(|error| {
+                    RunError::Checkpoint { path: "the best state".into(), error }
+                })?,
+                None => restore(&mut self.session, &path, &RunFolder::best_name(best))?,
+            }
         }
         let state = self.session.checkpoint();
         let test = (!self.session.test_examples().is_empty()).then(|| self.session.test());
@@ -257,12 +357,15 @@ impl Run<'_> {
             receipt: &receipt,
             records: &self.records,
             counted: Some((&ledger, &cost)),
-            state: Some(&state),
+            state: self.keeping.states.then_some(&state),
             examples: self.image.map(|image| (self.session.test_examples(), image)),
         };
         let page = page.draw();
         self.folder.write(names::REPORT, page.html.as_bytes())?;
         self.folder.write_receipt(&receipt)?;
+        if !self.keeping.states {
+            self.folder.forget_states();
+        }
         Ok(Outcome { receipt, records: self.records, summary: page.summary, cost })
     }
 }

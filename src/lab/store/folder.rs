@@ -106,6 +106,15 @@ impl RunFolder {
         Self::hold(path.into())
     }
 
+    /// Takes a folder, made if it is not there.
+    ///
+    /// # Errors
+    /// When it cannot be made or another process holds it.
+    pub fn take(path: &Path) -> Result<Self, FolderError> {
+        fs::create_dir_all(path).map_err(|e| io_error("make folder", path, e))?;
+        Self::hold(path.into())
+    }
+
     fn hold(path: PathBuf) -> Result<Self, FolderError> {
         let lock_path = path.join("lock");
         let lock = File::create(&lock_path).map_err(|e| io_error("write", &lock_path, e))?;
@@ -186,11 +195,20 @@ impl RunFolder {
     /// Removes files that a finished write has replaced: best states other than that of `keep`, and parts.
     pub fn tidy(&self, keep: Option<u32>) {
         let keep = keep.map(Self::best_name);
+        self.remove(|name| name.starts_with("best-") && Some(name) != keep.as_deref());
+    }
+
+    /// Removes all states.
+    pub fn forget_states(&self) {
+        self.remove(|name| name.starts_with("best-") || name == names::CHECKPOINT);
+    }
+
+    /// Removes parts of files that were never finished, and what else is not wanted.
+    fn remove(&self, unwanted: impl Fn(&str) -> bool) {
         let Ok(entries) = fs::read_dir(&self.path) else { return };
         for entry in entries.flatten() {
             let name = entry.file_name().to_string_lossy().into_owned();
-            let old_best = name.starts_with("best-") && Some(&name) != keep.as_ref();
-            if old_best || name.starts_with(".part-") {
+            if unwanted(&name) || name.starts_with(".part-") {
                 let _ = fs::remove_file(entry.path());
             }
         }

@@ -69,12 +69,20 @@ impl Experiment {
         samples.div_ceil(self.batch.get() as usize) as u64
     }
 
+    /// Checks that the network fits the chip.
+    ///
+    /// # Errors
+    /// When it does not.
+    pub fn check(&self) -> Result<(), PlanError> {
+        layer::check(&self.layers, &self.hardware)
+    }
+
     /// Builds the network and loads its initial levels.
     ///
     /// # Errors
     /// When it does not fit the chip.
     pub fn build(&self, backend: Backend, samples: usize) -> Result<Seeded, PlanError> {
-        layer::check(&self.layers, &self.hardware)?;
+        self.check()?;
         let bits = self.hardware.error_bits;
         let outputs = self.layers.last().expect("checked: at least one layer").units;
         let last = self.layers.len() - 1;

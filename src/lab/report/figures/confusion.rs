@@ -46,7 +46,7 @@ pub(super) fn draw(view: &RunView<'_>) -> Option<Figure> {
             "Test set. Blue: share of the true class. Orange: mistakes, compared with the most \
                   frequent one."
                 .into(),
-        body: drawing + &most,
+        body: drawing + most.as_str(),
         wide: false,
     })
 }

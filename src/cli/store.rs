@@ -1,0 +1,117 @@
+//! `store`: what a store holds, putting stores together, making the index again.
+
+use std::path::PathBuf;
+
+use clap::Subcommand;
+use serde_json::json;
+
+use super::{Done, Failure, say};
+use crate::lab::store::index::Store;
+use crate::lab::sweep::{self, SweepError};
+
+#[derive(Debug, Subcommand)]
+pub(super) enum StoreCommand {
+    /// List the sweeps of a store and how far they are
+    List {
+        /// The store
+        store: PathBuf,
+        /// One JSON object a line
+        #[arg(long)]
+        json: bool,
+    },
+    /// Bring the finished runs and the sweeps of other stores into one
+    Merge {
+        /// The store that gets them; made if it is not there
+        into: PathBuf,
+        /// The others
+        #[arg(required = true)]
+        from: Vec<PathBuf>,
+        /// One JSON object a line
+        #[arg(long)]
+        json: bool,
+    },
+    /// Make the rows of the index again from the run folders
+    Index {
+        /// The store
+        store: PathBuf,
+        /// One JSON object a line
+        #[arg(long)]
+        json: bool,
+    },
+}
+
+impl From<crate::lab::store::index::StoreError> for Failure {
+    fn from(error: crate::lab::store::index::StoreError) -> Self {
+        SweepError::from(error).into()
+    }
+}
+
+pub(super) fn execute(command: &StoreCommand) -> Done {
+    match command {
+        StoreCommand::List { store, json } => list(&Store::existing(store)?, *json),
+        StoreCommand::Merge { into, from, json } => {
+            let mut into = Store::open(into)?;
+            for from in from {
+                merge(&mut into, &Store::existing(from)?, *json)?;
+            }
+            Ok(())
+        }
+        StoreCommand::Index { store, json } => {
+            let [finished, others] = sweep::reindex(&mut Store::open(store)?, &mut |_, _| {})?;
+            if *json {
+                say(&json!({"event": "done", "finished": finished, "unfinished": others})
+                    .to_string());
+            } else {
+                say(&format!("{finished} finished runs, {others} folders that are not finished"));
+            }
+            Ok(())
+        }
+    }
+}
+
+fn list(store: &Store, json: bool) -> Done {
+    let runs = store.rows()?.len();
+    if !json {
+        say(&format!("{}: {runs} finished runs", store.path().display()));
+    }
+    for record in store.sweeps()? {
+        let points = store.points(&record.name)?;
+        let finished = points.iter().filter(|(_, row)| row.is_some()).count();
+        if json {
+            say(&json!({"event": "sweep", "name": record.name, "points": points.len(),
+                "finished": finished})
+            .to_string());
+        } else {
+            say(&format!("{:<24} {finished} of {} points finished", record.name, points.len()));
+        }
+    }
+    Ok(())
+}
+
+fn merge(into: &mut Store, from: &Store, json: bool) -> Done {
+    let merged = sweep::merge(into, from, &mut |_, _| {})?;
+    let place = from.path().display().to_string();
+    if json {
+        say(&json!({"event": "done", "from": place, "runs": merged.runs, "shared": merged.shared,
+            "held": merged.held, "sweeps": merged.sweeps, "different": merged.different})
+        .to_string());
+        return Ok(());
+    }
+    say(&format!(
+        "{place}: {} new runs, {} known with the same result, {} new sweeps",
+        merged.runs, merged.shared, merged.sweeps
+    ));
+    if merged.held > 0 {
+        eprintln!(
+            "warning: {} runs are at work in another process and were left; merge again",
+            merged.held
+        );
+    }
+    for name in merged.different {
+        eprintln!(
+            "warning: sweep {name} differs from the one of that name here; its runs came over. Give the command of the \
+             sweep you mean again: it finds them"
+        );
+    }
+    Ok(())
+}

@@ -1,0 +1,252 @@
+//! `sweep`: many runs from one file.
+
+use std::path::PathBuf;
+use std::sync::Mutex;
+use std::time::Duration;
+
+use clap::Args;
+use serde_json::json;
+
+use super::progress::{SweepMeter, clock};
+use super::run::stop_flag;
+use super::{Done, Failure, Shared, environment, say};
+use crate::lab::run::{Keeping, Machine};
+use crate::lab::store::index::Store;
+use crate::lab::sweep::{self, Carried, Event, Options, Plan, Shard, Sweep, SweepError, Task};
+
+/// A killed sweep loses at most so much of each run at work.
+const CHECKPOINT_SECONDS: u64 = 10;
+
+#[derive(Debug, Args)]
+pub(super) struct SweepArgs {
+    /// Sweep file
+    file: PathBuf,
+    /// Folder of all runs; finished ones are never run again [default: store, or DALEAN_STORE]
+    #[arg(long, value_name = "DIR")]
+    store: Option<PathBuf>,
+    /// Show what would run and how long it takes, and run nothing
+    #[arg(long)]
+    dry_run: bool,
+    /// Carry out only every N-th run, from the I-th on: for job arrays, each with the same or its own store
+    #[arg(long, value_name = "I/N")]
+    shard: Option<Shard>,
+    /// Change a key of all points, such as learning.epochs=1 (repeatable); axes win
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    settings: Vec<String>,
+    /// Keep the states of finished runs, for `eval` and for the levels in their reports
+    #[arg(long)]
+    keep_states: bool,
+    #[command(flatten)]
+    shared: Shared,
+}
+
+impl From<SweepError> for Failure {
+    fn from(error: SweepError) -> Self {
+        let code = match error {
+            SweepError::Config(_)
+            | SweepError::Key { .. }
+            | SweepError::Axis { .. }
+            | SweepError::Filter { .. }
+            | SweepError::Empty { .. } => 2,
+            SweepError::Run(error) => return error.into(),
+            _ => 1,
+        };
+        Self { code, message: error.to_string() }
+    }
+}
+
+/// The store a command means.
+pub(super) fn store_path(given: Option<&PathBuf>) -> PathBuf {
+    let named = || environment("DALEAN_STORE").map(PathBuf::from);
+    given.cloned().or_else(named).unwrap_or_else(|| PathBuf::from("store"))
+}
+
+pub(super) fn execute(args: &SweepArgs) -> Done {
+    let shared = &args.shared;
+    let machine = shared.machine()?;
+    let path = store_path(args.store.as_ref());
+    let plan = sweep::plan(Sweep::read(&args.file)?, &args.settings, &shared.data_root())?;
+    if args.dry_run {
+        return dry_run(args, &plan, machine, &path);
+    }
+    announce(shared, &plan, &path);
+    let mut store = Store::open(&path).map_err(SweepError::from)?;
+    let stop = stop_flag();
+    let keeping =
+        Keeping { states: args.keep_states, every: Duration::from_secs(CHECKPOINT_SECONDS) };
+    let options =
+        Options { backend: machine.backend, jobs: machine.threads, keeping, shard: args.shard };
+    let meter = Mutex::new(SweepMeter::new(shared.quiet || shared.json));
+    let on_event = |event: Event<'_>| {
+        let mut meter = meter.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+        tell(&mut meter, &plan, &event);
+        if shared.json {
+            tell_json(&plan, &event);
+        }
+    };
+    let carried = sweep::carry_out(&plan, &mut store, options, &stop, &on_event);
+    let seconds = meter.lock().unwrap_or_else(std::sync::PoisonError::into_inner).finish();
+    let Carried { runs, finished, failed } = carried?;
+    let name = &plan.sweep.name;
+    let page = path.join(format!("{name}.html"));
+    if shared.json {
+        say(&json!({"event": "done", "sweep": name, "store": path.display().to_string(),
+            "points": plan.points.len(), "runs": runs, "finished": finished, "failed": failed,
+            "seconds": seconds})
+        .to_string());
+    } else {
+        say(&format!(
+            "{name}: {finished} of {runs} runs finished{} in {}",
+            if failed > 0 { format!(", {failed} failed") } else { String::new() },
+            clock(Duration::from_secs_f64(seconds)),
+        ));
+    }
+    let _ = page;
+    if failed > 0 {
+        let message = format!("{failed} runs failed; the report of the sweep says why");
+        return Err(Failure { code: 1, message });
+    }
+    if finished < runs {
+        let message = format!(
+            "stopped: {finished} of {runs} runs are finished; give the same command again to go on"
+        );
+        return Err(Failure { code: 3, message });
+    }
+    Ok(())
+}
+
+/// What the sweep is, in a few lines.
+fn announce(shared: &Shared, plan: &Plan, path: &std::path::Path) {
+    let sweep = &plan.sweep;
+    let refused = plan.points.iter().filter(|planned| planned.key.is_err()).count();
+    if shared.json {
+        let axes: Vec<_> = sweep.axes.iter().map(|axis| &axis.name).collect();
+        say(&json!({"event": "planned", "sweep": sweep.name, "store": path.display().to_string(),
+            "axes": axes, "seeds": sweep.seeds, "points": plan.points.len(),
+            "filtered": plan.before - plan.points.len(), "refused": refused,
+            "runs": plan.tasks.len()})
+        .to_string());
+    } else if !shared.quiet {
+        eprintln!("{}", describe(plan));
+        for data in &plan.data {
+            eprintln!("{}", data.description);
+        }
+        let first = plan.points.iter().position(|planned| planned.key.is_err());
+        if let Some(first) = first
+            && let Err(why) = &plan.points[first].key
+        {
+            let others =
+                if refused > 1 { format!(" (and {} more)", refused - 1) } else { String::new() };
+            eprintln!(
+                "warning: point {} ({}) cannot run{others}: {why}",
+                first + 1,
+                plan.words(first)
+            );
+        }
+        eprintln!("store {}", path.display());
+    }
+}
+
+/// `level-bits: 216 points = 12 level_bits x 2 rounding x 3 rule x 3 seeds, 216 runs`.
+fn describe(plan: &Plan) -> String {
+    let sweep = &plan.sweep;
+    let mut parts: Vec<String> = match sweep.sample {
+        None => {
+            let size = |axis: &sweep::Axis| format!("{} {}", axis.list().len(), axis.name);
+            sweep.axes.iter().map(size).collect()
+        }
+        Some(sample) => {
+            let names: Vec<_> = sweep.axes.iter().map(|axis| &*axis.name).collect();
+            let method = if sample.latin_hypercube { "Latin hypercube" } else { "random" };
+            vec![format!("{} {method} points of {}", sample.points, names.join(", "))]
+        }
+    };
+    if !sweep.seeds.is_empty() {
+        parts.push(format!("{} seeds", sweep.seeds.len()));
+    }
+    let filtered = plan.before - plan.points.len();
+    let filtered = if filtered > 0 { format!(" less {filtered} filtered") } else { String::new() };
+    let runs = plan.tasks.len();
+    format!(
+        "{}: {} points = {}{filtered}, {runs} runs",
+        sweep.name,
+        plan.points.len(),
+        parts.join(" x ")
+    )
+}
+
+fn dry_run(args: &SweepArgs, plan: &Plan, machine: Machine, path: &std::path::Path) -> Done {
+    let shared = &args.shared;
+    announce(shared, plan, path);
+    let mine = |at: &usize| args.shard.is_none_or(|shard| shard.has(*at));
+    let tasks = (0..plan.tasks.len()).filter(mine).map(|at| &plan.tasks[at]);
+    let tasks: Vec<&Task> = tasks.collect();
+    let store = Store::existing(path).ok();
+    let finished = |task: &&Task| {
+        store.as_ref().is_some_and(|store| matches!(store.row(&task.key), Ok(Some(_))))
+    };
+    let all = tasks.len();
+    let todo: Vec<&Task> = tasks.into_iter().filter(|task| !finished(task)).collect();
+    let one = Machine { threads: 1, ..machine };
+    let estimate = sweep::estimate(plan, &todo, one)?;
+    let jobs = machine.threads.min(todo.len()).max(1);
+    let seconds = estimate.core_seconds / jobs as f64;
+    if shared.json {
+        say(&json!({"event": "done", "dry_run": true, "sweep": plan.sweep.name,
+            "points": plan.points.len(), "runs": all, "finished": all - todo.len(),
+            "todo": todo.len(), "jobs": jobs, "core_seconds": estimate.core_seconds,
+            "seconds": seconds, "probes": estimate.probes})
+        .to_string());
+    } else {
+        say(&describe(plan));
+        let shard = if args.shard.is_some() { " in this shard" } else { "" };
+        say(&format!("{all} runs{shard}: {} finished, {} to do", all - todo.len(), todo.len()));
+        say(&format!(
+            "about {} with {jobs} at a time ({} core hours); the first updates of {} runs were measured",
+            clock(Duration::from_secs_f64(seconds)),
+            (estimate.core_seconds / 36.0).round() / 100.0,
+            estimate.probes,
+        ));
+    }
+    Ok(())
+}
+
+fn tell(meter: &mut SweepMeter, plan: &Plan, event: &Event<'_>) {
+    match event {
+        Event::Started { finished, todo, work } => meter.start(*finished, *todo, *work),
+        Event::Work(work) => meter.work(*work),
+        Event::Finished { task, row, seconds, elsewhere, .. } => {
+            let figure = &plan.sweep.figures.y;
+            let value = row.results.get(figure).and_then(serde_json::Value::as_f64);
+            let value = value.map_or_else(|| "-".into(), |value| format!("{value:.4}"));
+            let took = if *elsewhere { "elsewhere".into() } else { format!("{seconds:.1} s") };
+            meter.finished(&format!("{}  {figure} {value}  {took}", plan.words(task.point)));
+        }
+        Event::Failed { task, error } => {
+            meter.line(&format!("failed: {}: {error}", plan.words(task.point)));
+        }
+        Event::Waiting { runs } => {
+            meter.line(&format!("waiting for {runs} runs that other processes are at"));
+        }
+    }
+}
+
+fn tell_json(plan: &Plan, event: &Event<'_>) {
+    let line = match event {
+        Event::Work(_) => return,
+        Event::Started { finished, todo, .. } => {
+            json!({"event": "started", "finished": finished, "todo": todo})
+        }
+        Event::Finished { task, row, seconds, elsewhere, finished } => {
+            let point = &plan.points[task.point].point;
+            json!({"event": "run", "key": task.key, "point": point.number, "values": point.values,
+                "seed": point.seed, "results": row.results, "state_hash": row.state_hash,
+                "seconds": seconds, "elsewhere": elsewhere, "finished": finished})
+        }
+        Event::Failed { task, error } => {
+            json!({"event": "failed", "key": task.key, "what": plan.words(task.point), "message": error})
+        }
+        Event::Waiting { runs } => json!({"event": "waiting", "runs": runs}),
+    };
+    say(&line.to_string());
+}

@@ -1,0 +1,130 @@
+//! The keys of sweep files. Every key is optional here; what they mean together is checked by `lab::sweep`.
+
+use serde::{Deserialize, Serialize};
+
+use super::ConfigError;
+use super::file::ExperimentFile;
+use super::layers::parse;
+
+/// Seeds of a sweep.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(untagged, expecting = "a number of seeds (1, 2, ... are used), or a list of seeds")]
+pub enum SeedsFile {
+    /// 1 to this.
+    Count(u32),
+    /// These.
+    List(Vec<u64>),
+}
+
+/// What an axis value is, or the name of a case.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(untagged, expecting = "a number, a word, true or false")]
+pub enum ScalarFile {
+    /// A whole number.
+    Whole(i64),
+    /// A number.
+    Real(f64),
+    /// True or false.
+    Flag(bool),
+    /// A word.
+    Text(String),
+}
+
+macro_rules! keys {
+    ($($(#[$doc:meta])* $name:ident { $($(#[$field_doc:meta])* $field:ident: $kind:ty,)* })*) => {$(
+        $(#[$doc])*
+        #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+        #[serde(deny_unknown_fields)]
+        pub struct $name {
+            $($(#[$field_doc])* #[serde(skip_serializing_if = "Option::is_none")] pub $field: Option<$kind>,)*
+        }
+    )*};
+}
+
+keys! {
+    /// A sweep file.
+    SweepFile {
+        /// What it is called in its store: lower-case letters, digits, `-`.
+        name: String,
+        /// Heading of its page.
+        title: String,
+        /// What it asks and shows, in paragraphs.
+        about: String,
+        /// Experiment file to start from, relative to this file; default: nothing but defaults.
+        experiment: String,
+        /// Keys of an experiment, laid over it.
+        base: ExperimentFile,
+        /// Seeds; default: the experiment's own.
+        seeds: SeedsFile,
+        /// What is varied, the slowest first.
+        axis: Vec<AxisFile>,
+        /// Conditions on axes; a point must meet them all.
+        filter: Vec<String>,
+        /// Draws points at random; default: the full grid.
+        sample: SampleFile,
+        /// What the figures show at first.
+        report: ReportFile,
+    }
+    /// `[[axis]]`: either `key` with `values` or with `from` and `to`, or cases.
+    AxisFile {
+        /// Name of its column; default: the last part of `key`.
+        name: String,
+        /// Words for people; default: the name.
+        label: String,
+        /// The key that is varied.
+        key: String,
+        /// Its values.
+        values: Vec<ScalarFile>,
+        /// The least value.
+        from: ScalarFile,
+        /// The greatest value.
+        to: ScalarFile,
+        /// `linear` or `log`.
+        scale: String,
+        /// Values from `from` to `to`; needed in a grid, optional in a sample.
+        steps: u32,
+        /// Values that set several keys each.
+        case: Vec<CaseFile>,
+    }
+    /// `[[axis.case]]`.
+    CaseFile {
+        /// The value of the axis.
+        name: ScalarFile,
+        /// Keys of an experiment.
+        set: ExperimentFile,
+    }
+    /// `[sample]`.
+    SampleFile {
+        /// `random` or `latin_hypercube`.
+        method: String,
+        /// How many; each is run with every seed.
+        points: u32,
+        /// Which points: another number, other points.
+        seed: u64,
+    }
+    /// `[report]`: names of axes and results.
+    ReportFile {
+        /// Abscissa; default: the first axis of numbers.
+        x: String,
+        /// Ordinate; default: `test_accuracy`.
+        y: String,
+        /// One curve each.
+        series: String,
+        /// One panel each.
+        panel: String,
+        /// Axes of the heat map.
+        heat: [String; 2],
+        /// What is set against `y`: `joules`, `cycles`, `pulses_attempted`, ...
+        cost: String,
+    }
+}
+
+impl SweepFile {
+    /// Reads a sweep file.
+    ///
+    /// # Errors
+    /// When the text is not TOML or has unknown keys: with line and caret.
+    pub fn parse(place: &str, text: &str) -> Result<Self, ConfigError> {
+        parse(place, text)
+    }
+}

@@ -1,0 +1,289 @@
+//! Carrying out the runs of a plan: one thread a run, several runs at a time, with other processes in the same store.
+//!
+//! A run is taken by locking its folder. What another process holds is left until the rest is done, and then asked for
+//! again: either it is finished by then, or the other process ended and the lock is free.
+
+use std::collections::VecDeque;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::Path;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::{Mutex, MutexGuard};
+use std::time::Duration;
+
+use super::row::row;
+use super::{Plan, Row, Shard, SweepError, Task};
+use crate::chip::crossbar::kernel::Backend;
+use crate::lab::run::{self, Keeping, Machine, RunError};
+use crate::lab::store::folder::{self, FolderError, RunFolder};
+use crate::lab::store::index::Store;
+use crate::lab::store::{ARITHMETIC, hash};
+
+/// Pause before asking again for what another process holds.
+const PAUSE: Duration = Duration::from_millis(200);
+
+/// How runs are carried out; none of it changes a result.
+#[derive(Debug, Clone, Copy)]
+pub struct Options {
+    /// Which loops run.
+    pub backend: Backend,
+    /// Runs at a time.
+    pub jobs: usize,
+    /// Which files they leave.
+    pub keeping: Keeping,
+    /// Which of the runs are this process's.
+    pub shard: Option<Shard>,
+}
+
+/// What happens meanwhile.
+#[derive(Debug)]
+pub enum Event<'a> {
+    /// It is about to start.
+    Started {
+        /// Runs that are finished already.
+        finished: usize,
+        /// Runs to do.
+        todo: usize,
+        /// Work of those.
+        work: f64,
+    },
+    /// So much work was done.
+    Work(f64),
+    /// A run is finished.
+    Finished {
+        /// Which.
+        task: &'a Task,
+        /// Its results.
+        row: &'a Row,
+        /// Seconds its learning took.
+        seconds: f64,
+        /// Whether another process did it.
+        elsewhere: bool,
+        /// Runs finished, of all.
+        finished: usize,
+    },
+    /// A run failed; the others go on.
+    Failed {
+        /// Which.
+        task: &'a Task,
+        /// Why.
+        error: &'a str,
+    },
+    /// Only runs that other processes hold are left.
+    Waiting {
+        /// How many.
+        runs: usize,
+    },
+}
+
+/// How it ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Carried {
+    /// Runs of this shard.
+    pub runs: usize,
+    /// Of these, finished.
+    pub finished: usize,
+    /// Of these, failed.
+    pub failed: usize,
+}
+
+struct Crew<'a> {
+    plan: &'a Plan,
+    options: Options,
+    store: Mutex<&'a mut Store>,
+    queue: Mutex<VecDeque<&'a Task>>,
+    held: Mutex<VecDeque<&'a Task>>,
+    finished: AtomicUsize,
+    failed: AtomicUsize,
+    stop: &'a AtomicBool,
+    broken: Mutex<Option<SweepError>>,
+    on_event: &'a (dyn Fn(Event<'_>) + Sync),
+}
+
+/// What came of a run.
+enum Came {
+    Done { row: Row, seconds: f64, elsewhere: bool },
+    Held,
+    Stopped,
+}
+
+/// Plans the sweep in the store and carries out what is not finished. Ends early when `stop` is set.
+///
+/// # Errors
+/// When disk or index refuse; what is finished by then is kept.
+///
+/// # Panics
+/// When a thread cannot be started.
+pub fn carry_out(
+    plan: &Plan,
+    store: &mut Store,
+    options: Options,
+    stop: &AtomicBool,
+    on_event: &(dyn Fn(Event<'_>) + Sync),
+) -> Result<Carried, SweepError> {
+    let (sweep, points) = plan.records();
+    store.plan(&sweep, &points)?;
+    let mine = |at: &usize| options.shard.is_none_or(|shard| shard.has(*at));
+    let tasks: Vec<&Task> = (0..plan.tasks.len()).filter(mine).map(|at| &plan.tasks[at]).collect();
+    let mut todo = VecDeque::new();
+    for &task in &tasks {
+        if store.row(&task.key)?.is_none() {
+            todo.push_back(task);
+        }
+    }
+    let finished = tasks.len() - todo.len();
+    let work = todo.iter().map(|task| task.work).sum();
+    on_event(Event::Started { finished, todo: todo.len(), work });
+    let jobs = options.jobs.min(todo.len());
+    let crew = Crew {
+        plan,
+        options,
+        store: Mutex::new(store),
+        queue: Mutex::new(todo),
+        held: Mutex::default(),
+        finished: AtomicUsize::new(finished),
+        failed: AtomicUsize::new(0),
+        stop,
+        broken: Mutex::new(None),
+        on_event,
+    };
+    std::thread::scope(|scope| {
+        for _ in 0..jobs {
+            scope.spawn(|| crew.work());
+        }
+    });
+    if let Some(error) = lock(&crew.broken).take() {
+        return Err(error);
+    }
+    let of = |count: &AtomicUsize| count.load(Ordering::SeqCst);
+    let (finished, failed) = (of(&crew.finished), of(&crew.failed));
+    Ok(Carried { runs: tasks.len(), finished, failed })
+}
+
+/// A run that panicked left nothing half done behind these locks.
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(std::sync::PoisonError::into_inner)
+}
+
+impl<'a> Crew<'a> {
+    fn stopped(&self) -> bool {
+        self.stop.load(Ordering::SeqCst) || lock(&self.broken).is_some()
+    }
+
+    fn work(&self) {
+        let mut announced = false;
+        while !self.stopped() {
+            let fresh = lock(&self.queue).pop_front();
+            let task = match fresh {
+                Some(task) => task,
+                None => {
+                    let (next, left) = {
+                        let mut held = lock(&self.held);
+                        let left = held.len();
+                        (held.pop_front(), left)
+                    };
+                    let Some(task) = next else { return };
+                    if !announced {
+                        announced = true;
+                        (self.on_event)(Event::Waiting { runs: left });
+                    }
+                    std::thread::sleep(PAUSE);
+                    task
+                }
+            };
+            // a fault of ours in one run must not lose the others
+            let came = catch_unwind(AssertUnwindSafe(|| self.run(task))).unwrap_or_else(|cause| {
+                let text = cause.downcast_ref::<String>().map(String::as_str);
+                let text = text.or_else(|| cause.downcast_ref::<&str>().copied()).unwrap_or("?");
+                Err(Trouble::Run(format!("this is a fault of the program: {text}")))
+            });
+            match came {
+                Ok(Came::Done { row, seconds, elsewhere }) => {
+                    let finished = self.finished.fetch_add(1, Ordering::SeqCst) + 1;
+                    let row = &row;
+                    (self.on_event)(Event::Finished { task, row, seconds, elsewhere, finished });
+                }
+                Ok(Came::Held) => lock(&self.held).push_back(task),
+                Ok(Came::Stopped) => return,
+                Err(Trouble::Run(error)) => {
+                    self.failed.fetch_add(1, Ordering::SeqCst);
+                    let noted = lock(&self.store).refuse(&task.key, &error);
+                    (self.on_event)(Event::Failed { task, error: &error });
+                    if let Err(error) = noted {
+                        lock(&self.broken).get_or_insert(error.into());
+                    }
+                }
+                Err(Trouble::Place(error)) => {
+                    lock(&self.broken).get_or_insert(error);
+                }
+            }
+        }
+    }
+
+    fn run(&self, task: &Task) -> Result<Came, Trouble> {
+        let path = lock(&self.store).folder(&task.key);
+        let folder = match RunFolder::take(&path) {
+            Ok(folder) => folder,
+            Err(FolderError::Held { .. }) => return Ok(Came::Held),
+            Err(error) => return Err(Trouble::Place(RunError::from(error).into())),
+        };
+        let data = &self.plan.data[task.data];
+        if is_finished(&path, task, &data.hash) {
+            let (row, seconds) = self.index(task, &path)?;
+            (self.on_event)(Event::Work(task.work));
+            return Ok(Came::Done { row, seconds, elsewhere: true });
+        }
+        let machine = Machine { backend: self.options.backend, threads: 1 };
+        let samples = f64::from(task.config.epochs) * data.split.train.len().max(1) as f64;
+        let mut before = None;
+        let outcome = run::carry_on(
+            &task.config,
+            data,
+            folder,
+            machine,
+            self.options.keeping,
+            &mut |event| {
+                if let run::Event::Batch(progress) = event {
+                    let seen = f64::from(progress.epoch) * progress.samples_total as f64
+                        + progress.samples as f64;
+                    let done = seen - before.replace(seen).unwrap_or(0.0);
+                    (self.on_event)(Event::Work(task.work * done / samples));
+                }
+                !self.stopped()
+            },
+        );
+        match outcome {
+            Ok(_) => {
+                let (row, seconds) = self.index(task, &path)?;
+                Ok(Came::Done { row, seconds, elsewhere: false })
+            }
+            Err(RunError::Stopped { .. }) => Ok(Came::Stopped),
+            Err(error @ RunError::Folder(_)) => Err(Trouble::Place(error.into())),
+            Err(error) => Err(Trouble::Run(error.to_string())),
+        }
+    }
+
+    /// Puts a finished run into the index.
+    fn index(&self, task: &Task, path: &Path) -> Result<(Row, f64), Trouble> {
+        let (row, seconds) = row(path).map_err(Trouble::Place)?;
+        let text = serde_json::to_string(&row).expect("rows have a JSON form");
+        let kept = lock(&self.store).keep(&[(task.key.clone(), text, seconds)]);
+        kept.map_err(|error| Trouble::Place(error.into()))?;
+        Ok((row, seconds))
+    }
+}
+
+/// What went wrong: with this run alone, or with the place all runs are kept in.
+enum Trouble {
+    Run(String),
+    Place(SweepError),
+}
+
+/// Whether a folder holds the finished run of this task.
+fn is_finished(path: &Path, task: &Task, data: &str) -> bool {
+    folder::read_receipt(path).is_ok_and(|receipt| {
+        receipt.status == "finished"
+            && receipt.arithmetic == ARITHMETIC
+            && receipt.data_hash == data
+            && receipt.config_hash == hash::text(&task.config.to_toml())
+    })
+}

@@ -1,0 +1,278 @@
+//! A sweep file, checked.
+#![expect(clippy::disallowed_methods, reason = "the file the user named")]
+
+use std::path::Path;
+
+use super::filter::Filter;
+use super::row::RESULTS;
+use super::{Axis, SweepError};
+use crate::lab::config::ConfigError;
+use crate::lab::config::file::ExperimentFile;
+use crate::lab::config::sweep::{ReportFile, SampleFile, SeedsFile, SweepFile};
+use crate::lab::report::sweep::Figures;
+
+/// Draws points in place of the full grid.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Sample {
+    /// Whether each axis is cut into as many parts as there are points, and each part drawn from once.
+    pub latin_hypercube: bool,
+    /// Points, each run with every seed.
+    pub points: u32,
+    /// Which points.
+    pub seed: u64,
+}
+
+/// A sweep, checked.
+#[derive(Debug)]
+pub struct Sweep {
+    /// Name in its store.
+    pub name: String,
+    /// Heading.
+    pub title: String,
+    /// What it asks and shows.
+    pub about: String,
+    /// What is varied, the slowest first.
+    pub axes: Vec<Axis>,
+    /// Seeds; empty when the experiment's own is used.
+    pub seeds: Vec<u64>,
+    /// Draws points in place of the grid.
+    pub sample: Option<Sample>,
+    /// What the figures show at first.
+    pub figures: Figures,
+    /// Keys laid over the experiment.
+    pub base: toml::Table,
+    /// Text of the sweep file.
+    pub text: String,
+    /// Name and text of the experiment file; empty when there is none.
+    pub experiment: [String; 2],
+    pub(super) filter: Filter,
+}
+
+impl Sweep {
+    /// Reads a sweep file and the experiment it starts from.
+    ///
+    /// # Errors
+    /// When one cannot be read, or what it says makes no sweep.
+    pub fn read(path: &Path) -> Result<Self, SweepError> {
+        let read = |path: &Path, hint: &str| {
+            std::fs::read_to_string(path).map_err(|error| ConfigError::Unreadable {
+                path: path.display().to_string(),
+                error,
+                hint: hint.into(),
+            })
+        };
+        let text = read(path, "name a sweep file, such as examples/sweeps/level_bits.toml")?;
+        let place = path.display().to_string();
+        let file = SweepFile::parse(&place, &text)?;
+        let experiment = match &file.experiment {
+            None => [String::new(), String::new()],
+            Some(name) => {
+                let path = path.parent().unwrap_or(Path::new(".")).join(name);
+                let hint = "`experiment` is relative to the sweep file";
+                [path.display().to_string(), read(&path, hint)?]
+            }
+        };
+        Self::check(file, &place, text, experiment)
+    }
+
+    /// Checks a sweep's text, as a store keeps it.
+    ///
+    /// # Errors
+    /// When what it says makes no sweep.
+    pub fn parse(place: &str, text: &str, experiment: &str) -> Result<Self, SweepError> {
+        let file = SweepFile::parse(place, text)?;
+        let name = file.experiment.clone().unwrap_or_default();
+        Self::check(file, place, text.into(), [name, experiment.into()])
+    }
+
+    fn check(
+        file: SweepFile,
+        place: &str,
+        text: String,
+        experiment: [String; 2],
+    ) -> Result<Self, SweepError> {
+        let stem =
+            Path::new(place).file_stem().map(|s| s.to_string_lossy().replace(['_', ' '], "-"));
+        let name = file.name.or(stem).unwrap_or_default();
+        let good = |b: u8| b.is_ascii_lowercase() || b.is_ascii_digit() || b == b'-';
+        if !(1..=64).contains(&name.len()) || !name.bytes().all(good) {
+            let allowed = "use 1 to 64 lower-case letters, digits and `-`";
+            return Err(SweepError::key("name", &format!("is {name:?}"), allowed));
+        }
+        let sample = file.sample.map(sampled).transpose()?;
+        let axes = file.axis.unwrap_or_default().into_iter();
+        let axes: Vec<Axis> =
+            axes.map(|axis| Axis::new(axis, sample.is_some())).collect::<Result<_, _>>()?;
+        if axes.is_empty() {
+            return Err(SweepError::key(
+                "axis",
+                "is missing",
+                "give the sweep one or more [[axis]]",
+            ));
+        }
+        for (at, axis) in axes.iter().enumerate() {
+            let taken = axes[..at].iter().any(|other| other.name == axis.name);
+            if taken || reserved(&axis.name) {
+                let allowed = "give it another `name`";
+                return Err(SweepError::axis(
+                    &axis.name,
+                    "has the name of another column",
+                    allowed,
+                ));
+            }
+        }
+        let seeds = seeds(file.seeds)?;
+        let mut names: Vec<&str> = axes.iter().map(|axis| &*axis.name).collect();
+        names.push("seed");
+        let filter = Filter::new(&file.filter.unwrap_or_default(), &names)?;
+        let figures = figures(file.report.unwrap_or_default(), &axes)?;
+        let base = super::table(&file.base.unwrap_or_else(ExperimentFile::default));
+        let title = file.title.unwrap_or_else(|| name.clone());
+        let about = file.about.unwrap_or_default();
+        Ok(Self {
+            name,
+            title,
+            about,
+            axes,
+            seeds,
+            sample,
+            figures,
+            base,
+            text,
+            experiment,
+            filter,
+        })
+    }
+}
+
+/// Names of columns that are not axes.
+fn reserved(name: &str) -> bool {
+    ["point", "seed", "status", "key", "run", "state_hash", "data_hash"].contains(&name)
+        || RESULTS.iter().any(|result| result.name == name)
+}
+
+fn sampled(file: SampleFile) -> Result<Sample, SweepError> {
+    let latin_hypercube = match file.method.as_deref() {
+        Some("latin_hypercube") => true,
+        Some("random") => false,
+        other => {
+            let found = other.map_or("is missing".into(), |name| format!("is {name:?}"));
+            return Err(SweepError::key("sample.method", &found, "use random or latin_hypercube"));
+        }
+    };
+    let points = file.points.unwrap_or(0);
+    if !(1..=1_000_000).contains(&points) {
+        let found = format!("is {points}");
+        return Err(SweepError::key("sample.points", &found, "it must lie in 1..=1000000"));
+    }
+    Ok(Sample { latin_hypercube, points, seed: file.seed.unwrap_or(1) })
+}
+
+fn seeds(file: Option<SeedsFile>) -> Result<Vec<u64>, SweepError> {
+    let list = match file {
+        None => return Ok(vec![]),
+        Some(SeedsFile::Count(count)) => (1..=u64::from(count)).collect(),
+        Some(SeedsFile::List(list)) => list,
+    };
+    let allowed = "give 1 to 100000 different ones";
+    if !(1..=100_000).contains(&list.len()) {
+        return Err(SweepError::key("seeds", &format!("are {}", list.len()), allowed));
+    }
+    let mut sorted = list.clone();
+    sorted.sort_unstable();
+    sorted.dedup();
+    if sorted.len() < list.len() {
+        return Err(SweepError::key("seeds", "name one twice", allowed));
+    }
+    Ok(list)
+}
+
+/// What the figures show: what the file says, and else the first axes that suit.
+fn figures(file: ReportFile, axes: &[Axis]) -> Result<Figures, SweepError> {
+    let known = || axes.iter().map(|axis| &*axis.name).collect::<Vec<_>>().join(", ");
+    let is_axis = |key: &str, name: &String| {
+        if axes.iter().any(|axis| axis.name == *name) {
+            return Ok(());
+        }
+        let found = format!("is {name:?}");
+        Err(SweepError::key(&format!("report.{key}"), &found, &format!("axes are {}", known())))
+    };
+    let is_result = |key: &str, name: &String| {
+        if RESULTS.iter().any(|result| result.name == name) {
+            return Ok(());
+        }
+        let all: Vec<_> = RESULTS.iter().map(|result| result.name).collect();
+        let allowed = format!("results are {}", all.join(", "));
+        Err(SweepError::key(&format!("report.{key}"), &format!("is {name:?}"), &allowed))
+    };
+    for (key, name) in [("x", &file.x), ("series", &file.series), ("panel", &file.panel)] {
+        name.iter().try_for_each(|name| is_axis(key, name))?;
+    }
+    for name in file.heat.iter().flatten() {
+        is_axis("heat", name)?;
+    }
+    for (key, name) in [("y", &file.y), ("cost", &file.cost)] {
+        name.iter().try_for_each(|name| is_result(key, name))?;
+    }
+    let number = || axes.iter().find(|axis| axis.is_number()).unwrap_or(&axes[0]).name.clone();
+    let x = file.x.unwrap_or_else(number);
+    let named = [Some(&x), file.series.as_ref(), file.panel.as_ref()];
+    // a range has no end of values: no curves, no panels
+    let few =
+        |axis: &&Axis| (1..=8).contains(&axis.list().len()) && !named.contains(&Some(&axis.name));
+    let mut free: Vec<String> = axes.iter().filter(few).map(|axis| axis.name.clone()).collect();
+    free.reverse();
+    let series = file.series.or_else(|| free.pop());
+    let panel = file.panel.or_else(|| free.pop());
+    let other = axes.iter().map(|axis| axis.name.clone()).find(|name| *name != x);
+    let heat = file.heat.or_else(|| Some([x.clone(), series.clone().or(other)?]));
+    let y = file.y.unwrap_or_else(|| "test_accuracy".into());
+    Ok(Figures { x, y, series, panel, heat, cost: file.cost })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const GRID: &str = "[[axis]]\nkey = 'hw.cell.level_bits'\nvalues = [1, 2]\n[[axis]]\nkey = 'learning.rule'\n\
+                        values = ['ed', 'bp']\n";
+
+    fn sweep(text: &str) -> Result<Sweep, String> {
+        Sweep::parse("a_b.toml", text, "").map_err(|e| e.to_string())
+    }
+
+    #[test]
+    fn what_is_not_said_follows() {
+        let sweep = sweep(GRID).unwrap();
+        assert_eq!((sweep.name.as_str(), sweep.title.as_str()), ("a-b", "a-b"));
+        assert_eq!(sweep.seeds, []);
+        let Figures { x, y, series, panel, heat, cost } = sweep.figures;
+        assert_eq!((x.as_str(), y.as_str()), ("level_bits", "test_accuracy"));
+        assert_eq!((series.as_deref(), panel, cost), (Some("rule"), None, None));
+        assert_eq!(heat, Some(["level_bits".into(), "rule".into()]));
+    }
+
+    #[test]
+    fn mistakes_say_what_is_allowed() {
+        for (text, wanted) in [
+            ("", "[[axis]]"),
+            ("axes = 1", "unknown field `axes`"),
+            (&format!("name = 'A b'\n{GRID}"), "lower-case"),
+            (&format!("seeds = [1, 1]\n{GRID}"), "twice"),
+            (&format!("seeds = 0\n{GRID}"), "different"),
+            (&format!("{GRID}[sample]\nmethod = 'sobol'\npoints = 3"), "latin_hypercube"),
+            (&format!("{GRID}[sample]\nmethod = 'random'"), "sample.points"),
+            (&format!("{GRID}[report]\nx = 'bits'"), "axes are level_bits, rule"),
+            (&format!("{GRID}[report]\ny = 'accuracy'"), "results are test_accuracy"),
+            (
+                &format!("{GRID}[[axis]]\nname = 'cycles'\nkey = 'a'\nvalues = [1]"),
+                "another column",
+            ),
+            (&format!("{GRID}[base.learning]\nepoch = 3"), "unknown field `epoch`"),
+            (&format!("filter = ['bits > 3']\n{GRID}"), "level_bits, rule, seed"),
+        ] {
+            let error = sweep(text).unwrap_err();
+            assert!(error.contains(wanted), "{text}: {error}");
+        }
+    }
+}

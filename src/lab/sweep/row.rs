@@ -1,0 +1,147 @@
+//! The results of a finished run as one row, read off its folder alone.
+
+use std::path::Path;
+
+use serde::{Deserialize, Serialize};
+use serde_json::{Map, Number, Value};
+
+use super::SweepError;
+use crate::lab::price::Cost;
+use crate::lab::run::{RunError, reprice};
+use crate::lab::store::folder;
+use crate::lab::store::record::{EpochRecord, Receipt, Score};
+use crate::lab::table::Unit;
+
+/// A column of results.
+#[derive(Debug, Clone, Copy)]
+pub struct ResultColumn {
+    /// Its name.
+    pub name: &'static str,
+    /// Words for people.
+    pub label: &'static str,
+    /// What it is measured in.
+    pub unit: Unit,
+    /// Whether its numbers are whole.
+    pub whole: bool,
+    of: fn(&Facts<'_>) -> Option<Number>,
+}
+
+/// What a row is made of.
+struct Facts<'a> {
+    receipt: &'a Receipt,
+    /// The last record.
+    last: &'a EpochRecord,
+    /// The record of the epoch whose state read the test set.
+    read: &'a EpochRecord,
+    cost: Cost,
+}
+
+impl Facts<'_> {
+    /// Ledger total of the training.
+    fn event(&self, name: &str) -> u64 {
+        self.last.events.get("training").and_then(|events| events.get(name)).copied().unwrap_or(0)
+    }
+
+    fn pathways(&self, of: fn(&crate::lab::store::record::PathwayRecord) -> u64) -> u64 {
+        self.last.pathways.iter().map(of).sum()
+    }
+
+    fn levels(&self, bank: usize) -> u64 {
+        self.last.layers.iter().map(|layer| layer.levels[bank]).sum()
+    }
+
+    fn joules(&self, bound: usize) -> Option<Number> {
+        self.cost.joules.and_then(|joules| Number::from_f64(joules[bound]))
+    }
+}
+
+/// A quotient; nothing when there is nothing to divide by.
+fn over(part: u64, whole: u64) -> Option<Number> {
+    if whole == 0 { None } else { Number::from_f64(part as f64 / whole as f64) }
+}
+
+fn share(score: Option<Score>) -> Option<Number> {
+    score.and_then(|score| over(score.correct, score.total))
+}
+
+macro_rules! results {
+    ($($name:literal, $label:literal, $unit:ident, $whole:literal, $of:expr;)*) => {
+        [$(ResultColumn { name: $name, label: $label, unit: Unit::$unit, whole: $whole, of: $of },)*]
+    };
+}
+
+/// All results, in the order of the table.
+#[rustfmt::skip]
+pub const RESULTS: [ResultColumn; 20] = results![
+    "test_accuracy", "test accuracy", Fraction, false, |f| share(f.receipt.test.as_ref().map(|test| test.score));
+    "validation_accuracy", "validation accuracy", Fraction, false, |f| share(f.read.validation);
+    "train_accuracy", "accuracy while learning", Fraction, false, |f| share(f.last.train);
+    "test_epoch", "epoch of the state that was tested", Plain, true, |f| f.receipt.test.as_ref().map(|test| test.epoch.into());
+    "epochs", "epochs", Plain, true, |f| Some(f.last.epoch.into());
+    "updates", "updates", Count, true, |f| Some(f.last.updates.into());
+    "cells", "cells", Count, true, |f| Some(f.pathways(|p| p.cells).into());
+    "floor_fraction", "cells at the floor", Fraction, false, |f| over(f.pathways(|p| p.floor), f.pathways(|p| p.cells));
+    "pruned_fraction", "cells pruned for good", Fraction, false, |f| over(f.pathways(|p| p.pruned), f.pathways(|p| p.cells));
+    "ei_ratio", "E/I of stored levels", Plain, false, |f| over(f.levels(0), f.levels(1));
+    "pulses_attempted", "pulses given", Count, true, |f| Some(f.event("pulses_attempted").into());
+    "pulses_effective", "pulses that moved a cell", Count, true, |f| Some(f.event("pulses_effective").into());
+    "bounded_fraction", "writes cut by the bound", Fraction, false, |f| over(f.event("bounded"), f.event("requested"));
+    "saturated_fraction", "conversions that saturated", Fraction, false, |f| over(f.event("saturated_conversions"), f.event("conversions"));
+    "cycles", "cycles on the chip", Cycles, true, |f| f.cost.cycles.map(Number::from);
+    "chip_seconds", "time on the chip", Seconds, false, |f| f.cost.seconds.and_then(Number::from_f64);
+    "joules", "energy on the chip", Joules, false, |f| f.joules(1);
+    "joules_low", "energy on the chip, low", Joules, false, |f| f.joules(0);
+    "joules_high", "energy on the chip, high", Joules, false, |f| f.joules(2);
+    "joules_assumed", "share of energy that leans on assumed constants", Fraction, false,
+        |f| f.cost.joules.and_then(|_| Number::from_f64(f.cost.assumed_share));
+];
+
+/// One finished run. Nothing in it depends on the machine or the time.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Row {
+    /// Results by name; those that the run does not have are absent.
+    pub results: Map<String, Value>,
+    /// Hash of the last state.
+    pub state_hash: String,
+    /// Hash of the data.
+    pub data_hash: String,
+    /// Name of the chip.
+    pub hardware: String,
+    /// What it leaves out: `key = text`.
+    pub not_simulated: Vec<String>,
+}
+
+/// Reads a finished run; with it, the seconds its learning took.
+///
+/// # Errors
+/// When it is not finished or damaged.
+pub fn row(path: &Path) -> Result<(Row, f64), SweepError> {
+    let receipt = folder::read_receipt(path).map_err(RunError::from)?;
+    let records = folder::read_metrics(path).map_err(RunError::from)?;
+    let priced = reprice(path, None)?;
+    let damaged = |found: &str| {
+        let found = found.into();
+        RunError::from(folder::FolderError::Content { path: path.into(), found })
+    };
+    let last = records.last().ok_or_else(|| damaged("has no record"))?;
+    if receipt.status != "finished" {
+        return Err(damaged("is not finished").into());
+    }
+    let tested = receipt.test.as_ref().map(|test| test.epoch);
+    let read = records.iter().find(|record| Some(record.epoch) == tested).unwrap_or(last);
+    let facts = Facts { receipt: &receipt, last, read, cost: priced.cost() };
+    let results = RESULTS.iter().filter_map(|column| {
+        let value = (column.of)(&facts)?;
+        Some((column.name.to_owned(), Value::Number(value)))
+    });
+    let not_simulated = priced.not_simulated.iter().map(|(key, text)| format!("{key} = {text}"));
+    let row = Row {
+        results: results.collect(),
+        state_hash: last.state_hash.clone(),
+        data_hash: receipt.data_hash.clone(),
+        hardware: priced.made_on.clone(),
+        not_simulated: not_simulated.collect(),
+    };
+    Ok((row, receipt.train_seconds))
+}

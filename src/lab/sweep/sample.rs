@@ -1,0 +1,65 @@
+//! Doing some runs of a store again, to see whether its numbers hold.
+
+use std::collections::BTreeSet;
+
+use super::row::row;
+use super::{Row, SweepError};
+use crate::lab::data::DataRoot;
+use crate::lab::run::{self, Machine, Verdict};
+use crate::lab::store::index::Store;
+use crate::task::classify::Progress;
+
+/// A run that was done again.
+#[derive(Debug)]
+pub struct Sampled {
+    /// Which.
+    pub key: String,
+    /// What doing it again showed.
+    pub verdict: Verdict,
+}
+
+/// Draws `count` finished runs by the number `seed` and does each again: its row in the index must be what its folder
+/// says, its folder must be that of its key, and every state hash and the test must come out the same.
+///
+/// # Errors
+/// When a folder is missing or damaged, data is not the same, or the caller stops it.
+pub fn sample(
+    store: &Store,
+    count: usize,
+    seed: u64,
+    root: &DataRoot,
+    machine: Machine,
+    on_run: &mut dyn FnMut(usize, &Sampled),
+    on_batch: &mut (dyn FnMut(Progress) -> bool + Send),
+) -> Result<usize, SweepError> {
+    let rows = store.rows()?;
+    let mut order: Vec<_> = rows
+        .iter()
+        .map(|(key, text, _)| {
+            let mut hash = blake3::Hasher::new();
+            hash.update(&seed.to_le_bytes()).update(key.as_bytes());
+            (*hash.finalize().as_bytes(), key, text)
+        })
+        .collect();
+    order.sort();
+    let mut seen = BTreeSet::new();
+    for (number, (_, key, text)) in order.into_iter().take(count).enumerate() {
+        let path = store.folder(key);
+        let (found, _) = row(&path)?;
+        let kept: Option<Row> = serde_json::from_str(text).ok();
+        let address = super::merge::address_of(&path)?;
+        let verdict = if address != *key {
+            let what = format!("the key of {}", path.display());
+            Verdict::Different { what, wanted: key.clone(), found: address }
+        } else if kept.as_ref() != Some(&found) {
+            let what = format!("the row of run {key} in the index");
+            let found = serde_json::to_string(&found).expect("rows have a JSON form");
+            Verdict::Different { what, wanted: text.clone(), found }
+        } else {
+            run::verify(&path, root, machine, None, on_batch)?
+        };
+        seen.insert(key);
+        on_run(number + 1, &Sampled { key: key.clone(), verdict });
+    }
+    Ok(seen.len())
+}
