@@ -92,6 +92,7 @@ pub fn verify(
     let mut tested = false;
     if let (true, Some(wanted)) = (whole, &receipt.test) {
         let mut found = best.map_or_else(|| session.test(), |(_, test)| test);
+        // receipts of earlier programs list none
         if wanted.confused.is_empty() {
             found.confused.clear();
         }
