@@ -23,6 +23,7 @@ mod export;
 mod hw;
 mod price;
 mod progress;
+mod report;
 mod run;
 mod store;
 mod sweep;
@@ -84,6 +85,8 @@ enum Command {
     Profile(price::ProfileArgs),
     /// Price a finished run: joules and seconds, with its own constants or another chip's
     Price(price::PriceArgs),
+    /// Draw the page of a run again, from what is in its folder
+    Report(report::ReportArgs),
     /// Show and fetch data sets
     #[command(subcommand)]
     Data(data::DataCommand),
@@ -202,6 +205,7 @@ pub fn main() -> ExitCode {
         Command::Store(command) => store::execute(&command),
         Command::Profile(args) => price::profile(&args),
         Command::Price(args) => price::price(&args),
+        Command::Report(args) => report::execute(&args),
         Command::Data(command) => data::execute(&command),
         Command::Hw(command) => hw::execute(&command),
         Command::Trace(args) => trace::execute(&args),

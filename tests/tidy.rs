@@ -22,8 +22,14 @@ const HOUSE: [(&str, &[&str]); 6] = [
     ("chip", &["hardware", "ledger", "periphery", "crossbar", "population", "layer", "engine"]),
     ("learn", &["error", "route", "statistics", "rule", "driver"]),
     ("task", &["classify"]),
-    ("lab", &["data", "config", "store", "price", "wave", "table", "report", "run", "sweep"]),
-    ("cli", &["progress", "data", "hw", "run", "sweep", "export", "store", "price", "trace", "bench"]),
+    ("lab", &["data", "config", "store", "price", "table", "report", "run", "wave", "sweep"]),
+    (
+        "cli",
+        &[
+            "progress", "data", "hw", "run", "report", "sweep", "export", "store", "price",
+            "trace", "bench",
+        ],
+    ),
 ];
 
 /// Wings that know no floats, clocks, hash maps, environment or files.

@@ -36,7 +36,8 @@ pub(super) fn execute(args: &ExportArgs) -> Done {
     let store = Store::existing(&path).map_err(SweepError::from)?;
     let record = sweep::find(&store, args.sweep.as_deref())?;
     let results = sweep::results(&store, &record)?;
-    let ending = args.out.as_ref().and_then(|out| out.extension()).and_then(|ending| ending.to_str());
+    let ending =
+        args.out.as_ref().and_then(|out| out.extension()).and_then(|ending| ending.to_str());
     let format = match (args.format, ending) {
         (Some(format), _) => format,
         (None, None) => Format::Csv,

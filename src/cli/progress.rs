@@ -135,7 +135,16 @@ impl SweepMeter {
             bar.set_style(style.expect("a valid template"));
             bar
         });
-        Self { bar, quiet, started: now, last_line: now, done: 0.0, total: 0.0, finished: 0, runs: 0 }
+        Self {
+            bar,
+            quiet,
+            started: now,
+            last_line: now,
+            done: 0.0,
+            total: 0.0,
+            finished: 0,
+            runs: 0,
+        }
     }
 
     /// Notes what there is to do.

@@ -260,7 +260,10 @@ fn sample(args: &VerifyArgs, count: usize, machine: Machine, stop: &AtomicBool) 
                 say(&json!({"event": "run", "key": sampled.key, "verified": true, "state_hash": state_hash})
                     .to_string());
             } else if !shared.quiet {
-                say(&format!("{number:>4}/{count}  {}  {epochs} state hashes are the same", sampled.key));
+                say(&format!(
+                    "{number:>4}/{count}  {}  {epochs} state hashes are the same",
+                    sampled.key
+                ));
             }
         }
         Verdict::Different { what, wanted, found } => {
@@ -283,7 +286,8 @@ fn sample(args: &VerifyArgs, count: usize, machine: Machine, stop: &AtomicBool) 
     }
     let again = format!("--sample {count} --sample-seed {seed}");
     if shared.json {
-        say(&json!({"event": "done", "verified": true, "runs": runs, "sample_seed": seed}).to_string());
+        say(&json!({"event": "done", "verified": true, "runs": runs, "sample_seed": seed})
+            .to_string());
     } else {
         say(&format!("verified: {same} runs drawn with {again} give the same bits"));
     }

@@ -59,7 +59,8 @@ pub(super) fn execute(command: &StoreCommand) -> Done {
         StoreCommand::Index { store, json } => {
             let [finished, others] = sweep::reindex(&mut Store::open(store)?, &mut |_, _| {})?;
             if *json {
-                say(&json!({"event": "done", "finished": finished, "unfinished": others}).to_string());
+                say(&json!({"event": "done", "finished": finished, "unfinished": others})
+                    .to_string());
             } else {
                 say(&format!("{finished} finished runs, {others} folders that are not finished"));
             }
@@ -101,7 +102,10 @@ fn merge(into: &mut Store, from: &Store, json: bool) -> Done {
         merged.runs, merged.shared, merged.sweeps
     ));
     if merged.held > 0 {
-        eprintln!("warning: {} runs are at work in another process and were left; merge again", merged.held);
+        eprintln!(
+            "warning: {} runs are at work in another process and were left; merge again",
+            merged.held
+        );
     }
     for name in merged.different {
         eprintln!(

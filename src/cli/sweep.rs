@@ -107,8 +107,9 @@ pub(super) fn execute(args: &SweepArgs) -> Done {
         return Err(Failure { code: 1, message });
     }
     if finished < runs {
-        let message =
-            format!("stopped: {finished} of {runs} runs are finished; give the same command again to go on");
+        let message = format!(
+            "stopped: {finished} of {runs} runs are finished; give the same command again to go on"
+        );
         return Err(Failure { code: 3, message });
     }
     Ok(())
@@ -134,8 +135,13 @@ fn announce(shared: &Shared, plan: &Plan, path: &std::path::Path) {
         if let Some(first) = first
             && let Err(why) = &plan.points[first].key
         {
-            let others = if refused > 1 { format!(" (and {} more)", refused - 1) } else { String::new() };
-            eprintln!("warning: point {} ({}) cannot run{others}: {why}", first + 1, plan.words(first));
+            let others =
+                if refused > 1 { format!(" (and {} more)", refused - 1) } else { String::new() };
+            eprintln!(
+                "warning: point {} ({}) cannot run{others}: {why}",
+                first + 1,
+                plan.words(first)
+            );
         }
         eprintln!("store {}", path.display());
     }
@@ -159,10 +165,14 @@ fn describe(plan: &Plan) -> String {
         parts.push(format!("{} seeds", sweep.seeds.len()));
     }
     let filtered = plan.before - plan.points.len();
-    let filtered =
-        if filtered > 0 { format!(" less {filtered} filtered") } else { String::new() };
+    let filtered = if filtered > 0 { format!(" less {filtered} filtered") } else { String::new() };
     let runs = plan.tasks.len();
-    format!("{}: {} points = {}{filtered}, {runs} runs", sweep.name, plan.points.len(), parts.join(" x "))
+    format!(
+        "{}: {} points = {}{filtered}, {runs} runs",
+        sweep.name,
+        plan.points.len(),
+        parts.join(" x ")
+    )
 }
 
 fn dry_run(args: &SweepArgs, plan: &Plan, machine: Machine, path: &std::path::Path) -> Done {
@@ -209,8 +219,7 @@ fn tell(meter: &mut SweepMeter, plan: &Plan, event: &Event<'_>) {
             let figure = &plan.sweep.figures.y;
             let value = row.results.get(figure).and_then(serde_json::Value::as_f64);
             let value = value.map_or_else(|| "-".into(), |value| format!("{value:.4}"));
-            let took =
-                if *elsewhere { "elsewhere".into() } else { format!("{seconds:.1} s") };
+            let took = if *elsewhere { "elsewhere".into() } else { format!("{seconds:.1} s") };
             meter.finished(&format!("{}  {figure} {value}  {took}", plan.words(task.point)));
         }
         Event::Failed { task, error } => {

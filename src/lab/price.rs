@@ -28,6 +28,7 @@ mod changes;
 mod cost;
 mod peak;
 mod plan;
+mod stage;
 mod unit;
 
 pub use bill::{Bill, Group, Idle, Line, Missing, Range, Share, price};
@@ -35,4 +36,5 @@ pub use changes::{Change, changes};
 pub use cost::Cost;
 pub use peak::{Figure, Peak, areas, figures, peak};
 pub use plan::{Plan, PlanLayer};
+pub use stage::{StageUse, stages};
 pub use unit::{bounds, prefixed};

@@ -22,6 +22,7 @@ pub mod text;
 mod sample;
 
 use super::price::Cost;
+use super::store::ledger::LedgerRecord;
 use super::store::record::{EpochRecord, Receipt};
 
 /// Levels of one pathway of one layer in the final state.
@@ -35,8 +36,6 @@ pub struct Heat {
     pub rows: usize,
     /// Output side.
     pub columns: usize,
-    /// Highest level a cell can hold.
-    pub level_max: u16,
     /// Row-major.
     pub levels: Vec<u16>,
 }
@@ -73,12 +72,16 @@ pub struct RunView<'a> {
     pub receipt: &'a Receipt,
     /// One record an epoch, in order; epoch 0 is the state before the first update.
     pub epochs: &'a [EpochRecord],
+    /// Highest level a cell can hold.
+    pub level_max: u16,
     /// Final levels, any subset of the pathways.
     pub heats: &'a [Heat],
     /// Wrong answers.
     pub pictures: &'a [Picture],
     /// Names of the classes; numbers stand in for missing ones.
     pub class_names: &'a [String],
+    /// What was counted on the chip; only a finished run has it.
+    pub ledger: Option<&'a LedgerRecord>,
     /// What the run cost on its chip.
     pub cost: Option<&'a Cost>,
 }

@@ -1,18 +1,20 @@
-//! Carrying out a configuration: train, continue, verify, evaluate.
+//! Carrying out a configuration: train, continue, verify, evaluate, report.
 //!
 //! A [`Session`] is a training in memory that makes records; [`train`] keeps it in a folder, [`verify()`] compares it with
 //! one. Neither prints: callers get [`Event`]s.
 
 mod profile;
+mod report;
 mod repriced;
 mod session;
 mod train;
 mod verify;
 
-pub use profile::{Act, Profile, StageUse, profile};
+pub use profile::{Act, Profile, profile};
+pub use report::{ReportMade, report};
 pub use repriced::{Repriced, reprice};
 pub use session::{Machine, Session};
-pub use train::{Event, Keeping, Outcome, carry_on, evaluate, resume, train, view};
+pub use train::{Event, Keeping, Outcome, carry_on, evaluate, resume, train};
 pub use verify::{Verdict, verify};
 
 use crate::chip::layer::PlanError;

@@ -12,6 +12,7 @@ mod hardware;
 mod laws;
 mod oracle;
 mod program;
+mod report;
 mod rules;
 mod same_bits;
 mod sweep;

@@ -55,15 +55,24 @@ fn a_sweep_fills_its_table_and_is_not_done_again() {
     let head = table.lines().next().unwrap();
     assert!(head.starts_with("point,bits,rule,seed,test_accuracy,"), "{head}");
     // the table says what `train` says of the same configuration
-    let settings = ["data.set=optdigits", "network.hidden=[16]", "network.alpha=4", "learning.batch=64",
-        "learning.epochs=3", "learning.rule=bp", "learning.rate=10", "hw.cell.level_bits=4"];
+    let settings = [
+        "data.set=optdigits",
+        "network.hidden=[16]",
+        "network.alpha=4",
+        "learning.batch=64",
+        "learning.epochs=3",
+        "learning.rule=bp",
+        "learning.rate=10",
+        "hw.cell.level_bits=4",
+    ];
     let empty = store.path().join("empty.toml");
     std::fs::write(&empty, "").unwrap();
     let mut train = dalean();
     train.arg("train").arg(&empty).args(["--json", "--seed", "2", "--out"]).arg(store.path());
     settings.iter().for_each(|setting| drop(train.args(["--set", setting])));
     let trained = run(&mut train).last();
-    let wanted = |event: &&Value| event["values"] == serde_json::json!([4, "bp"]) && event["seed"] == 2;
+    let wanted =
+        |event: &&Value| event["values"] == serde_json::json!([4, "bp"]) && event["seed"] == 2;
     let same = runs.iter().find(wanted).unwrap();
     assert_eq!(same["state_hash"], trained["state_hash"]);
     assert_eq!(same["results"]["test_accuracy"], trained["test_accuracy"]);
@@ -86,7 +95,11 @@ fn killed_ten_times_with_two_processes_the_table_is_that_of_an_undisturbed_sweep
     let (_, _, wanted) = undisturbed();
     let store = tempfile::tempdir().unwrap();
     let start = || {
-        sweep(store.path()).stdout(Stdio::piped()).stderr(Stdio::null()).spawn().expect("the program starts")
+        sweep(store.path())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::null())
+            .spawn()
+            .expect("the program starts")
     };
     let mut killed = 0;
     for number in 0..10u64 {
@@ -104,7 +117,11 @@ fn killed_ten_times_with_two_processes_the_table_is_that_of_an_undisturbed_sweep
     let pair = [start(), start()];
     let pair = pair.map(|child| Ran::from(child.wait_with_output().unwrap()));
     for ran in &pair {
-        assert_eq!((ran.code, ran.last()["finished"].as_u64()), (Some(0), Some(RUNS as u64)), "{ran:?}");
+        assert_eq!(
+            (ran.code, ran.last()["finished"].as_u64()),
+            (Some(0), Some(RUNS as u64)),
+            "{ran:?}"
+        );
     }
     assert_eq!(table(store.path()), wanted);
     assert_eq!(folders(store.path()), RUNS);
@@ -114,7 +131,8 @@ fn killed_ten_times_with_two_processes_the_table_is_that_of_an_undisturbed_sweep
 fn two_processes_share_a_store_without_doing_a_run_twice() {
     let (_, _, wanted) = undisturbed();
     let store = tempfile::tempdir().unwrap();
-    let start = || sweep(store.path()).args(["--threads", "1"]).stdout(Stdio::piped()).spawn().unwrap();
+    let start =
+        || sweep(store.path()).args(["--threads", "1"]).stdout(Stdio::piped()).spawn().unwrap();
     let pair = [start(), start()].map(|child| Ran::from(child.wait_with_output().unwrap()));
     let mut done = BTreeMap::new();
     for ran in &pair {
@@ -141,7 +159,8 @@ fn shards_in_stores_of_their_own_merge_into_the_whole() {
         store
     });
     let whole = root.path().join("whole");
-    let merge = |from: &[&Path]| run(dalean().args(["store", "merge", "--json"]).arg(&whole).args(from));
+    let merge =
+        |from: &[&Path]| run(dalean().args(["store", "merge", "--json"]).arg(&whole).args(from));
     let ran = merge(&parts.each_ref().map(AsRef::as_ref));
     assert_eq!(ran.code, Some(0), "{ran:?}");
     assert_eq!(table(&whole), wanted);
@@ -170,7 +189,13 @@ fn a_sample_of_a_store_is_done_again_and_lies_are_found() {
     let (store, _, _) = undisturbed();
     let verify = |count: &str| {
         let path = store.path();
-        run(dalean().arg("verify").arg(path).args(["--json", "--sample", count, "--sample-seed", "1"]))
+        run(dalean().arg("verify").arg(path).args([
+            "--json",
+            "--sample",
+            count,
+            "--sample-seed",
+            "1",
+        ]))
     };
     let ran = verify("3");
     assert_eq!((ran.code, ran.last()["runs"].as_u64()), (Some(0), Some(3)), "{ran:?}");
@@ -191,7 +216,9 @@ fn a_full_disk_stops_a_sweep_that_goes_on_later() {
     let (_, _, wanted) = undisturbed();
     let store = tempfile::tempdir().unwrap();
     for room in [1, 9, 25] {
-        let line = format!("ulimit -f {room}; trap '' XFSZ; exec \"$0\" sweep \"$2\" --json --store \"$1\"");
+        let line = format!(
+            "ulimit -f {room}; trap '' XFSZ; exec \"$0\" sweep \"$2\" --json --store \"$1\""
+        );
         let mut command = Command::new("bash");
         command.arg("-c").arg(line).arg(env!("CARGO_BIN_EXE_dalean")).arg(store.path()).arg(SWEEP);
         let ran = run(&mut command);

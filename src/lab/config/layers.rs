@@ -77,7 +77,8 @@ pub fn load(sources: &Sources<'_>) -> Result<Config, ConfigError> {
 
 /// A table as what its keys mean.
 fn table_of(place: &str, table: &toml::Table) -> Result<ExperimentFile, ConfigError> {
-    let error = |e: toml::de::Error| ConfigError::Text { place: place.into(), error: e.to_string() };
+    let error =
+        |e: toml::de::Error| ConfigError::Text { place: place.into(), error: e.to_string() };
     table.clone().try_into().map_err(error)
 }
 
@@ -93,7 +94,10 @@ pub fn setting(key: &str, value: toml::Value) -> toml::Table {
     table
 }
 
-pub(super) fn parse<T: serde::de::DeserializeOwned>(place: &str, text: &str) -> Result<T, ConfigError> {
+pub(super) fn parse<T: serde::de::DeserializeOwned>(
+    place: &str,
+    text: &str,
+) -> Result<T, ConfigError> {
     toml::from_str(text)
         .map_err(|e| ConfigError::Text { place: place.into(), error: e.to_string() })
 }

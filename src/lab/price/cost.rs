@@ -1,6 +1,6 @@
 //! What a report shows of a bill: a few totals.
 
-use super::bill::{Bill, Group, Missing, Range};
+use super::bill::{Bill, Group, Missing, Range, Share};
 use crate::chip::ledger::Event;
 use crate::lab::config::{Constants, Table};
 use crate::lab::store::ledger::LedgerRecord;
@@ -16,6 +16,16 @@ pub struct Cost {
     pub joules: Option<Range>,
     /// Joules by component, the greatest first.
     pub components: Vec<Group>,
+    /// Joules by phase, the greatest first.
+    pub phases: Vec<Group>,
+    /// Joules by operation, the greatest first.
+    pub operations: Vec<Group>,
+    /// Joules by layer, static power last.
+    pub layers: Vec<Group>,
+    /// Joules by pathway, the greatest first.
+    pub pathways: Vec<Group>,
+    /// How much of the typical total leans on each constant, the greatest first.
+    pub constants: Vec<Share>,
     /// Part of the typical total that leans on assumed constants.
     pub assumed_share: f64,
     /// What has no price.
@@ -38,6 +48,11 @@ impl Cost {
             seconds: bill.seconds_total(),
             joules: priced.then(|| bill.total()),
             components: bill.by_component(),
+            phases: bill.by_phase(),
+            operations: bill.by_operation(),
+            layers: bill.by_layer(),
+            pathways: bill.by_pathway(),
+            constants: bill.shares(),
             assumed_share: bill.assumed().0,
             missing: bill.missing.clone(),
             each: each.collect(),

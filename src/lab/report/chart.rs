@@ -1,6 +1,8 @@
 //! Line charts as inline SVG: axes, lines, bars, labels at the line ends, and bands the pointer reads values from.
 //! Colours and type come from the page's style sheet.
 
+mod margin;
+
 use std::fmt::Write as _;
 
 use super::number::{escape, place};
@@ -62,7 +64,7 @@ impl Chart {
     /// Axes and grid; `right` units are left free for labels at the line ends.
     pub(super) fn new(width: f64, height: f64, right: f64, x: Axis, y: Axis) -> Self {
         let digits = y.ticks.iter().map(|(_, text)| text.chars().count()).max().unwrap_or(1);
-        let left = 26.0 + 6.6 * super::number::size(digits);
+        let left = 30.0 + 6.9 * super::number::size(digits);
         let body = String::new();
         let mut chart = Self { width, height, left, right, top: 12.0, bottom: 42.0, x, y, body };
         chart.axes();
@@ -199,6 +201,13 @@ impl Chart {
             self.body,
             "<circle class=\"dot\" style=\"fill:{colour}\" cx=\"{x}\" cy=\"{y}\" r=\"2.6\"/>"
         );
+    }
+
+    /// Labels right of the plot, in the colour of text, each beside a value.
+    pub(super) fn beside(&mut self, labels: impl Iterator<Item = (f64, String)>) {
+        let end = |(value, text)| End { y: self.y(value), text, colour: "var(--ink)" };
+        let ends = labels.map(end).collect();
+        self.ends(ends);
     }
 
     /// Labels right of the plot, pushed apart until none overlaps.

@@ -21,13 +21,6 @@ pub(super) fn dashed(name: &str) -> bool {
     name.ends_with('n')
 }
 
-/// The style-sheet colour of a layer; colours return after six layers.
-pub(super) fn layer(layer: usize) -> &'static str {
-    const LAYERS: [&str; 6] =
-        ["var(--a)", "var(--b)", "var(--c)", "var(--d)", "var(--e)", "var(--f)"];
-    LAYERS[layer % LAYERS.len()]
-}
-
 /// Dark violet through green to yellow: anchors at equal steps of lightness, straight lines between.
 const ANCHORS: [[f64; 3]; 10] = [
     [68.0, 1.0, 84.0],
@@ -53,6 +46,25 @@ pub(super) fn levels() -> Palette {
         };
         [mix(0), mix(1), mix(2), 255]
     })
+}
+
+/// The place in [`shares`] of a share, 0 to 1: clear at 0, then logarithmic from 0.01 % on.
+pub(super) fn share_index(share: f64) -> u8 {
+    if share <= 0.0 {
+        return 0;
+    }
+    let along = 1.0 + share.clamp(SHARE_MIN, 1.0).log10() / -SHARE_MIN.log10();
+    byte(1.0 + 254.0 * along)
+}
+
+/// Where the scale of shares begins; what is rarer looks the same.
+const SHARE_MIN: f64 = 1e-4;
+
+/// The map of levels, clear where there is nothing.
+pub(super) fn shares() -> Palette {
+    let mut palette = levels();
+    palette[0] = [255, 255, 255, 0];
+    palette
 }
 
 const EXCITES: [u8; 3] = [20, 134, 212];
@@ -98,6 +110,12 @@ mod tests {
         let map = levels();
         assert!(map.windows(2).all(|pair| light(pair[1]) >= light(pair[0]) - 0.8));
         assert_eq!((map[0], map[255]), ([68, 1, 84, 255], [253, 231, 37, 255]));
+    }
+
+    #[test]
+    fn shares_are_clear_at_nothing_and_logarithmic_above() {
+        assert_eq!([0.0, 1e-9, 1e-4, 0.01, 1.0].map(share_index), [0, 1, 1, 128, 255]);
+        assert_eq!((shares()[0][3], shares()[1][3]), (0, 255));
     }
 
     #[test]

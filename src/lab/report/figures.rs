@@ -12,6 +12,8 @@ mod histogram;
 mod mistakes;
 mod pathways;
 mod saturation;
+mod time;
+mod timelines;
 mod turnover;
 mod writes;
 
@@ -38,19 +40,18 @@ pub(super) struct Figure {
 pub(super) type Draw = for<'a, 'b> fn(&'a RunView<'b>) -> Option<Figure>;
 
 /// All figures, in the order of the page.
-pub(super) const ALL: [Draw; 14] = [
+pub(super) const ALL: [Draw; 13] = [
     accuracy::draw,
     confusion::draw,
-    balance::draw,
-    floor::draw,
-    turnover::draw,
+    mistakes::draw,
+    timelines::draw,
+    histogram::draw,
     fields::draw,
     heat::draw,
-    histogram::draw,
     writes::draw,
     saturation::draw,
+    time::draw,
     energy::draw,
-    mistakes::draw,
     pathways::draw,
     configuration::draw,
 ];
@@ -88,13 +89,6 @@ fn per_epoch(view: &RunView<'_>, phase: &str, event: &str) -> Vec<(f64, u64)> {
 /// First and last epoch on record.
 fn span(view: &RunView<'_>) -> Option<(u32, u32)> {
     Some((view.epochs.first()?.epoch, view.epochs.last()?.epoch))
-}
-
-/// Small charts, a heading each, side by side.
-fn multiples(charts: impl Iterator<Item = (String, String)>) -> String {
-    let charts = charts
-        .map(|(heading, chart)| format!("<div class=\"multiple\"><h3>{heading}</h3>{chart}</div>"));
-    format!("<div class=\"multiples\">{}</div>", charts.collect::<String>())
 }
 
 /// `Layer 0 <small>784 → 512</small>`.

@@ -25,6 +25,14 @@ pub(super) fn percent_of(part: u64, whole: u64, digits: usize) -> String {
     quotient(part, whole).map_or_else(|| "–".into(), |fraction| percent(fraction, digits))
 }
 
+/// A share with one decimal, as markup; what would round to 0 but is not says so.
+pub(super) fn share(fraction: f64) -> String {
+    if fraction > 0.0 && fraction < 0.0005 {
+        return "&lt;\u{202f}0.1\u{202f}%".into();
+    }
+    percent(fraction, 1)
+}
+
 /// Three significant digits of a ratio, or a dash.
 pub(super) fn ratio(value: Option<f64>) -> String {
     match value {
@@ -162,6 +170,10 @@ mod tests {
     fn nothing_divided_by_nothing_is_a_dash() {
         assert_eq!(percent_of(0, 0, 1), "–");
         assert_eq!(percent_of(1, 3, 1), "33.3\u{202f}%");
+        assert_eq!(
+            [0.0, 0.0004, 0.0005].map(share),
+            ["0.0\u{202f}%", "&lt;\u{202f}0.1\u{202f}%", "0.1\u{202f}%"]
+        );
         assert_eq!(ratio(None), "–");
         assert_eq!(seconds(f64::NAN), "–");
         assert_eq!(place(f64::INFINITY), "0");

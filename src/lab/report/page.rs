@@ -42,7 +42,7 @@ fn header(view: &RunView<'_>) -> String {
     let shape: Vec<String> = shape(view).iter().map(ToString::to_string).collect();
     let mut facts = vec![escape(&receipt.data)];
     if !shape.is_empty() {
-        facts.push(shape.join("\u{202f}–\u{202f}"));
+        facts.push(format!("<span class=\"nowrap\">{}</span>", shape.join("\u{202f}–\u{202f}")));
     }
     facts.push(format!("kernel {}", escape(&receipt.kernel)));
     facts.push(match receipt.threads {
@@ -158,6 +158,9 @@ fn keys(view: &RunView<'_>) -> String {
 /// Time and energy of the run on its chip.
 fn chip(cost: &Cost, key: &dyn Fn(&str, &str, &str) -> String) -> String {
     let mut out = String::new();
+    let key = |name: &str, value: &str, note: &str| {
+        key(name, value, note).replacen("class=\"key\"", "class=\"key half\"", 1)
+    };
     if let (Some(cycles), Some(seconds)) = (cost.cycles, cost.seconds) {
         let note = format!("{} cycles", short(cycles));
         out += &key("time on the chip", &prefixed(seconds, "s"), &note);
@@ -191,12 +194,22 @@ fn notices(view: &RunView<'_>) -> String {
         out +=
             &format!("<li>The run is <b>{}</b>, not finished.</li>", escape(&view.receipt.status));
     }
-    for warning in &view.receipt.warnings {
+    let absent = not_simulated(view.config);
+    // the receipt repeats them, one a line
+    let repeated = |text: &&String| !absent.is_empty() && text.starts_with("not simulated");
+    for warning in view.receipt.warnings.iter().filter(|text| !repeated(text)) {
         out += &format!("<li>{}</li>", escape(warning));
     }
-    for (key, value) in not_simulated(view.config) {
-        out +=
-            &format!("<li>Not simulated: <code>{} = {}</code></li>", escape(&key), escape(&value));
+    if !absent.is_empty() {
+        let names: Vec<_> = absent.iter().map(|(key, _)| escape(&key.replace('_', " "))).collect();
+        let lines = absent.iter().map(|(key, value)| {
+            format!("<li><code>{} = {}</code></li>", escape(key), escape(value))
+        });
+        out += &format!(
+            "<li><details><summary>Not simulated: {}</summary><ul>{}</ul></details></li>",
+            names.join(", "),
+            lines.collect::<String>()
+        );
     }
     if out.is_empty() { out } else { format!("<ul class=\"notices\">{out}</ul>\n") }
 }

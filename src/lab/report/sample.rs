@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use super::{Heat, Picture, RunView};
 use crate::lab::price::Cost;
+use crate::lab::store::ledger::LedgerRecord;
 use crate::lab::store::record::{
     EpochRecord, LayerRecord, PathwayRecord, Receipt, Score, TestRecord,
 };
@@ -16,6 +17,7 @@ pub(super) struct Sample {
     pub heats: Vec<Heat>,
     pub pictures: Vec<Picture>,
     pub class_names: Vec<String>,
+    pub ledger: Option<LedgerRecord>,
     pub cost: Option<Cost>,
 }
 
@@ -33,6 +35,7 @@ impl Sample {
             heats: heats.collect(),
             pictures: vec![picture(1), picture(3)],
             class_names: vec!["zero".into(), "<one>".into()],
+            ledger: None,
             cost: None,
         }
     }
@@ -43,9 +46,11 @@ impl Sample {
             config: &self.config,
             receipt: &self.receipt,
             epochs: &self.epochs,
+            level_max: 15,
             heats: &self.heats,
             pictures: &self.pictures,
             class_names: &self.class_names,
+            ledger: self.ledger.as_ref(),
             cost: self.cost.as_ref(),
         }
     }
@@ -53,7 +58,7 @@ impl Sample {
 
 fn heat(layer: usize, name: &str, rows: usize, columns: usize) -> Heat {
     let levels = (0..rows * columns).map(|cell| (cell * 37 % 61 % 16) as u16).collect();
-    Heat { layer, pathway: name.into(), rows, columns, level_max: 15, levels }
+    Heat { layer, pathway: name.into(), rows, columns, levels }
 }
 
 fn record(layers: &[(usize, usize, &[&str])], epoch: u32) -> EpochRecord {
@@ -125,6 +130,7 @@ fn receipt(records: &[EpochRecord], classes: usize) -> Receipt {
         score: Score { correct: 1749, total: 1797 },
         confusion,
         mistakes: vec![[17, 1, 0]],
+        confused: vec![[18, 0, 1]],
     };
     Receipt {
         version: "0.1.0".into(),

@@ -5,6 +5,7 @@
 //! ```
 
 use super::number::{float, short, size};
+use crate::lab::price::prefixed;
 
 /// The curve of a scale.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -157,6 +158,35 @@ impl Axis {
         Self { scale, ticks, label: label.into() }
     }
 
+    /// Energies, given in picojoules, on a log curve that ends where they do.
+    pub(super) fn picojoules(values: impl Iterator<Item = f64>, label: &str) -> Self {
+        let (mut low, mut high) = (f64::MAX, f64::MIN_POSITIVE);
+        for value in values.filter(|&value| value > 0.0 && value.is_finite()) {
+            low = low.min(value);
+            high = high.max(value);
+        }
+        if low > high {
+            (low, high) = (1.0, 1.0);
+        }
+        let (from, to) = (0.8 * low, 1.25 * high);
+        let decades = to.log10() - from.log10();
+        let stride = (decades / 6.0).ceil().max(1.0);
+        let parts: &[f64] = if decades > 2.5 {
+            &[1.0]
+        } else if decades > 0.9 {
+            &[1.0, 2.0, 5.0]
+        } else {
+            &[1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0]
+        };
+        let powers = multiples(from.log10().floor(), to.log10(), stride);
+        let ticks = powers
+            .flat_map(|power| parts.iter().map(move |part| part * 10f64.powf(power)))
+            .filter(|&tick| tick >= from && tick <= to)
+            .map(|tick| (tick, round(1e-12 * tick)))
+            .collect();
+        Self { scale: Scale { curve: Curve::Log, from, to }, ticks, label: label.into() }
+    }
+
     /// Levels from 0.
     pub(super) fn levels(end: f64, label: &str) -> Self {
         let to = end.max(1.0);
@@ -164,6 +194,17 @@ impl Axis {
         let ticks = multiples(0.0, to, step).map(|tick| (tick, format!("{tick:.0}"))).collect();
         let scale = Scale { curve: Curve::Linear, from: 0.0, to };
         Self { scale, ticks, label: label.into() }
+    }
+}
+
+/// Joules at a mark, without the digits that a round number does not need.
+pub(super) fn round(joules: f64) -> String {
+    let text = prefixed(joules, "J");
+    match text.split_once(' ') {
+        Some((digits, unit)) if digits.contains('.') => {
+            format!("{}\u{202f}{unit}", digits.trim_end_matches('0').trim_end_matches('.'))
+        }
+        _ => text.replace(' ', "\u{202f}"),
     }
 }
 
@@ -200,6 +241,8 @@ mod tests {
             Axis::ratio([1e-3, 3e4].into_iter(), ""),
             Axis::counts([0.0].into_iter(), ""),
             Axis::counts([1.0, 1e18].into_iter(), ""),
+            Axis::picojoules([2.9e5, 3e5].into_iter(), ""),
+            Axis::picojoules([1e-3, 1e9].into_iter(), ""),
             Axis::levels(0.0, ""),
             Axis::levels(255.0, ""),
         ];

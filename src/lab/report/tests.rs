@@ -1,8 +1,10 @@
 //! Laws of the page: well formed, nothing that is no number, all text escaped, the records' own values.
 
 use super::sample::Sample;
-use super::{html, page, text};
-use crate::lab::price::{Cost, Group, Missing};
+use super::{Picture, html, page, text};
+use crate::lab::config::Kind;
+use crate::lab::price::{Cost, Group, Missing, Share};
+use crate::lab::store::ledger::{CyclesRecord, LayerCycles, LedgerRecord};
 
 const DALE: &[&str] = &["pp", "np", "nn", "pn"];
 const READOUT: &[&str] = &["pp", "np"];
@@ -20,10 +22,34 @@ fn cost() -> Cost {
             group("conversion", [1e-9, 1.5e-9, 5e-9]),
             group("tile_static", [0.0, 5e-10, 3e-9]),
         ],
+        phases: vec![group("training", [1e-9, 2e-9, 8e-9])],
+        operations: vec![group("forward_rows", [1e-9, 1.5e-9, 5e-9])],
+        layers: vec![group("layer 0", [1e-9, 2e-9, 8e-9])],
+        pathways: vec![group("pp", [1e-9, 2e-9, 8e-9])],
+        constants: vec![Share { key: "energy.<x>_pj".into(), share: 0.75, kind: Kind::Fitted }],
         assumed_share: 0.25,
         missing: vec![missing],
         each: vec![("conversions", "conversion", 1e-13)],
     }
+}
+
+/// What a chip with a timing might have counted.
+fn ledger() -> LedgerRecord {
+    let named = |all: &[(&str, u64)]| all.iter().map(|&(name, n)| (name.to_owned(), n)).collect();
+    let phase = |stages: &[(&str, u64)], layers: usize| CyclesRecord {
+        elapsed: stages.iter().map(|(_, cycles)| cycles).sum(),
+        stages: named(stages),
+        layers: (0..layers)
+            .map(|_| LayerCycles {
+                busy: named(&[("forward_rows", 600_000), ("error", 0)]),
+                used: named(&[("converters", 450_000), ("writers", 3)]),
+            })
+            .collect(),
+    };
+    let training = phase(&[("forward", 900_000), ("program", 100_000), ("error", 0)], 2);
+    let evaluation = phase(&[("forward", 234_567)], 0);
+    let phases = [("training".into(), training), ("evaluation".into(), evaluation)];
+    LedgerRecord { counts: vec![], cycles: Some(phases.into()) }
 }
 
 /// Runs at the edges of what a report may meet.
@@ -52,9 +78,10 @@ fn samples() -> Vec<Sample> {
     hollow.heats[0].levels.pop();
     hollow.pictures[0].values.pop();
     let mut priced = dense();
-    priced.cost = Some(cost());
+    (priced.cost, priced.ledger) = (Some(cost()), Some(ledger()));
     let mut timed = dense();
     timed.cost = Some(Cost { joules: None, components: vec![], each: vec![], ..cost() });
+    timed.ledger = Some(ledger());
     let mut colour = Sample::new(&[(193, 4, DALE)], 2, 4);
     colour.pictures.remove(0);
     vec![
@@ -191,14 +218,73 @@ fn effects_that_are_not_simulated_are_found_in_any_table() {
 #[test]
 fn what_a_run_cost_stands_on_page_and_terminal() {
     let mut sample = Sample::new(&[(64, 20, DALE), (20, 10, READOUT)], 3, 10);
-    sample.cost = Some(cost());
-    let page = html(&sample.view());
-    for words in ["time on the chip", "1.23 ms", "energy on the chip", "tile static", "75.0"] {
+    (sample.cost, sample.ledger) = (Some(cost()), Some(ledger()));
+    let page = html(&sample.view()).replace('\u{202f}', " ");
+    for words in [
+        "time on the chip",
+        "1.23 ms",
+        "energy on the chip",
+        "tile static",
+        // shares of the phases, of the stages of training, of the time of a part
+        "<td>81.0 %</td>",
+        "<td>19.0 %</td>",
+        "<td>90.0 %</td><td>900 k</td><td>900 us</td><td>converters of layer 0, 50 %</td>",
+        ">45.0 %</td>",
+        "One update takes 6 493 cycles",
+        // by component, and the constant it leans on
+        "<td>1.00 nJ</td><td><b>1.50 nJ</b></td><td>5.00 nJ</td><td>75.0 %</td>",
+        "energy.&lt;x&gt;_pj",
+        "<b>25 %</b> leans on assumed constants",
+    ] {
         assert!(page.contains(words), "{words}");
     }
     let text = text::summary(&sample.view());
     let line = "on the chip 1.23 M cycles, 1.23 ms, 2.00 nJ (1.00 nJ to 8.00 nJ), 25 % assumed\n";
     assert!(text.contains(line) && text.contains("without a price: holds"), "{text}");
-    sample.cost = None;
+}
+
+#[test]
+fn what_a_chip_does_not_say_is_not_on_the_page() {
+    let has = |sample: &Sample, id: &str| html(&sample.view()).contains(&format!("id=\"{id}\""));
+    let mut sample = Sample::new(&[(64, 20, DALE), (20, 10, READOUT)], 3, 10);
+    assert!(!has(&sample, "time") && !has(&sample, "energy"));
     assert!(!html(&sample.view()).contains("on the chip"));
+    // energies, but no timing
+    sample.ledger = Some(LedgerRecord { cycles: None, ..ledger() });
+    sample.cost = Some(Cost { cycles: None, seconds: None, ..cost() });
+    assert!(!has(&sample, "time") && has(&sample, "energy"));
+    // the reverse
+    sample.ledger = Some(ledger());
+    sample.cost = Some(Cost { joules: None, ..cost() });
+    assert!(has(&sample, "time") && !has(&sample, "energy"));
+}
+
+#[test]
+fn wrong_answers_stand_with_their_confusion_the_most_frequent_first() {
+    let mut sample = Sample::new(&[(64, 20, DALE)], 2, 4);
+    let test = sample.receipt.test.as_mut().unwrap();
+    (test.confusion[2][3], test.confusion[1][0]) = (9, 5);
+    assert_eq!(test.confusions()[..3], [(9, 2, 3), (5, 1, 0), (1, 0, 1)]);
+    let one = sample.pictures[0].clone();
+    let of = |example, truth, guess| Picture { example, truth, guess, ..one.clone() };
+    sample.pictures = (1..=5).map(|example| of(example, 1, 0)).collect();
+    sample.pictures.extend([of(6, 2, 3), of(7, 3, 2)]);
+    let page = html(&sample.view());
+    let start = page.find("id=\"mistakes\"").unwrap();
+    let figure = &page[start..start + page[start..].find("</section>").unwrap()];
+    let order: Vec<_> =
+        figure.match_indices("<small>#").map(|(at, _)| &figure[at + 8..at + 9]).collect();
+    // of a confusion at most four, the others at the end
+    assert_eq!(order, ["6", "1", "2", "3", "4", "5", "7"]);
+    let names = figure.matches("class=\"pair-name\"").count();
+    assert_eq!(names, 2, "{names}");
+}
+
+#[test]
+fn a_run_without_its_states_still_shows_levels_by_their_number() {
+    let mut sample = Sample::new(&[(64, 20, DALE), (20, 10, READOUT)], 3, 10);
+    sample.heats.clear();
+    let page = html(&sample.view());
+    assert!(page.contains("id=\"levels\"") && page.contains("level 3&#10;now 70.0"));
+    assert!(!page.contains("id=\"maps\"") && !page.contains("id=\"fields\""));
 }

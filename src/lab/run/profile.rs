@@ -4,10 +4,10 @@
 use super::{Machine, RunError, Session};
 use crate::chip::engine::Phase;
 use crate::chip::hardware::Hardware;
-use crate::chip::ledger::{Event, Part, Stage};
+use crate::chip::ledger::Event;
 use crate::lab::config::{Config, Constants};
 use crate::lab::data::{self, DataRoot};
-use crate::lab::price::{Bill, Plan, price};
+use crate::lab::price::{Bill, Plan, StageUse, price, stages};
 use crate::lab::store::ledger::{CyclesRecord, LedgerRecord};
 
 /// One update or one inference.
@@ -38,17 +38,6 @@ pub struct Profile {
     pub constants: Constants,
     /// What the user should know.
     pub warnings: Vec<String>,
-}
-
-/// What a stage waits for.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct StageUse {
-    /// Which stage.
-    pub stage: Stage,
-    /// Cycles of it.
-    pub cycles: u64,
-    /// The layer and part that works most of this time, and for how many cycles.
-    pub critical: Option<(usize, Part, u64)>,
 }
 
 /// Builds an experiment, learns its first batch, reads one example.
@@ -104,34 +93,6 @@ impl Act {
     /// Stages that took time, and what each waited for.
     #[must_use]
     pub fn stages(&self) -> Vec<StageUse> {
-        let Some(cycles) = self.cycles() else { return vec![] };
-        let elapsed = |stage: Stage| cycles.stages.get(stage.name()).copied().unwrap_or(0);
-        let stages = Stage::ALL.into_iter().filter(|&stage| elapsed(stage) > 0);
-        let critical = |stage| {
-            let layers = cycles.layers.iter().enumerate();
-            let used = layers.flat_map(|(layer, this)| {
-                parts_of(stage).iter().map(move |&part| {
-                    (layer, part, this.used.get(part.name()).copied().unwrap_or(0))
-                })
-            });
-            let used = used.filter(|(.., used)| *used > 0);
-            used.max_by_key(|&(layer, _, used)| (used, std::cmp::Reverse(layer)))
-        };
-        stages
-            .map(|stage| StageUse { stage, cycles: elapsed(stage), critical: critical(stage) })
-            .collect()
-    }
-}
-
-/// Parts that work in a stage.
-const fn parts_of(stage: Stage) -> &'static [Part] {
-    match stage {
-        Stage::Forward | Stage::Columns => {
-            &[Part::Arrays, Part::Converters, Part::Tree, Part::Lanes]
-        }
-        Stage::Error => &[Part::Bus, Part::Multipliers],
-        Stage::Accumulate => &[Part::Accumulators],
-        Stage::Load | Stage::Program => &[Part::Writers],
-        Stage::Centre => &[],
+        self.cycles().map_or_else(Vec::new, stages)
     }
 }

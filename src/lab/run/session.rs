@@ -21,6 +21,8 @@ use crate::task::classify::{Evaluation, Examples, Progress, Trainer};
 
 /// Wrong answers kept for the report.
 const MISTAKES: usize = 24;
+/// Confusions of which wrong answers are kept, and how many of each.
+const CONFUSIONS: [usize; 2] = [6, 4];
 
 /// What a run is carried out with; none of it changes a result.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -272,8 +274,9 @@ impl Session {
             }
         }
         wrong.sort_by_key(|&(margin, example, ..)| (std::cmp::Reverse(margin), example));
-        let mistakes = wrong.into_iter().take(MISTAKES);
-        TestRecord {
+        let wrong = wrong.into_iter().map(|(_, e, t, g)| [e, u64::from(t), u64::from(g)]);
+        let wrong: Vec<[u64; 3]> = wrong.collect();
+        let mut record = TestRecord {
             epoch: self.trainer.epoch(),
             select: match self.select {
                 Select::BestValidation => "best_validation".into(),
@@ -281,8 +284,15 @@ impl Session {
             },
             score: Score { correct: found.correct, total: self.test.len() as u64 },
             confusion,
-            mistakes: mistakes.map(|(_, e, t, g)| [e, u64::from(t), u64::from(g)]).collect(),
+            mistakes: wrong.iter().copied().take(MISTAKES).collect(),
+            confused: vec![],
+        };
+        let [pairs, each] = CONFUSIONS;
+        for (_, truth, guess) in record.confusions().into_iter().take(pairs) {
+            let of_pair = |one: &&[u64; 3]| one[1..] == [truth as u64, guess as u64];
+            record.confused.extend(wrong.iter().filter(of_pair).take(each));
         }
+        record
     }
 
     fn record(

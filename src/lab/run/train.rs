@@ -11,14 +11,13 @@ use super::session::chosen;
 use super::{Machine, RunError, Session};
 use crate::lab::config::{self, Config, Select, Sources};
 use crate::lab::data::{self, DataRoot, ImageShape, Loaded};
-use crate::lab::price::{Cost, Plan, price};
-use crate::lab::report::{self, Heat, Picture, RunView};
+use crate::lab::price::Cost;
 use crate::lab::store::ARITHMETIC;
 use crate::lab::store::folder::{self, RunFolder, names};
 use crate::lab::store::hash;
 use crate::lab::store::ledger::LedgerRecord;
 use crate::lab::store::record::{EpochRecord, Receipt, TestRecord};
-use crate::task::classify::{Examples, Progress};
+use crate::task::classify::Progress;
 
 /// What happens while a run is carried out.
 #[derive(Debug)]
@@ -240,7 +239,18 @@ impl<'a> Run<'a> {
     ) -> Self {
         let (written, keeping) = (Instant::now(), Keeping::ALL);
         let records = vec![];
-        Self { config, folder, machine, description, image, session, records, keeping, written, best: None }
+        Self {
+            config,
+            folder,
+            machine,
+            description,
+            image,
+            session,
+            records,
+            keeping,
+            written,
+            best: None,
+        }
     }
 
     fn carry_out(
@@ -323,13 +333,10 @@ impl<'a> Run<'a> {
     }
 
     fn finish(mut self) -> Result<Outcome, RunError> {
-        let engine = self.session.trainer().driver().engine();
-        let (ledger, plan) = (LedgerRecord::of(engine), Plan::of_layers(engine.layers()));
+        let ledger = LedgerRecord::of(self.session.trainer().driver().engine());
         self.folder.write_metrics(&self.records)?;
         self.folder.write(names::LEDGER, ledger.to_json().as_bytes())?;
-        let (hardware, constants) = (&self.config.hardware, &self.config.constants);
-        let bill = price(&ledger, &plan, hardware, constants, &[]);
-        let cost = Cost::of(&bill, &ledger, constants);
+        let cost = super::report::cost(self.config, &ledger, &self.records);
         let epoch = self.session.trainer().epoch();
         let best = chosen(self.config.select, &self.records).unwrap_or(epoch);
         let path = self.folder.path().to_path_buf();
@@ -341,82 +348,24 @@ impl<'a> Run<'a> {
                 None => restore(&mut self.session, &path, &RunFolder::best_name(best))?,
             }
         }
+        let state = self.session.checkpoint();
         let test = (!self.session.test_examples().is_empty()).then(|| self.session.test());
         let receipt = self.receipt("finished", test);
-        let heats = if self.keeping.states { heats(&self.session) } else { vec![] };
-        let pictures = pictures(&receipt, self.session.test_examples(), self.image);
-        let view = view(self.config, &receipt, &self.records, &heats, &pictures);
-        let text = self.config.to_toml();
-        let view = RunView { config: &text, cost: Some(&cost), ..view };
-        let summary = report::text::summary(&view);
-        self.folder.write(names::REPORT, report::html(&view).as_bytes())?;
+        let page = super::report::Parts {
+            config: self.config,
+            text: &self.config.to_toml(),
+            receipt: &receipt,
+            records: &self.records,
+            counted: Some((&ledger, &cost)),
+            state: self.keeping.states.then_some(&state),
+            examples: self.image.map(|image| (self.session.test_examples(), image)),
+        };
+        let page = page.draw();
+        self.folder.write(names::REPORT, page.html.as_bytes())?;
         self.folder.write_receipt(&receipt)?;
         if !self.keeping.states {
             self.folder.forget_states();
         }
-        Ok(Outcome { receipt, records: self.records, summary, cost })
+        Ok(Outcome { receipt, records: self.records, summary: page.summary, cost })
     }
-}
-
-/// What a report shows of a run.
-#[must_use]
-pub fn view<'a>(
-    config: &'a Config,
-    receipt: &'a Receipt,
-    records: &'a [EpochRecord],
-    heats: &'a [Heat],
-    pictures: &'a [Picture],
-) -> RunView<'a> {
-    let shapes = records.first().map(|record| &record.pathways).into_iter().flatten();
-    let mut sizes: Vec<(usize, [usize; 2])> = shapes.map(|p| (p.layer, p.shape)).collect();
-    sizes.dedup();
-    let first = sizes.first().map_or(0, |(_, [rows, _])| rows - usize::from(config.bias_rows));
-    let units = sizes.iter().map(|(_, [_, columns])| columns);
-    let sizes: Vec<_> = std::iter::once(&first).chain(units).map(usize::to_string).collect();
-    let title = format!(
-        "{} by {}: {} on {}",
-        config.data_name(),
-        config.rule_name(),
-        sizes.join("-"),
-        config.hardware_name
-    );
-    RunView {
-        title,
-        config: "",
-        receipt,
-        epochs: records,
-        heats,
-        pictures,
-        class_names: &[],
-        cost: None,
-    }
-}
-
-fn heats(session: &Session) -> Vec<Heat> {
-    let engine = session.trainer().driver().engine();
-    let level_max = engine.hardware().level_bits.level_max();
-    let layers = engine.layers().iter();
-    let all =
-        layers.flat_map(|l| l.arrays.iter().zip(l.spec.wiring.pathways()).map(move |p| (l, p)));
-    all.map(|(layer, (array, pathway))| Heat {
-        layer: usize::from(layer.index),
-        pathway: pathway.name.into(),
-        rows: layer.layout.rows,
-        columns: layer.layout.columns,
-        level_max,
-        levels: array.levels().collect(),
-    })
-    .collect()
-}
-
-fn pictures(receipt: &Receipt, test: &Examples, image: Option<ImageShape>) -> Vec<Picture> {
-    let Some(ImageShape { height, width, channels }) = image else { return vec![] };
-    let mistakes = receipt.test.iter().flat_map(|test| &test.mistakes);
-    mistakes
-        .filter_map(|&[example, truth, guess]| {
-            let values = test.values(usize::try_from(example).ok()?).to_vec();
-            let full_scale = test.full_scale();
-            Some(Picture { example, truth, guess, height, width, channels, full_scale, values })
-        })
-        .collect()
 }

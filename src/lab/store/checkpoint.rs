@@ -8,6 +8,7 @@
 use std::borrow::Cow;
 
 use bitvec::prelude::*;
+use safetensors::tensor::Metadata;
 use safetensors::{Dtype, SafeTensors, View};
 
 use super::{ARITHMETIC, hash};
@@ -159,22 +160,11 @@ pub fn read(
 ) -> Result<(), CheckpointError> {
     let (_, header) = SafeTensors::read_metadata(bytes)?;
     let file = SafeTensors::deserialize(bytes)?;
-    let entry = |what: &'static str| -> Result<String, CheckpointError> {
-        let found = header.metadata().as_ref().and_then(|map| map.get(what)).cloned();
-        found.ok_or_else(|| CheckpointError::Tensor {
-            name: what.into(),
-            found: "is missing from the metadata".into(),
-        })
-    };
-    let same = |what: &'static str, wanted: &str| match entry(what)? {
-        found if found == wanted => Ok(()),
-        found => Err(CheckpointError::Other { what, found, wanted: wanted.into() }),
-    };
-    same("arithmetic", &ARITHMETIC.to_string())?;
-    same("config_hash", identity.config)?;
-    same("data_hash", identity.data)?;
+    same(&header, "arithmetic", &ARITHMETIC.to_string())?;
+    same(&header, "config_hash", identity.config)?;
+    same(&header, "data_hash", identity.data)?;
     let whole = |what: &'static str| -> Result<u64, CheckpointError> {
-        entry(what)?.parse().map_err(|_| CheckpointError::Tensor {
+        entry(&header, what)?.parse().map_err(|_| CheckpointError::Tensor {
             name: what.into(),
             found: "is not a whole number".into(),
         })
@@ -264,7 +254,47 @@ pub fn read(
     }
     trainer.driver_mut().set_updates(updates);
     trainer.set_epoch(epoch);
-    same("state_hash", &hash::state(trainer.driver()))
+    same(&header, "state_hash", &hash::state(trainer.driver()))
+}
+
+/// Levels of arrays in a checkpoint, without building the network; an array is a layer, the name of its pathway and
+/// its shape.
+///
+/// # Errors
+/// When the file is damaged, belongs to another run, or does not hold the state that `state_hash` names.
+pub fn levels(
+    bytes: &[u8],
+    identity: Identity<'_>,
+    state_hash: &str,
+    arrays: &[(usize, &str, [usize; 2])],
+) -> Result<Vec<Vec<u16>>, CheckpointError> {
+    let (_, header) = SafeTensors::read_metadata(bytes)?;
+    let file = SafeTensors::deserialize(bytes)?;
+    let wanted = [
+        ("config_hash", identity.config),
+        ("data_hash", identity.data),
+        ("state_hash", state_hash),
+    ];
+    for (what, wanted) in wanted {
+        same(&header, what, wanted)?;
+    }
+    let of = |&(layer, pathway, ref shape): &(usize, &str, [usize; 2])| {
+        read_halves(&file, &format!("layer{layer}.{pathway}.levels"), shape)
+    };
+    arrays.iter().map(of).collect()
+}
+
+/// An entry of the metadata.
+fn entry(header: &Metadata, what: &'static str) -> Result<String, CheckpointError> {
+    let found = header.metadata().as_ref().and_then(|map| map.get(what)).cloned();
+    found.ok_or_else(|| damaged(what, "is missing from the metadata"))
+}
+
+fn same(header: &Metadata, what: &'static str, wanted: &str) -> Result<(), CheckpointError> {
+    match entry(header, what)? {
+        found if found == wanted => Ok(()),
+        found => Err(CheckpointError::Other { what, found, wanted: wanted.into() }),
+    }
 }
 
 fn damaged(name: &str, found: &str) -> CheckpointError {

@@ -54,7 +54,9 @@ pub enum StoreError {
         path: PathBuf,
     },
     /// Made by another version.
-    #[error("{path} has layout {found}, this program reads {LAYOUT}; use the version of dalean that made it")]
+    #[error(
+        "{path} has layout {found}, this program reads {LAYOUT}; use the version of dalean that made it"
+    )]
     Layout {
         /// The index.
         path: PathBuf,
@@ -138,8 +140,9 @@ impl Store {
         let mut index = Connection::open(&file).map_err(fail)?;
         index.busy_timeout(PATIENCE).map_err(fail)?;
         // two processes may find the store new at once: the one that comes second finds the tables made
-        let making =
-            index.transaction_with_behavior(rusqlite::TransactionBehavior::Immediate).map_err(fail)?;
+        let making = index
+            .transaction_with_behavior(rusqlite::TransactionBehavior::Immediate)
+            .map_err(fail)?;
         let layout: i64 =
             making.query_row("PRAGMA user_version", [], |row| row.get(0)).map_err(fail)?;
         match layout {
@@ -296,7 +299,10 @@ impl Store {
         let list = |path: &Path| -> Result<Vec<PathBuf>, StoreError> {
             let fail = |error| StoreError::Io { doing: "list", path: path.into(), error };
             let entries = fs::read_dir(path).map_err(fail)?;
-            entries.map(|entry| entry.map(|entry| entry.path())).collect::<Result<_, _>>().map_err(fail)
+            entries
+                .map(|entry| entry.map(|entry| entry.path()))
+                .collect::<Result<_, _>>()
+                .map_err(fail)
         };
         let mut keys = Vec::new();
         for group in list(&self.path.join("runs"))? {
@@ -354,7 +360,10 @@ mod tests {
         assert_eq!(other.sweeps().unwrap(), std::slice::from_ref(&sweep));
         let found = other.points("s").unwrap();
         assert_eq!(found.iter().map(|(p, _)| p.clone()).collect::<Vec<_>>(), points);
-        assert_eq!(found.iter().map(|(_, row)| row.is_some()).collect::<Vec<_>>(), [true, false, false]);
+        assert_eq!(
+            found.iter().map(|(_, row)| row.is_some()).collect::<Vec<_>>(),
+            [true, false, false]
+        );
         store.plan(&sweep, &points[..1]).unwrap();
         assert_eq!((other.points("s").unwrap().len(), other.rows().unwrap().len()), (1, 1));
         assert_eq!(other.row(&key).unwrap().as_deref(), Some("{}"));
@@ -363,7 +372,11 @@ mod tests {
     #[test]
     fn a_file_that_is_no_index_is_said_to_be_none() {
         let folder = tempfile::tempdir().unwrap();
-        fs::write(folder.path().join(INDEX), "not a data base, not at all, not even a little bit".repeat(40)).unwrap();
+        fs::write(
+            folder.path().join(INDEX),
+            "not a data base, not at all, not even a little bit".repeat(40),
+        )
+        .unwrap();
         let error = Store::open(folder.path()).unwrap_err().to_string();
         assert!(error.contains("remove it") && error.contains(INDEX), "{error}");
     }

@@ -114,6 +114,24 @@ pub struct TestRecord {
     pub confusion: Vec<Vec<u64>>,
     /// Wrong answers with the greatest margin, at most 24: example number, true class, predicted class.
     pub mistakes: Vec<[u64; 3]>,
+    /// Wrong answers of the most frequent confusions, those with the greatest margin: at most 4 of each of 6. Receipts
+    /// of earlier programs list none.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub confused: Vec<[u64; 3]>,
+}
+
+impl TestRecord {
+    /// Confusions that happened, the most frequent first: how often, true class, answered class.
+    #[must_use]
+    pub fn confusions(&self) -> Vec<(u64, usize, usize)> {
+        let mut pairs = Vec::new();
+        for (truth, row) in self.confusion.iter().enumerate() {
+            let wrong = row.iter().enumerate().filter(|&(guess, &n)| guess != truth && n > 0);
+            pairs.extend(wrong.map(|(guess, &n)| (n, truth, guess)));
+        }
+        pairs.sort_by_key(|&(n, truth, guess)| (std::cmp::Reverse(n), truth, guess));
+        pairs
+    }
 }
 
 /// Proof of a run: what went in, what came out, enough to do it again.

@@ -110,7 +110,9 @@ impl Axis {
         let name = name.or(last).unwrap_or_default();
         let wrong = |what: &str, allowed: &str| SweepError::axis(&name, what, allowed);
         let starts = name.starts_with(|c: char| c.is_ascii_lowercase());
-        if !starts || !name.bytes().all(|b| b.is_ascii_lowercase() || b.is_ascii_digit() || b == b'_') {
+        if !starts
+            || !name.bytes().all(|b| b.is_ascii_lowercase() || b.is_ascii_digit() || b == b'_')
+        {
             return Err(wrong(
                 "has a name that cannot be used",
                 "give it a `name` of lower-case letters, digits and `_`",
@@ -122,16 +124,16 @@ impl Axis {
             Some(_) => return Err(wrong("has an unknown `scale`", "use linear or log")),
         };
         let source = match (keys, values, from.zip(to), case) {
-            (Some(keys), Some(values), None, None) => Source::List(
-                values.into_iter().map(|value| choice(&keys, value.into())).collect(),
-            ),
+            (Some(keys), Some(values), None, None) => {
+                Source::List(values.into_iter().map(|value| choice(&keys, value.into())).collect())
+            }
             (Some(keys), None, Some((from, to)), None) => {
                 range(keys, &from.into(), &to.into(), log, steps, sampled)
                     .map_err(|(what, allowed)| wrong(what, allowed))?
             }
-            (None, None, None, Some(cases)) => {
-                Source::List(cases.into_iter().map(|case| case_choice(&name, case)).collect::<Result<_, _>>()?)
-            }
+            (None, None, None, Some(cases)) => Source::List(
+                cases.into_iter().map(|case| case_choice(&name, case)).collect::<Result<_, _>>()?,
+            ),
             _ => {
                 return Err(wrong(
                     "does not say what it varies",
@@ -145,7 +147,10 @@ impl Axis {
             }
             for (at, one) in list.iter().enumerate() {
                 if list[..at].iter().any(|other| other.value == one.value) {
-                    return Err(wrong(&format!("has the value {} twice", one.value), "give it once"));
+                    return Err(wrong(
+                        &format!("has the value {} twice", one.value),
+                        "give it once",
+                    ));
                 }
             }
         }
@@ -195,7 +200,11 @@ fn choice(names: &[String], value: Value) -> Choice {
 
 fn case_choice(axis: &str, case: CaseFile) -> Result<Choice, SweepError> {
     let Some(name) = case.name else {
-        return Err(SweepError::axis(axis, "has a case without `name`", "give each [[axis.case]] a name"));
+        return Err(SweepError::axis(
+            axis,
+            "has a case without `name`",
+            "give each [[axis.case]] a name",
+        ));
     };
     let keys = super::table(&case.set.unwrap_or_default());
     Ok(Choice { value: name.into(), keys })
@@ -227,7 +236,10 @@ fn range(
         return Err(("has an empty range", "`from` must lie below `to`"));
     }
     if log && from <= 0.0 {
-        return Err(("has steps that are ratios from 0 or below", "start above 0, or use scale = \"linear\""));
+        return Err((
+            "has steps that are ratios from 0 or below",
+            "start above 0, or use scale = \"linear\"",
+        ));
     }
     let Some(steps) = steps else {
         return if sampled {
@@ -245,7 +257,8 @@ fn range(
     let mut list: Vec<Choice> = Vec::new();
     for step in 0..steps {
         let value = bend(from, to, log, f64::from(step) / f64::from(steps - 1));
-        let value = if whole { Value::Whole(value.round() as i64) } else { Value::Real(round(value)) };
+        let value =
+            if whole { Value::Whole(value.round() as i64) } else { Value::Real(round(value)) };
         if list.last().is_none_or(|last| last.value != value) {
             list.push(choice(&keys, value));
         }
@@ -289,7 +302,10 @@ mod tests {
         let draw = |part| whole.at(part).value;
         assert_eq!([0.0, 0.249, 0.25, 0.999_999].map(draw), [1, 1, 2, 4].map(Value::Whole));
         let real = axis("key = 'a'\nfrom = 0.5\nto = 32\nscale = 'log'", true).unwrap();
-        assert_eq!([0.0, 0.5, 1.0].map(|part| real.at(part).value), [0.5, 4.0, 32.0].map(Value::Real));
+        assert_eq!(
+            [0.0, 0.5, 1.0].map(|part| real.at(part).value),
+            [0.5, 4.0, 32.0].map(Value::Real)
+        );
         assert!(real.is_number());
     }
 
@@ -299,7 +315,10 @@ mod tests {
                     [[case]]\nname = 'bp'";
         let rule = axis(text, false).unwrap();
         assert_eq!((values(&rule).as_str(), rule.is_number()), ("ed bp", false));
-        assert_eq!(toml::to_string(&rule.list()[0].keys).unwrap(), "[learning]\nrate = 4.0\nrule = \"ed\"\n");
+        assert_eq!(
+            toml::to_string(&rule.list()[0].keys).unwrap(),
+            "[learning]\nrate = 4.0\nrule = \"ed\"\n"
+        );
     }
 
     #[test]

@@ -235,14 +235,22 @@ impl<'a> Crew<'a> {
         let machine = Machine { backend: self.options.backend, threads: 1 };
         let samples = f64::from(task.config.epochs) * data.split.train.len().max(1) as f64;
         let mut before = None;
-        let outcome = run::carry_on(&task.config, data, folder, machine, self.options.keeping, &mut |event| {
-            if let run::Event::Batch(progress) = event {
-                let seen = f64::from(progress.epoch) * progress.samples_total as f64 + progress.samples as f64;
-                let done = seen - before.replace(seen).unwrap_or(0.0);
-                (self.on_event)(Event::Work(task.work * done / samples));
-            }
-            !self.stopped()
-        });
+        let outcome = run::carry_on(
+            &task.config,
+            data,
+            folder,
+            machine,
+            self.options.keeping,
+            &mut |event| {
+                if let run::Event::Batch(progress) = event {
+                    let seen = f64::from(progress.epoch) * progress.samples_total as f64
+                        + progress.samples as f64;
+                    let done = seen - before.replace(seen).unwrap_or(0.0);
+                    (self.on_event)(Event::Work(task.work * done / samples));
+                }
+                !self.stopped()
+            },
+        );
         match outcome {
             Ok(_) => {
                 let (row, seconds) = self.index(task, &path)?;

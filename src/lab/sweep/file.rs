@@ -91,7 +91,8 @@ impl Sweep {
         text: String,
         experiment: [String; 2],
     ) -> Result<Self, SweepError> {
-        let stem = Path::new(place).file_stem().map(|s| s.to_string_lossy().replace(['_', ' '], "-"));
+        let stem =
+            Path::new(place).file_stem().map(|s| s.to_string_lossy().replace(['_', ' '], "-"));
         let name = file.name.or(stem).unwrap_or_default();
         let good = |b: u8| b.is_ascii_lowercase() || b.is_ascii_digit() || b == b'-';
         if !(1..=64).contains(&name.len()) || !name.bytes().all(good) {
@@ -103,13 +104,21 @@ impl Sweep {
         let axes: Vec<Axis> =
             axes.map(|axis| Axis::new(axis, sample.is_some())).collect::<Result<_, _>>()?;
         if axes.is_empty() {
-            return Err(SweepError::key("axis", "is missing", "give the sweep one or more [[axis]]"));
+            return Err(SweepError::key(
+                "axis",
+                "is missing",
+                "give the sweep one or more [[axis]]",
+            ));
         }
         for (at, axis) in axes.iter().enumerate() {
             let taken = axes[..at].iter().any(|other| other.name == axis.name);
             if taken || reserved(&axis.name) {
                 let allowed = "give it another `name`";
-                return Err(SweepError::axis(&axis.name, "has the name of another column", allowed));
+                return Err(SweepError::axis(
+                    &axis.name,
+                    "has the name of another column",
+                    allowed,
+                ));
             }
         }
         let seeds = seeds(file.seeds)?;
@@ -120,7 +129,19 @@ impl Sweep {
         let base = super::table(&file.base.unwrap_or_else(ExperimentFile::default));
         let title = file.title.unwrap_or_else(|| name.clone());
         let about = file.about.unwrap_or_default();
-        Ok(Self { name, title, about, axes, seeds, sample, figures, base, text, experiment, filter })
+        Ok(Self {
+            name,
+            title,
+            about,
+            axes,
+            seeds,
+            sample,
+            figures,
+            base,
+            text,
+            experiment,
+            filter,
+        })
     }
 }
 
@@ -197,9 +218,8 @@ fn figures(file: ReportFile, axes: &[Axis]) -> Result<Figures, SweepError> {
     let x = file.x.unwrap_or_else(number);
     let named = [Some(&x), file.series.as_ref(), file.panel.as_ref()];
     // a range has no end of values: no curves, no panels
-    let few = |axis: &&Axis| {
-        (1..=8).contains(&axis.list().len()) && !named.contains(&Some(&axis.name))
-    };
+    let few =
+        |axis: &&Axis| (1..=8).contains(&axis.list().len()) && !named.contains(&Some(&axis.name));
     let mut free: Vec<String> = axes.iter().filter(few).map(|axis| axis.name.clone()).collect();
     free.reverse();
     let series = file.series.or_else(|| free.pop());
@@ -244,7 +264,10 @@ mod tests {
             (&format!("{GRID}[sample]\nmethod = 'random'"), "sample.points"),
             (&format!("{GRID}[report]\nx = 'bits'"), "axes are level_bits, rule"),
             (&format!("{GRID}[report]\ny = 'accuracy'"), "results are test_accuracy"),
-            (&format!("{GRID}[[axis]]\nname = 'cycles'\nkey = 'a'\nvalues = [1]"), "another column"),
+            (
+                &format!("{GRID}[[axis]]\nname = 'cycles'\nkey = 'a'\nvalues = [1]"),
+                "another column",
+            ),
             (&format!("{GRID}[base.learning]\nepoch = 3"), "unknown field `epoch`"),
             (&format!("filter = ['bits > 3']\n{GRID}"), "level_bits, rule, seed"),
         ] {

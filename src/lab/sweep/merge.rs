@@ -55,7 +55,8 @@ pub fn merge(
     for (number, (key, text, seconds)) in rows.iter().enumerate() {
         on_run(number + 1, rows.len());
         let source = from.folder(key);
-        let damaged = |found: &str| FolderError::Content { path: source.clone(), found: found.into() };
+        let damaged =
+            |found: &str| FolderError::Content { path: source.clone(), found: found.into() };
         if address_of(&source)? != *key {
             return Err(RunError::from(damaged("does not hold the run its name says")).into());
         }
@@ -141,7 +142,11 @@ pub fn reindex(
         let path = store.folder(key);
         let Ok((row, seconds)) = row(&path) else { continue };
         if address_of(&path).is_ok_and(|address| address == *key) {
-            rows.push((key.clone(), serde_json::to_string(&row).expect("rows have a JSON form"), seconds));
+            rows.push((
+                key.clone(),
+                serde_json::to_string(&row).expect("rows have a JSON form"),
+                seconds,
+            ));
             finished += 1;
         }
         if rows.len() == BATCH {

@@ -27,7 +27,8 @@ impl FromStr for Shard {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        let parts = text.split_once('/').and_then(|(a, b)| Some((a.parse().ok()?, b.parse().ok()?)));
+        let parts =
+            text.split_once('/').and_then(|(a, b)| Some((a.parse().ok()?, b.parse().ok()?)));
         match parts {
             Some((number, of)) if (1..=of).contains(&number) => Ok(Self { number, of }),
             _ => Err("write it as I/N with I from 1 to N, such as 1/4".into()),
@@ -181,8 +182,11 @@ impl Plan {
     #[must_use]
     pub fn records(&self) -> (SweepRecord, Vec<PointRecord>) {
         let Sweep { name, text, experiment, .. } = &self.sweep;
-        let sweep =
-            SweepRecord { name: name.clone(), text: text.clone(), experiment: experiment[1].clone() };
+        let sweep = SweepRecord {
+            name: name.clone(),
+            text: text.clone(),
+            experiment: experiment[1].clone(),
+        };
         let points = self.points.iter().map(|planned| PointRecord {
             number: planned.point.number,
             seed: planned.point.seed,
@@ -198,7 +202,8 @@ impl Plan {
     pub fn words(&self, point: usize) -> String {
         let point = &self.points[point].point;
         let axes = self.sweep.axes.iter().zip(&point.values);
-        let mut words: Vec<_> = axes.map(|(axis, value)| format!("{} {value}", axis.name)).collect();
+        let mut words: Vec<_> =
+            axes.map(|(axis, value)| format!("{} {value}", axis.name)).collect();
         words.extend(point.seed.map(|seed| format!("seed {seed}")));
         words.join(", ")
     }

@@ -65,7 +65,8 @@ impl Sweep {
         };
         let before = all.len() * seeds.len();
         if before > POINTS_MAX {
-            let allowed = format!("at most {POINTS_MAX}: take fewer values, or draw them with [sample]");
+            let allowed =
+                format!("at most {POINTS_MAX}: take fewer values, or draw them with [sample]");
             return Err(SweepError::key("axis", &format!("make {before} points"), &allowed));
         }
         let mut points = Vec::new();
@@ -79,19 +80,26 @@ impl Sweep {
                 }
             }
         }
-        if points.is_empty() { Err(SweepError::Empty { points: before }) } else { Ok((points, before)) }
+        if points.is_empty() {
+            Err(SweepError::Empty { points: before })
+        } else {
+            Ok((points, before))
+        }
     }
 
     fn grid(&self) -> Result<Vec<Vec<Choice>>, SweepError> {
         let mut all = vec![vec![]];
         for axis in &self.axes {
             if all.len().saturating_mul(axis.list().len()) > POINTS_MAX {
-                let allowed = format!("at most {POINTS_MAX}: take fewer values, or draw them with [sample]");
+                let allowed =
+                    format!("at most {POINTS_MAX}: take fewer values, or draw them with [sample]");
                 return Err(SweepError::key("axis", "make too many points", &allowed));
             }
             let with = |choices: &Vec<Choice>| {
                 let choices = choices.clone();
-                axis.list().iter().map(move |choice| [&choices[..], std::slice::from_ref(choice)].concat())
+                axis.list()
+                    .iter()
+                    .map(move |choice| [&choices[..], std::slice::from_ref(choice)].concat())
             };
             all = all.iter().flat_map(with).collect();
         }
@@ -146,7 +154,9 @@ mod tests {
 
     #[test]
     fn a_grid_counts_like_a_clock_and_filters_take_points_away() {
-        let (all, before) = points(&format!("seeds = [7, 8]\nfilter = ['a == 1 || b == \"v\"', 'seed == 7']\n{TWO}"));
+        let (all, before) = points(&format!(
+            "seeds = [7, 8]\nfilter = ['a == 1 || b == \"v\"', 'seed == 7']\n{TWO}"
+        ));
         assert_eq!(before, 8);
         assert_eq!(show(&all), ["1 1,u Some(7)", "2 1,v Some(7)", "3 2,v Some(7)"]);
         assert_eq!(all[2].keys[1].to_string(), "y = \"v\"\n");

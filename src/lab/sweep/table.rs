@@ -56,7 +56,11 @@ pub fn results(store: &Store, record: &SweepRecord) -> Result<Results, SweepErro
     let SweepRecord { name, text, experiment } = record;
     let sweep = Sweep::parse(&format!("{name}.toml"), text, experiment)?;
     let damaged = |what: String| {
-        SweepError::key(&format!("{}: {what}", store.path().display()), "cannot be read", "run `dalean store index` on it")
+        SweepError::key(
+            &format!("{}: {what}", store.path().display()),
+            "cannot be read",
+            "run `dalean store index` on it",
+        )
     };
     let mut values: Vec<Vec<Value>> = Vec::new();
     let mut rows: Vec<Option<Row>> = Vec::new();
@@ -114,7 +118,9 @@ pub fn results(store: &Store, record: &SweepRecord) -> Result<Results, SweepErro
         Some(status.to_owned())
     });
     columns.push(text("status", "status", status.collect()));
-    let of = |pick: fn(&Row) -> &String| rows.iter().map(|row| row.as_ref().map(|row| pick(row).clone())).collect();
+    let of = |pick: fn(&Row) -> &String| {
+        rows.iter().map(|row| row.as_ref().map(|row| pick(row).clone())).collect()
+    };
     columns.push(text("hardware", "chip", of(|row| &row.hardware)));
     columns.push(text("state_hash", "state hash", of(|row| &row.state_hash)));
     columns.push(text("data_hash", "data hash", of(|row| &row.data_hash)));
@@ -145,7 +151,9 @@ pub fn results(store: &Store, record: &SweepRecord) -> Result<Results, SweepErro
     let table = Table { columns };
     let has = |name: &str| {
         let column = table.column(name);
-        column.is_some_and(|column| (0..column.values.len()).any(|at| column.values.number(at).is_some()))
+        column.is_some_and(|column| {
+            (0..column.values.len()).any(|at| column.values.number(at).is_some())
+        })
     };
     let costs = ["joules", "cycles", "pulses_attempted"].into_iter().find(|name| has(name));
     let cost = sweep.figures.cost.clone().or_else(|| costs.map(str::to_owned));
@@ -157,7 +165,8 @@ pub fn results(store: &Store, record: &SweepRecord) -> Result<Results, SweepErro
 /// Whole numbers if all are, else numbers if all are, else words.
 fn of_values<'a>(values: impl Iterator<Item = &'a Value> + Clone) -> Values {
     if values.clone().all(|value| matches!(value, Value::Whole(_))) {
-        let whole = |value: &Value| if let Value::Whole(value) = value { Some(*value) } else { None };
+        let whole =
+            |value: &Value| if let Value::Whole(value) = value { Some(*value) } else { None };
         Values::Whole(values.map(whole).collect())
     } else if values.clone().all(|value| value.number().is_some()) {
         Values::Real(values.map(Value::number).collect())
@@ -168,7 +177,8 @@ fn of_values<'a>(values: impl Iterator<Item = &'a Value> + Clone) -> Values {
 
 fn result_columns(rows: &[Option<Row>]) -> impl Iterator<Item = Column> {
     RESULTS.iter().map(move |column| {
-        let cells = rows.iter().map(|row| row.as_ref().and_then(|row| row.results.get(column.name)));
+        let cells =
+            rows.iter().map(|row| row.as_ref().and_then(|row| row.results.get(column.name)));
         let values = if column.whole {
             Values::Whole(cells.map(|cell| cell.and_then(serde_json::Value::as_i64)).collect())
         } else {
@@ -178,4 +188,3 @@ fn result_columns(rows: &[Option<Row>]) -> impl Iterator<Item = Column> {
         Column { name, label, unit: column.unit, role: Role::Result, values }
     })
 }
-

@@ -74,7 +74,8 @@ impl Table {
         let mut writer = csv::Writer::from_writer(out);
         writer.write_record(self.columns.iter().map(|column| &column.name))?;
         for row in 0..self.len() {
-            let cells = self.columns.iter().map(|column| column.values.text(row).unwrap_or_default());
+            let cells =
+                self.columns.iter().map(|column| column.values.text(row).unwrap_or_default());
             writer.write_record(cells)?;
         }
         Ok(writer.flush()?)
@@ -83,7 +84,8 @@ impl Table {
     fn json(&self, mut out: impl Write) -> Result<(), WriteError> {
         out.write_all(b"[")?;
         for row in 0..self.len() {
-            let cells = self.columns.iter().map(|column| (column.name.clone(), json(&column.values, row)));
+            let cells =
+                self.columns.iter().map(|column| (column.name.clone(), json(&column.values, row)));
             let object: serde_json::Map<_, _> = cells.collect();
             out.write_all(if row == 0 { b"\n" } else { b",\n" })?;
             serde_json::to_writer(&mut out, &object).map_err(std::io::Error::from)?;

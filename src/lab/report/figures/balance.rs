@@ -1,70 +1,72 @@
-//! Excitation over inhibition, in what is stored and in what flows.
+//! Excitation over inhibition, in what is stored and in what flows, by target stream.
 
-use super::{Figure, multiples, span};
+use super::{of_layer, span};
 use crate::lab::report::RunView;
 use crate::lab::report::chart::{Chart, Series};
-use crate::lab::report::colour;
+use crate::lab::report::colour::dashed;
 use crate::lab::report::number::ratio;
 use crate::lab::report::scale::Axis;
-use crate::lab::store::record::LayerRecord;
+use crate::lab::store::record::EpochRecord;
 
-pub(super) fn draw(view: &RunView<'_>) -> Option<Figure> {
-    let layers = view.layers();
-    let curve = |layer: usize, pick: &dyn Fn(&LayerRecord) -> Option<f64>| {
-        let points = view.epochs.iter().filter_map(|record| {
-            let one = record.layers.iter().find(|one| one.layer == layer)?;
-            Some((f64::from(record.epoch), pick(one)?))
-        });
-        points.collect::<Vec<_>>()
+/// A chart a layer, all on one vertical axis.
+pub(super) fn charts(view: &RunView<'_>) -> Vec<Option<String>> {
+    let Some((first, last)) = span(view) else { return Vec::new() };
+    let all: Vec<_> = view.layers().into_iter().map(|layer| (layer, lines(view, layer))).collect();
+    let values = || {
+        let points = all.iter().flat_map(|(_, lines)| lines).flat_map(|one| &one.points);
+        points.map(|point| point.1)
     };
-    let mut stored = Vec::new();
-    let mut flowing = Vec::new();
-    for &layer in &layers {
-        let hue = colour::layer(layer);
-        let points = curve(layer, &|one| divide(one.levels[0], one.levels[1]));
-        stored.push(Series::new(&format!("layer {layer}"), hue, points));
-        for (stream, name) in ["p", "n"].into_iter().enumerate() {
-            let points = curve(layer, &|one| {
-                let [excite, inhibit] = one.currents[stream];
-                divide(u64::try_from(excite).ok()?, u64::try_from(inhibit).ok()?)
-            });
-            let series = Series::new(&format!("layer {layer}\u{202f}{name}"), hue, points);
-            flowing.push(series.dashed(stream == 1));
+    let chart = |(layer, lines): &(usize, Vec<Series>)| {
+        if lines.is_empty() {
+            return None;
         }
-    }
-    let both = [(stored, "Stored: sums of levels"), (flowing, "Flowing: bank currents")];
-    let (first, last) = span(view)?;
-    let charts: Vec<_> = both
-        .into_iter()
-        .filter_map(|(mut series, heading)| {
-            series.retain(|one| !one.points.is_empty());
-            if series.is_empty() {
-                return None;
-            }
-            let values = series.iter().flat_map(|one| &one.points).map(|point| point.1);
-            let y = Axis::ratio(values, "E/I (log scale)");
-            let mut chart = Chart::new(460.0, 300.0, 96.0, Axis::epochs(first, last), y);
-            chart.rule(1.0, "balance");
-            chart.series(&series, |value| ratio(Some(value)));
-            Some((heading.to_string(), chart.finish(&format!("E/I over epochs. {heading}"))))
-        })
-        .collect();
-    if charts.is_empty() {
-        return None;
-    }
-    Some(Figure {
-        id: "balance",
-        title: "Excitation over inhibition",
-        caption: "Left, what the cells hold: levels of excitatory over inhibitory pathways, layer by \
-                  layer. Right, what the columns carry while the net is evaluated, by target stream \
-                  (solid p, dashed n). At 1 the two sides cancel."
-            .into(),
-        body: multiples(charts.into_iter()),
-        wide: true,
-    })
+        let y = Axis::ratio(values(), "E/I (log scale)");
+        let mut chart = Chart::new(372.0, 270.0, 104.0, Axis::epochs(first, last), y);
+        chart.rule(1.0, "balance");
+        chart.series(lines, |value| ratio(Some(value)));
+        Some(chart.finish(&format!("Excitation over inhibition in layer {layer} over epochs")))
+    };
+    all.iter().map(chart).collect()
 }
 
-/// A quotient that can be drawn on a log scale.
-fn divide(above: u64, below: u64) -> Option<f64> {
-    crate::lab::report::number::quotient(above, below).filter(|value| *value > 0.0)
+fn lines(view: &RunView<'_>, layer: usize) -> Vec<Series> {
+    let paired = view.last().is_some_and(|last| of_layer(last, layer).all(|p| p.pathway.len() < 2));
+    let kinds: [(&str, &str, Pick); 2] =
+        [("stored", "var(--a)", stored), ("flowing", "var(--b)", flowing)];
+    let mut lines = Vec::new();
+    for (kind, hue, pick) in kinds {
+        for (stream, name) in ["p", "n"].into_iter().enumerate() {
+            let points = view.epochs.iter().filter_map(|record| {
+                let [above, below] = pick(record, layer, stream)?;
+                let value = super::super::number::quotient(above, below)?;
+                (value > 0.0).then(|| (f64::from(record.epoch), value))
+            });
+            let points: Vec<_> = points.collect();
+            let name = if paired { kind.into() } else { format!("{kind}\u{202f}{name}") };
+            if !points.is_empty() {
+                lines.push(Series::new(&name, hue, points).dashed(stream == 1));
+            }
+        }
+    }
+    lines
+}
+
+/// Excitation and inhibition that reach a stream of a layer.
+type Pick = fn(&EpochRecord, usize, usize) -> Option<[u64; 2]>;
+
+/// Sums of levels of the arrays that drive a stream.
+fn stored(record: &EpochRecord, layer: usize, stream: usize) -> Option<[u64; 2]> {
+    let sum = |excites: bool| {
+        let arrays = of_layer(record, layer)
+            .filter(|one| usize::from(dashed(&one.pathway)) == stream && one.excites == excites);
+        arrays.fold(0u64, |sum, one| sum.saturating_add(one.levels))
+    };
+    Some([sum(true), sum(false)])
+}
+
+/// Sums of bank currents of a stream.
+fn flowing(record: &EpochRecord, layer: usize, stream: usize) -> Option<[u64; 2]> {
+    let one = record.layers.iter().find(|one| one.layer == layer)?;
+    let [excite, inhibit] = one.currents[stream];
+    Some([u64::try_from(excite).ok()?, u64::try_from(inhibit).ok()?])
 }

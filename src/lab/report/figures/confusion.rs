@@ -4,11 +4,13 @@ use std::fmt::Write as _;
 
 use super::Figure;
 use crate::lab::report::image::indexed;
-use crate::lab::report::number::{escape, percent_of, place, quotient, size};
+use crate::lab::report::number::{count, escape, percent_of, place, quotient, size};
 use crate::lab::report::{RunView, colour};
 
 /// Above this many classes the counts no longer fit into their squares.
 const CLASSES_WRITTEN: usize = 20;
+/// Confusions named below the matrix.
+const NAMED: usize = 6;
 
 pub(super) fn draw(view: &RunView<'_>) -> Option<Figure> {
     let matrix = &view.receipt.test.as_ref()?.confusion;
@@ -17,33 +19,45 @@ pub(super) fn draw(view: &RunView<'_>) -> Option<Figure> {
         return None;
     }
     let drawing = if classes <= CLASSES_WRITTEN { squares(view, matrix) } else { image(matrix)? };
-    let mut pairs: Vec<(u64, usize, usize)> = Vec::new();
-    for (truth, row) in matrix.iter().enumerate() {
-        let wrong = row.iter().enumerate().filter(|&(guess, &n)| guess != truth && n > 0);
-        pairs.extend(wrong.map(|(guess, &n)| (n, truth, guess)));
-    }
-    pairs.sort_by(|a, b| b.0.cmp(&a.0).then(a.1.cmp(&b.1)).then(a.2.cmp(&b.2)));
-    let name = |class: usize| escape(&view.class(class as u64));
-    let most: Vec<String> = pairs
-        .iter()
-        .take(3)
-        .map(|&(n, truth, guess)| format!("{} as {} ({n})", name(truth), name(guess)))
+    let test = view.receipt.test.as_ref()?;
+    let most: String = test
+        .confusions()
+        .into_iter()
+        .take(NAMED)
+        .map(|(n, truth, guess)| {
+            let of_class: u64 = matrix[truth].iter().sum();
+            format!(
+                "<li>{} <small>{n} of {}, {}</small></li>",
+                pair(view, truth as u64, guess as u64),
+                count(of_class),
+                percent_of(n, of_class, 1)
+            )
+        })
         .collect();
     let most = if most.is_empty() {
-        "No wrong answer.".into()
+        "<p>No wrong answer.</p>".into()
     } else {
-        format!("Most often taken for another: <b>{}</b>.", most.join(", "))
+        format!("<h4>Most often taken for another</h4><ol class=\"pairs\">{most}</ol>")
     };
     Some(Figure {
         id: "confusion",
         title: "Confusion matrix",
-        caption: format!(
-            "{most} Test set. Blue: share of the true class. Orange: mistakes, compared with the most \
-             frequent one."
-        ),
-        body: drawing,
+        caption:
+            "Test set. Blue: share of the true class. Orange: mistakes, compared with the most \
+                  frequent one."
+                .into(),
+        body: drawing + most.as_str(),
         wide: false,
     })
+}
+
+/// A confusion in words: true class, then the answer.
+pub(super) fn pair(view: &RunView<'_>, truth: u64, guess: u64) -> String {
+    format!(
+        "<b><span class=\"right\">{}</span> → <span class=\"wrong\">{}</span></b>",
+        escape(&view.class(truth)),
+        escape(&view.class(guess))
+    )
 }
 
 fn squares(view: &RunView<'_>, matrix: &[Vec<u64>]) -> String {

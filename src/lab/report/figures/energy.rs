@@ -1,73 +1,193 @@
-//! Where the joules go: training by component, epoch by epoch, and totals with their bounds.
+//! Where the joules go: training by component, epoch by epoch, and the whole run cut in five ways, with bounds.
+
+use std::fmt::Write as _;
 
 use super::{Figure, per_epoch, span};
-use crate::lab::price::prefixed;
+use crate::lab::config::Kind;
+use crate::lab::price::{Cost, Group, prefixed};
 use crate::lab::report::RunView;
 use crate::lab::report::chart::{Chart, Series};
-use crate::lab::report::number::{escape, float, percent};
-use crate::lab::report::scale::Axis;
+use crate::lab::report::number::{escape, float, percent, place, share, size};
+use crate::lab::report::scale::{Axis, round};
 
-/// Components drawn as lines.
-const LINES: usize = 4;
-const HUES: [&str; LINES] = ["var(--a)", "var(--b)", "var(--c)", "var(--d)"];
+/// Components drawn as lines, each with its own colour and dashes.
+const LINES: [(&str, bool); 4] =
+    [("var(--a)", false), ("var(--b)", true), ("var(--d)", false), ("var(--e)", true)];
+/// Constants listed.
+const CONSTANTS: usize = 6;
+/// Most decades of the scale of bounds; what lies below is drawn at its end.
+const DECADES: f64 = 9.0;
 
 pub(super) fn draw(view: &RunView<'_>) -> Option<Figure> {
-    let (cost, (first, last)) = (view.cost?, span(view)?);
-    let [low, typical, high] = cost.joules?;
+    let cost = view.cost?;
+    let joules = cost.joules?;
     if cost.components.is_empty() {
         return None;
     }
-    let events = cost.components.iter().filter_map(|group| {
-        let each = cost.each.iter().find(|(_, component, _)| *component == group.name)?;
-        Some((group.name.replace('_', " "), each.0, each.2))
-    });
-    let series: Vec<Series> = events
-        .take(LINES)
-        .zip(HUES)
-        .map(|((name, event, joules), hue)| {
-            let counts = per_epoch(view, "training", event).into_iter();
-            let points = counts.map(|(epoch, count)| (epoch, 1e12 * joules * float(count)));
-            Series::new(&name, hue, points.collect())
-        })
-        .collect();
-    let drawn = if series.iter().all(|one| one.points.is_empty()) {
-        String::new()
-    } else {
-        let values = series.iter().flat_map(|one| &one.points).map(|point| point.1);
-        let y = Axis::counts(values, "picojoules per epoch (log scale)");
-        let start = series.iter().find_map(|one| one.points.first()).map_or(first, |p| p.0 as u32);
-        let mut chart = Chart::new(480.0, 310.0, 122.0, Axis::epochs(start, last), y);
-        chart.series(&series, |value| prefixed(1e-12 * value, "J"));
-        chart.finish("Energy of training per epoch")
-    };
-    let rows = cost.components.iter().map(|group| {
-        let [low, middle, high] = group.joules.map(|joules| prefixed(joules, "J"));
-        let share = if typical > 0.0 { percent(group.joules[1] / typical, 1) } else { "–".into() };
-        format!(
-            "<tr><th scope=\"row\">{}</th><td>{low}</td><td>{middle}</td><td>{high}</td><td>{share}</td></tr>",
-            escape(&group.name.replace('_', " "))
-        )
-    });
-    let rows: String = rows.collect();
-    let [low, middle, high] = [low, typical, high].map(|joules| prefixed(joules, "J"));
-    let missing: Vec<_> = cost.missing.iter().map(|missing| escape(&missing.what)).collect();
+    let cuts = [
+        ("Component", &cost.components),
+        ("Phase", &cost.phases),
+        ("Operation", &cost.operations),
+        ("Layer", &cost.layers),
+        ("Pathway", &cost.pathways),
+    ];
+    let scale = Decades::of(cuts.iter().flat_map(|(_, groups)| groups.iter()));
+    let table =
+        |&(name, groups): &(&str, &Vec<Group>)| groups_table(name, groups, joules[1], &scale);
+    // the two halves of the figure come out about as long as one another
+    let (left, right) = (cuts[..1].iter().map(table), cuts[1..].iter().map(table));
+    let (left, right) = (left.collect::<String>(), right.collect::<String>());
+    let [low, typical, high] = joules.map(|joules| prefixed(joules, "J"));
+    let missing: Vec<_> = cost.missing.iter().map(|one| one.what.replace('_', " ")).collect();
     let missing = match missing.is_empty() {
         true => String::new(),
-        false => format!(" Without a price: {}.", missing.join(", ")),
+        false => format!(" Without a price: {}.", escape(&missing.join(", "))),
     };
     Some(Figure {
         id: "energy",
         title: "Energy",
         caption: format!(
-            "Counts of the ledger times constants of the hardware model: {middle} for the whole run, bounds {low} to \
-             {high}; {} leans on assumed constants. The lines are training at typical constants, without static \
-             power.{missing}",
+            "Counts of the ledger times constants of the hardware model: <b>{typical}</b> for the whole run, the final test \
+             aside, bounds {low} to {high}; <b>{}</b> leans on assumed constants. Each bound adds all low or all high \
+             constants: the line spans them, the dot is the typical value. Static power belongs to no layer, pathway or \
+             operation; what a target does for both of its banks is charged to its excitatory pathway.{missing}",
             percent(cost.assumed_share, 0)
         ),
         body: format!(
-            "{drawn}<div class=\"scroll\"><table><thead><tr><th>Whole run</th><th>low</th><th>typical</th><th>high</th>\
-             <th>share</th></tr></thead><tbody>{rows}</tbody></table></div>"
+            "<div class=\"halves\"><div>{}{left}</div><div>{}{right}</div></div>",
+            lines(view, cost),
+            constants(cost)
         ),
-        wide: false,
+        wide: true,
     })
+}
+
+/// Training, epoch by epoch.
+fn lines(view: &RunView<'_>, cost: &Cost) -> String {
+    let events = cost.components.iter().filter_map(|group| {
+        let each = cost.each.iter().find(|(_, component, _)| *component == group.name)?;
+        let counts = per_epoch(view, "training", each.0);
+        // what only happens before the first update is no line
+        let some = counts.iter().any(|&(_, count)| count > 0);
+        some.then(|| (group.name.replace('_', " "), counts, each.2))
+    });
+    let series: Vec<Series> = events
+        .zip(LINES)
+        .map(|((name, counts, joules), (hue, dashed))| {
+            let points =
+                counts.into_iter().map(|(epoch, count)| (epoch, 1e12 * joules * float(count)));
+            Series::new(&name, hue, points.collect()).dashed(dashed)
+        })
+        .collect();
+    let Some((first, last)) = span(view) else { return String::new() };
+    if series.iter().all(|one| one.points.is_empty()) {
+        return String::new();
+    }
+    let values = series.iter().flat_map(|one| &one.points).map(|point| point.1);
+    let y = Axis::picojoules(values, "energy per epoch (log scale)");
+    let start = series.iter().find_map(|one| one.points.first()).map_or(first, |p| p.0 as u32);
+    let mut chart = Chart::new(540.0, 270.0, 168.0, Axis::epochs(start, last), y);
+    chart.series(&series, |value| prefixed(1e-12 * value, "J"));
+    format!(
+        "<h4>Training, at typical constants, without static power</h4>{}",
+        chart.finish("Energy of training per epoch, by component")
+    )
+}
+
+/// A log scale of joules, the same for all bounds.
+struct Decades {
+    from: f64,
+    to: f64,
+}
+
+impl Decades {
+    fn of<'a>(groups: impl Iterator<Item = &'a Group>) -> Self {
+        let (mut low, mut high) = (f64::INFINITY, f64::MIN_POSITIVE);
+        for value in groups.flat_map(|group| group.joules).filter(|&value| value > 0.0) {
+            (low, high) = (low.min(value), high.max(value));
+        }
+        let to = high.log10().ceil();
+        Self { from: low.log10().floor().clamp(to - DECADES, to - 1.0), to }
+    }
+
+    fn place(&self, joules: f64) -> f64 {
+        let power = joules.max(f64::MIN_POSITIVE).log10();
+        WIDTH * ((power - self.from) / (self.to - self.from)).clamp(0.0, 1.0)
+    }
+
+    /// Grid lines at the decades.
+    fn grid(&self) -> String {
+        let decades = self.to - self.from;
+        let lines = (0..=decades as usize).map(|at| {
+            let x = place(WIDTH * size(at) / decades);
+            format!("M{x} 0V{HEIGHT}")
+        });
+        format!("<path class=\"grid\" d=\"{}\"/>", lines.collect::<String>())
+    }
+
+    /// The ends in words.
+    fn ends(&self) -> String {
+        let [from, to] = [self.from, self.to].map(|power| round(10f64.powf(power)));
+        format!("<span class=\"ends\"><span>{from}</span><span>log</span><span>{to}</span></span>")
+    }
+}
+
+const WIDTH: f64 = 128.0;
+const HEIGHT: f64 = 16.0;
+
+fn groups_table(name: &str, groups: &[Group], total: f64, scale: &Decades) -> String {
+    let mut rows = String::new();
+    for group in groups {
+        let [low, typical, high] = group.joules;
+        let part = if total > 0.0 { share(typical / total) } else { "–".into() };
+        let [a, b, c] = group.joules.map(|joules| place(scale.place(joules)));
+        let bounds = format!(
+            "<svg class=\"bounds\" viewBox=\"0 0 {WIDTH} {HEIGHT}\" width=\"{WIDTH}\" height=\"{HEIGHT}\" aria-hidden=\"true\">\
+             {}<path class=\"span\" d=\"M{a} 8H{c}\"/><circle class=\"typical\" cx=\"{b}\" cy=\"8\" r=\"4\"/></svg>",
+            scale.grid()
+        );
+        let [low, typical, high] = [low, typical, high].map(|joules| prefixed(joules, "J"));
+        let _ = write!(
+            rows,
+            "<tr><th scope=\"row\">{}</th><td>{bounds}</td><td>{low}</td><td><b>{typical}</b></td><td>{high}</td>\
+             <td>{part}</td></tr>",
+            escape(&group.name.replace('_', " "))
+        );
+    }
+    if rows.is_empty() {
+        return rows;
+    }
+    format!(
+        "<div class=\"scroll\"><table class=\"joules\"><thead><tr><th scope=\"col\">{name}</th><th scope=\"col\">{}</th>\
+         <th scope=\"col\">low</th><th scope=\"col\">typical</th><th scope=\"col\">high</th><th scope=\"col\">share</th></tr>\
+         </thead><tbody>{rows}</tbody></table></div>",
+        scale.ends()
+    )
+}
+
+/// The constants that the typical total leans on most, and how far to trust them.
+fn constants(cost: &Cost) -> String {
+    let mut rows = String::new();
+    for one in cost.constants.iter().take(CONSTANTS).filter(|one| one.share > 0.0) {
+        let kind = match one.kind {
+            Kind::Measured => "measured",
+            Kind::Fitted => "fitted",
+            Kind::Assumed => "<b>assumed</b>",
+        };
+        let _ = write!(
+            rows,
+            "<tr><th scope=\"row\"><code>{}</code></th><td class=\"meter\"><i style=\"width:{}%\"></i></td><td>{}</td>\
+             <td>{kind}</td></tr>",
+            escape(&one.key),
+            place(100.0 * one.share),
+            share(one.share)
+        );
+    }
+    if rows.is_empty() {
+        return rows;
+    }
+    format!(
+        "<div class=\"scroll\"><table class=\"meters\"><thead><tr><th scope=\"col\">Leans on</th><th scope=\"col\" colspan=\"2\">\
+         of the typical total</th><th scope=\"col\">is</th></tr></thead><tbody>{rows}</tbody></table></div>"
+    )
 }

@@ -17,29 +17,37 @@ pub(super) fn draw(view: &RunView<'_>) -> Option<Figure> {
     let end = view.last()?;
     let mut body = String::new();
     for phase in end.events.keys() {
-        let rows = KINDS.map(|(event, name, whole)| {
-            let counts = per_epoch(view, phase, event);
-            let values: Vec<f64> = counts.iter().map(|&(_, count)| float(count)).collect();
-            let (some, all) = (total(end, phase, event), total(end, phase, whole));
-            let share = match quotient(some, all) {
-                // Few per million still deserve digits.
-                Some(0.0) => "0".into(),
-                Some(share) if share < 1e-4 => format!("{:.1} ppm", share * 1e6),
-                Some(share) => percent(share, 2),
-                None => "–".into(),
-            };
-            let last = counts.last().map_or("–".into(), |&(_, last)| count(last));
-            format!(
-                "<tr><th scope=\"row\">{name}</th><td>{}</td><td>{share}</td><td>{last}</td>\
+        let rows: String = KINDS
+            .iter()
+            .filter(|(.., whole)| total(end, phase, whole) > 0)
+            .map(|(event, name, whole)| {
+                let counts = per_epoch(view, phase, event);
+                let values: Vec<f64> = counts.iter().map(|&(_, count)| float(count)).collect();
+                let (some, all) = (total(end, phase, event), total(end, phase, whole));
+                let share = match quotient(some, all) {
+                    // Few per million still deserve digits.
+                    Some(0.0) => "0".into(),
+                    Some(share) if share < 5e-8 => "&lt; 0.1 ppm".into(),
+                    Some(share) if share < 1e-4 => format!("{:.1} ppm", share * 1e6),
+                    Some(share) => percent(share, 2),
+                    None => "–".into(),
+                };
+                let last = counts.last().map_or("–".into(), |&(_, last)| count(last));
+                format!(
+                    "<tr><th scope=\"row\">{name}</th><td>{}</td><td>{share}</td><td>{last}</td>\
                  <td>{}</td></tr>",
-                count(some),
-                spark(&values, "var(--d)")
-            )
-        });
+                    count(some),
+                    spark(&values, "var(--d)")
+                )
+            })
+            .collect();
+        if rows.is_empty() {
+            continue;
+        }
         body += &format!(
             "<tr class=\"group\"><th colspan=\"5\" scope=\"rowgroup\">{}</th></tr>{}",
             escape(phase),
-            rows.concat()
+            rows
         );
     }
     if body.is_empty() {

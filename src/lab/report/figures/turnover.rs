@@ -1,17 +1,17 @@
 //! Births and deaths at the floor, as bars above and below zero.
 
-use super::{Figure, drawn_percent, hue, layer_heading, multiples, of_layer, span};
+use super::{drawn_percent, hue, of_layer, span};
 use crate::lab::report::RunView;
 use crate::lab::report::chart::Chart;
 use crate::lab::report::number::{count, percent_of};
 use crate::lab::report::scale::Axis;
 
-pub(super) fn draw(view: &RunView<'_>) -> Option<Figure> {
-    let (first, last) = span(view)?;
+/// A chart a layer, all on one vertical axis; none of a run without an update.
+pub(super) fn charts(view: &RunView<'_>) -> Vec<Option<String>> {
+    let Some((first, last)) = span(view).filter(|(first, last)| first != last) else {
+        return Vec::new();
+    };
     let layers = view.layers();
-    if layers.is_empty() || last == first {
-        return None;
-    }
     let sums = |layer: usize| {
         view.epochs.iter().map(move |record| {
             let of = || of_layer(record, layer);
@@ -26,11 +26,11 @@ pub(super) fn draw(view: &RunView<'_>) -> Option<Figure> {
 
     let half = 0.38 * f64::from(last - first) / view.epochs.len().max(2) as f64;
     let charts = layers.iter().map(|&layer| {
-        let y = Axis::percent(-low, high, "deaths   |   births");
+        let y = Axis::percent(-low, high, "deaths   |   births, of cells");
         let mut x = Axis::epochs(first, last);
         x.scale.from -= 2.0 * half;
         x.scale.to += 2.0 * half;
-        let mut chart = Chart::new(460.0, 300.0, 20.0, x, y);
+        let mut chart = Chart::new(372.0, 270.0, 100.0, x, y);
         let mut tips = Vec::new();
         for (record, births, deaths, cells) in sums(layer) {
             let epoch = f64::from(record.epoch);
@@ -59,29 +59,14 @@ pub(super) fn draw(view: &RunView<'_>) -> Option<Figure> {
             ));
         }
         chart.rule(0.0, "");
+        let end = sums(layer).last().into_iter();
+        chart.beside(end.flat_map(|(_, births, deaths, cells)| {
+            let half = |count: u64| drawn_percent(count, cells) / 2.0;
+            [(half(births), "births", births), (-half(deaths), "deaths", deaths)]
+                .map(|(at, name, count)| (at, format!("{name} {}", percent_of(count, cells, 1))))
+        }));
         chart.tips(&tips);
-        (layer_heading(view, layer), chart.finish(&format!("Births and deaths of layer {layer}")))
+        Some(chart.finish(&format!("Births and deaths in layer {layer} over epochs")))
     });
-    let body = multiples(charts);
-    let legend = view.last().map(|record| {
-        let mut seen: Vec<&str> = Vec::new();
-        let mut out = String::new();
-        for one in &record.pathways {
-            if !seen.contains(&one.pathway.as_str()) {
-                seen.push(&one.pathway);
-                out += &super::swatch(one);
-            }
-        }
-        format!("<p class=\"legend\">{out}</p>")
-    });
-    Some(Figure {
-        id: "turnover",
-        title: "Births and deaths at the floor",
-        caption:
-            "Compared with the start, as a share of the layer's cells. Above zero: cells that left \
-                  the floor. Below: cells that reached it."
-                .into(),
-        body: legend.unwrap_or_default() + body.as_str(),
-        wide: true,
-    })
+    charts.collect()
 }

@@ -1,0 +1,216 @@
+//! The report of a run folder, drawn when a run ends and again whenever someone asks for it.
+//!
+//! ```text
+//! report.html = f(config.toml, receipt.json, metrics.jsonl [, ledger.json] [, state that read the test set] [, data])
+//! ```
+//!
+//! What stands in brackets may be missing; figures that need it are then left out.
+
+use std::path::{Path, PathBuf};
+
+use super::RunError;
+use super::session::chosen;
+use super::train::read_config;
+use crate::lab::config::Config;
+use crate::lab::data::{self, DataRoot, ImageShape};
+use crate::lab::price::{Cost, Plan, price};
+use crate::lab::report::{self, Heat, Picture, RunView};
+use crate::lab::store::checkpoint::{self, CheckpointError, Identity};
+use crate::lab::store::folder::{self, FolderError, RunFolder, names};
+use crate::lab::store::ledger::LedgerRecord;
+use crate::lab::store::record::{EpochRecord, Receipt};
+use crate::task::classify::Examples;
+
+/// A report on disk.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ReportMade {
+    /// Where it is.
+    pub path: PathBuf,
+    /// The summary table, as `dalean train` prints it.
+    pub summary: String,
+    /// Which figures were left out, and why.
+    pub notes: Vec<String>,
+}
+
+/// Draws `report.html` of a run folder again from what is on disk: also of a run that is not finished, and without its
+/// states and its data, as far as that goes. The pictures of wrong answers come from the data set in `data_root`.
+///
+/// # Errors
+/// When the folder is not that of a run, is damaged, or another process is carrying the run out.
+pub fn report(path: &Path, data_root: Option<&DataRoot>) -> Result<ReportMade, RunError> {
+    let folder = RunFolder::open(path)?;
+    let text = folder::read_text(path, names::CONFIG)?;
+    let config = read_config(path)?;
+    let receipt = folder::read_receipt(path)?;
+    let mut records = folder::read_metrics(path)?;
+    // the receipt is written last: what it does not name was not finished
+    records.truncate(receipt.epoch_hashes.len());
+    let mut notes = vec![];
+    let ledger = if path.join(names::LEDGER).exists() {
+        let damaged = |found| FolderError::Content { path: path.join(names::LEDGER), found };
+        Some(LedgerRecord::parse(&folder::read_text(path, names::LEDGER)?).map_err(damaged)?)
+    } else {
+        notes.push(format!("no time and energy: there is no {}", names::LEDGER));
+        None
+    };
+    let cost = ledger.as_ref().map(|ledger| cost(&config, ledger, &records));
+    let state = match state_name(path, &config, &records) {
+        Some(name) => Some(folder::read_checkpoint(path, &name)?),
+        None => {
+            notes
+                .push("no pictures of cells: the state that read the test set was not kept".into());
+            None
+        }
+    };
+    let source = config.source()?;
+    let loaded = match data_root.map(|root| data::load(&source, root)) {
+        Some(Ok(loaded)) if loaded.hash == receipt.data_hash => Some(loaded),
+        Some(Ok(_)) => {
+            notes.push("no pictures of wrong answers: the data has changed since".into());
+            None
+        }
+        Some(Err(error)) => {
+            notes.push(format!("no pictures of wrong answers: {error}"));
+            None
+        }
+        None => None,
+    };
+    let parts = Parts {
+        config: &config,
+        text: &text,
+        receipt: &receipt,
+        records: &records,
+        counted: ledger.as_ref().zip(cost.as_ref()),
+        state: state.as_deref(),
+        examples: loaded.as_ref().and_then(|loaded| Some((&loaded.split.test, loaded.image?))),
+    };
+    let Page { html, summary, damage } = parts.draw();
+    notes.extend(damage.map(|error| format!("no pictures of cells: {error}")));
+    folder.write(names::REPORT, html.as_bytes())?;
+    Ok(ReportMade { path: path.join(names::REPORT), summary, notes })
+}
+
+/// What a run cost on its own chip.
+pub(super) fn cost(config: &Config, ledger: &LedgerRecord, records: &[EpochRecord]) -> Cost {
+    let plan = Plan::of_records(records.last().map_or(&[], |record| &record.pathways));
+    let bill = price(ledger, &plan, &config.hardware, &config.constants, &[]);
+    Cost::of(&bill, ledger, &config.constants)
+}
+
+/// The file of the state that reads the test set; `None` when it was not kept.
+fn state_name(path: &Path, config: &Config, records: &[EpochRecord]) -> Option<String> {
+    let last = records.last().map(|record| record.epoch);
+    let wanted = chosen(config.select, records).or(last);
+    let best = wanted.filter(|_| wanted != last).map(RunFolder::best_name);
+    let name = best.unwrap_or_else(|| names::CHECKPOINT.into());
+    path.join(&name).exists().then_some(name)
+}
+
+/// What a report is drawn from.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Parts<'a> {
+    /// The configuration.
+    pub config: &'a Config,
+    /// The same as the folder holds it.
+    pub text: &'a str,
+    /// What went in and came out.
+    pub receipt: &'a Receipt,
+    /// One an epoch.
+    pub records: &'a [EpochRecord],
+    /// What was counted, and its price.
+    pub counted: Option<(&'a LedgerRecord, &'a Cost)>,
+    /// Checkpoint of the state that reads the test set.
+    pub state: Option<&'a [u8]>,
+    /// The test set and how to draw it.
+    pub examples: Option<(&'a Examples, ImageShape)>,
+}
+
+/// A report, drawn.
+#[derive(Debug)]
+pub(super) struct Page {
+    /// The page.
+    pub html: String,
+    /// The table for the terminal.
+    pub summary: String,
+    /// Why the state could not be drawn.
+    pub damage: Option<CheckpointError>,
+}
+
+impl Parts<'_> {
+    /// Draws page and table.
+    pub(super) fn draw(&self) -> Page {
+        let (heats, damage) = match self.heats() {
+            Ok(heats) => (heats, None),
+            Err(error) => (vec![], Some(error)),
+        };
+        let pictures = self.pictures();
+        let view = RunView {
+            title: self.title(),
+            config: self.text,
+            receipt: self.receipt,
+            epochs: self.records,
+            level_max: self.config.hardware.level_bits.level_max(),
+            heats: &heats,
+            pictures: &pictures,
+            class_names: &[],
+            ledger: self.counted.map(|(ledger, _)| ledger),
+            cost: self.counted.map(|(_, cost)| cost),
+        };
+        Page { html: report::html(&view), summary: report::text::summary(&view), damage }
+    }
+
+    fn title(&self) -> String {
+        let shapes = self.records.first().map(|record| &record.pathways).into_iter().flatten();
+        let mut sizes: Vec<(usize, [usize; 2])> = shapes.map(|p| (p.layer, p.shape)).collect();
+        sizes.dedup();
+        let bias = usize::from(self.config.bias_rows);
+        let first = sizes.first().map_or(0, |(_, [rows, _])| rows.saturating_sub(bias));
+        let units = sizes.iter().map(|(_, [_, columns])| columns);
+        let sizes: Vec<_> = std::iter::once(&first).chain(units).map(usize::to_string).collect();
+        format!(
+            "{} by {}: {} on {}",
+            self.config.data_name(),
+            self.config.rule_name(),
+            sizes.join("-"),
+            self.config.hardware_name
+        )
+    }
+
+    fn heats(&self) -> Result<Vec<Heat>, CheckpointError> {
+        let epoch = chosen(self.config.select, self.records);
+        let of_epoch = |record: &&EpochRecord| epoch.is_none_or(|epoch| record.epoch == epoch);
+        let (Some(state), Some(record)) = (self.state, self.records.iter().find(of_epoch)) else {
+            return Ok(vec![]);
+        };
+        let identity =
+            Identity { config: &self.receipt.config_hash, data: &self.receipt.data_hash };
+        let pathways = &record.pathways;
+        let arrays: Vec<_> = pathways.iter().map(|p| (p.layer, &*p.pathway, p.shape)).collect();
+        let levels = checkpoint::levels(state, identity, &record.state_hash, &arrays)?;
+        let heats = arrays.into_iter().zip(levels).map(|((layer, pathway, shape), levels)| {
+            let [rows, columns] = shape;
+            Heat { layer, pathway: pathway.into(), rows, columns, levels }
+        });
+        Ok(heats.collect())
+    }
+
+    fn pictures(&self) -> Vec<Picture> {
+        let Some((test, ImageShape { height, width, channels })) = self.examples else {
+            return vec![];
+        };
+        let mut places: Vec<[u64; 3]> = vec![];
+        for place in
+            self.receipt.test.iter().flat_map(|test| test.mistakes.iter().chain(&test.confused))
+        {
+            if !places.contains(place) {
+                places.push(*place);
+            }
+        }
+        let places = places.into_iter().filter_map(|[example, truth, guess]| {
+            let at = usize::try_from(example).ok().filter(|&at| at < test.len())?;
+            let (values, full_scale) = (test.values(at).to_vec(), test.full_scale());
+            Some(Picture { example, truth, guess, height, width, channels, full_scale, values })
+        });
+        places.collect()
+    }
+}
