@@ -9,15 +9,20 @@
 //! The script on the page computes its means, intervals and fronts itself, from the table, so that a reader can change
 //! what is shown; `statistics` holds the law, and tests/it/browser.rs compares.
 
+mod curves;
+mod heat;
 mod json;
 mod library;
 mod page;
 mod paper;
+mod pareto;
+mod raster;
 mod settings;
 mod statistics;
 
 pub use page::html;
 pub use paper::{StaticFigure, figures};
+pub use raster::png;
 
 use crate::lab::table::Table;
 

@@ -123,7 +123,7 @@ function curves(look, width) {
     });
     layout[`yaxis${suffix}`] = axisLook(look, {
       domain: [Math.max(0, top - cellY), top], anchor: `x${suffix}`, range: range.map((end) => end * scale.by), nticks: 7,
-      showticklabels: column === 0, title: column === 0 ? titled(y.label, scale.sign) : "", ...(number ? { matches: "y" } : {}),
+      showticklabels: column === 0, ticklen: column === 0 ? 4 : 0, title: column === 0 ? titled(y.label, scale.sign) : "", ...(number ? { matches: "y" } : {}),
     });
     if (panel) {
       notes.push({ text: `<b>${escapeText(panel.label)} ${escapeText(panel.shorts[panelAt])}</b>`, xref: "paper", yref: "paper", x: left, y: top,
@@ -175,7 +175,7 @@ function curves(look, width) {
     caption = "One run a point (n = 1), so there is no band.";
   } else {
     caption = `Mean of runs that differ in the seed alone, ${countWords(counts)} a point. ${x.numeric ? "Bands are" : "Bars are"} its 95${gap}% ` +
-      `confidence interval (Student's t)${Math.min(...counts) === 1 ? "; points with n = 1 have none" : ""}.`;
+      `confidence interval (Student's t)${Math.min(...counts) === 1 ? "; points with n = 1 have none" : ""}${Math.min(...counts.filter((n) => n > 1)) === 2 ? "; with n = 2 it is wide" : ""}.`;
   }
   if (cut) caption += " Some reach beyond the frame.";
   caption += held.text;

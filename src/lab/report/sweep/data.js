@@ -110,8 +110,9 @@ function prefixed(value, unit, digits = 4) {
   if (value === 0) return `0${gap}${unit}`;
   const power = Math.floor(Math.log10(Math.abs(value)) / 3 + 1e-12);
   const at = Math.max(0, Math.min(prefixes.length - 1, power + 6));
-  const number = Number((value / 1000 ** (at - 6)).toPrecision(digits));
-  return `${String(number).replace("-", "−")}${gap}${prefixes[at]}${unit}`;
+  const number = value / 1000 ** (at - 6);
+  const text = Math.abs(number) >= 1000 ? String(Math.round(number)) : number.toPrecision(digits);
+  return `${text.replace("-", "−")}${gap}${prefixes[at]}${unit}`;
 }
 
 /** A value in its unit. Axis values are shown as they were written. */
@@ -137,6 +138,16 @@ function drawn(unit, values) {
   const at = most < 1e5 ? 0 : power;
   const times = at === 0 ? "" : `10${[...String(at)].map((digit) => "⁰¹²³⁴⁵⁶⁷⁸⁹"[digit]).join("")}`;
   return { by: 10 ** -at, sign: [times, unit === "cycles" ? "cycles" : ""].filter(Boolean).join(" ") };
+}
+
+/** About `parts` round steps (1, 2 or 5 times a power of ten) inside a range. */
+function roundTicks(low, high, parts) {
+  const raw = (high - low) / parts || 1;
+  const power = 10 ** Math.floor(Math.log10(raw));
+  const step = power * [1, 2, 5, 10].find((lead) => raw / power <= lead * 1.0001);
+  const ticks = [];
+  for (let at = Math.ceil(low / step - 1e-9); at * step <= high + 1e-9 * step; at++) ticks.push(Number((at * step).toPrecision(12)));
+  return ticks;
 }
 
 const titled = (label, sign) => (sign ? `${label} (${sign})` : label);

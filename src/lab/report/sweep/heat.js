@@ -37,6 +37,7 @@ function heat(look, width) {
   if (groups.size === 0) return { none: `No finished run has ${value.label} here.${held.text}` };
   const grid = () => down.texts.map(() => across.texts.map(() => null));
   const [z, text, tips, counts] = [grid(), grid(), grid(), []];
+  for (const line of text) line.fill("");
   const scale = drawn(value.unit, [...groups.values()].flatMap((group) => group.values));
   let [low, high] = [Infinity, -Infinity];
   const parts = [];
@@ -56,11 +57,11 @@ function heat(look, width) {
   const left = 40 + 7.2 * Math.max(...down.texts.map((one) => one.length));
   const barWidth = width < 620 ? 86 : 118;
   const cellWidth = (width - left - barWidth) / across.texts.length;
-  const cellHeight = Math.max(13, Math.min(34, 520 / down.texts.length));
+  const cellHeight = Math.max(13, Math.min(44, 520 / down.texts.length));
   const roomy = cellWidth > longest * 7 + 6 && cellHeight >= 16;
   const turned = !x.numeric && Math.max(...across.texts.map((one) => one.length)) * 7.4 > cellWidth;
   const bottom = turned ? 62 + 4.6 * Math.max(...across.texts.map((one) => one.length)) : 58;
-  const height = Math.round(Math.max(220, cellHeight * down.texts.length + bottom + 18));
+  const height = Math.round(Math.max(240, cellHeight * down.texts.length + bottom + 18));
   const places = (cells, room) => {
     const stride = Math.max(1, Math.ceil(cells.texts.length / Math.max(2, Math.floor(room))));
     const at = cells.texts.map((_, i) => i).filter((i) => i % stride === 0);
@@ -72,7 +73,7 @@ function heat(look, width) {
     text, ...(roomy ? { texttemplate: "%{text}", textfont: { size: 12.5 } } : {}), customdata: tips, hovertemplate: "%{customdata}<extra></extra>",
     colorscale: colourScale, xgap: cellWidth > 8 ? 1.5 : 0, ygap: cellHeight > 8 ? 1.5 : 0, hoverongaps: false,
     colorbar: { title: { text: titled(value.label, scale.sign), side: "right", font: { size: 13, color: look.ink } }, thickness: 14, outlinewidth: 0,
-      tickfont: { size: 12.5, color: look.soft }, ticks: "outside", ticklen: 3, tickcolor: look.soft, len: 1, nticks: 7 },
+      tickfont: { size: 12.5, color: look.soft }, ticks: "outside", ticklen: 3, tickcolor: look.soft, len: 1, tickvals: roundTicks(low, high, 5) },
     meta: { kind: "heat" },
   }];
   const layout = layoutLook(look, width, height, {

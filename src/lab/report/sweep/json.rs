@@ -34,7 +34,10 @@ pub(super) fn data(settings: &Settings<'_>) -> String {
         "student": (1..=SOLVED).map(student).collect::<Vec<_>>(),
     });
     // `<` could end or hide the script element that holds this; the line separators end lines of old scripts.
-    all.to_string().replace('<', "\\u003c").replace('\u{2028}', "\\u2028").replace('\u{2029}', "\\u2029")
+    all.to_string()
+        .replace('<', "\\u003c")
+        .replace('\u{2028}', "\\u2028")
+        .replace('\u{2029}', "\\u2029")
 }
 
 fn column(column: &Column) -> Value {
@@ -56,7 +59,9 @@ fn column(column: &Column) -> Value {
                           "less": less_is_better(column) });
     match &column.values {
         // A script's numbers are exact to 2^53; greater ones go as words.
-        Values::Whole(values) if values.iter().flatten().any(|value| value.unsigned_abs() > 1 << 53) => {
+        Values::Whole(values)
+            if values.iter().flatten().any(|value| value.unsigned_abs() > 1 << 53) =>
+        {
             let words = values.iter().map(|value| value.map(|value| value.to_string()));
             let words: Vec<_> = words.collect();
             put(&mut out, &words);

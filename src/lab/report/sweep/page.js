@@ -18,7 +18,7 @@ function firstState() {
   if (sweep.best !== null) {
     for (const axis of varied) if (!axis.drawn && axis.codes[sweep.best] >= 0) hold[axis.name] = axis.codes[sweep.best];
   }
-  return { x, y: y?.name ?? "", series: axisNamed(wanted.series), panel: axisNamed(wanted.panel), hx, hy, cost: cost?.name ?? "", hold, find: "", sort: "", down: false, page: 0, plainLines: false };
+  return { x, y: y?.name ?? "", series: axisNamed(wanted.series), panel: axisNamed(wanted.panel), hx, hy, cost: cost?.name ?? "", hold, find: "", sort: "", down: false, page: 0 };
 }
 
 const initial = firstState();

@@ -4,7 +4,7 @@ use super::settings::{Measure, Settings};
 use super::statistics::Summary;
 use super::{SweepView, json, library, paper};
 use crate::lab::price::prefixed;
-use crate::lab::report::number::{count, escape, percent};
+use crate::lab::report::number::{count, escape, percent, significant};
 use crate::lab::table::Unit;
 
 const STYLE: &str = include_str!("../page.css");
@@ -33,7 +33,11 @@ const FRAMES: [Frame; 4] = [
     Frame {
         id: "curves",
         title: "Curves",
-        choices: &[("x", "across"), ("series", "one curve for each"), ("panel", "one panel for each")],
+        choices: &[
+            ("x", "across"),
+            ("series", "one curve for each"),
+            ("panel", "one panel for each"),
+        ],
     },
     Frame { id: "heat", title: "Heat map", choices: &[("hx", "across"), ("hy", "down")] },
     Frame { id: "pareto", title: "What it costs", choices: &[("cost", "cost")] },
@@ -76,7 +80,9 @@ pub fn html(view: &SweepView<'_>) -> String {
 }
 
 fn select(name: &str, label: &str) -> String {
-    format!("<label class=\"choice\"><span>{label}</span><select id=\"choose-{name}\"></select></label>")
+    format!(
+        "<label class=\"choice\"><span>{label}</span><select id=\"choose-{name}\"></select></label>"
+    )
 }
 
 fn card(number: usize, frame: &Frame) -> String {
@@ -132,7 +138,8 @@ fn header(settings: &Settings<'_>) -> String {
         0 => "all of them".into(),
         rest => format!("{} without a result", tally(rest)),
     };
-    let mut keys = key("planned", &tally(planned), &format!("{} settings", tally(settings.groups.len())));
+    let mut keys =
+        key("planned", &tally(planned), &format!("{} settings", tally(settings.groups.len())));
     keys += &key("finished", &tally(finished), &open);
     keys += &key("refused", &tally(view.refused.len()), "cannot be run");
     let axes: String = settings
@@ -141,6 +148,9 @@ fn header(settings: &Settings<'_>) -> String {
         .map(|axis| {
             let (first, last) = (axis.texts.first(), axis.texts.last());
             let what = match (first, last) {
+                (Some(first), Some(last)) if axis.drawn() => {
+                    format!("{} to {}, drawn", brief(first), brief(last))
+                }
                 (Some(first), Some(last)) if axis.numbers.is_some() && axis.texts.len() > 4 => {
                     format!("{} to {}, {} values", escape(first), escape(last), axis.texts.len())
                 }
@@ -162,6 +172,11 @@ fn header(settings: &Settings<'_>) -> String {
     )
 }
 
+/// A drawn number, with the digits that matter.
+fn brief(text: &str) -> String {
+    text.parse().map_or_else(|_| escape(text), significant)
+}
+
 fn tally(number: usize) -> String {
     count(number as u64)
 }
@@ -171,7 +186,7 @@ fn print(value: f64, unit: Unit) -> String {
     match unit {
         Unit::Fraction => percent(value, 2),
         Unit::Cycles | Unit::Seconds | Unit::Joules => prefixed(value, unit.sign()),
-        Unit::Plain | Unit::Count => super::paper::plain(value),
+        Unit::Plain | Unit::Count => significant(value),
     }
 }
 
@@ -191,7 +206,8 @@ fn headline(settings: &Settings<'_>) -> String {
         .filter(|axis| axis.varies())
         .filter_map(|axis| {
             let text = axis.texts.get(axis.codes[*rows.first()?]?)?;
-            Some(format!("{} <b>{}</b>", escape(&axis.axis.label), escape(text)))
+            let text = if axis.drawn() { brief(text) } else { escape(text) };
+            Some(format!("{} <b>{text}</b>", escape(&axis.axis.label)))
         })
         .collect();
     let at = if where_.is_empty() { String::new() } else { format!("{}.", where_.join(", ")) };
@@ -214,7 +230,10 @@ fn chosen(settings: &Settings<'_>, measure: Measure<'_>, best: Summary) -> Strin
         _ => "One run (n = 1)".into(),
     };
     let among = settings.with_mean(measure);
-    format!("{runs}, picked afterwards among {} settings: the best of many is flattered by chance.", tally(among))
+    format!(
+        "{runs}, picked afterwards among {} settings: the best of many is flattered by chance.",
+        tally(among)
+    )
 }
 
 /// What the chips leave out, and points that cannot be run.
@@ -222,12 +241,19 @@ fn notices(view: &SweepView<'_>) -> String {
     let mut out = String::new();
     if !view.not_simulated.is_empty() {
         let list = view.not_simulated.iter();
-        let list: String = list.map(|text| format!("<li>Not simulated: <code>{}</code></li>", escape(text))).collect();
+        let list: String = list
+            .map(|text| format!("<li>Not simulated: <code>{}</code></li>", escape(text)))
+            .collect();
         out += &format!("<ul class=\"notices\">{list}</ul>\n");
     }
     if !view.refused.is_empty() {
         let list = view.refused.iter().map(|one| {
-            format!("<tr><th>{}</th><td>{}</td><td>{}</td></tr>", one.point, escape(&one.what), escape(&one.why))
+            format!(
+                "<tr><th>{}</th><td>{}</td><td>{}</td></tr>",
+                one.point,
+                escape(&one.what),
+                escape(&one.why)
+            )
         });
         out += &format!(
             "<details class=\"refused\" id=\"refused\"><summary>{} points cannot be run</summary><div \
@@ -267,5 +293,8 @@ fn fixed(view: &SweepView<'_>) -> String {
 
 fn figures_or_none(view: &SweepView<'_>) -> String {
     let figures = paper::figures(view);
-    figures.iter().map(|figure| format!("<figure class=\"paper\">{}</figure>", figure.svg)).collect()
+    figures
+        .iter()
+        .map(|figure| format!("<figure class=\"paper\">{}</figure>", figure.svg))
+        .collect()
 }

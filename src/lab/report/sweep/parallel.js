@@ -1,6 +1,10 @@
 // All settings at once: a line a run through its axes and results, coloured by the result.
 const linesMost = 400;
+const linesMostGl = 1500;
 const shades = 8;
+// Lines need more contrast to the page than areas: the palest end of the map on white, the darkest on black, is left out.
+const lineShade = (look, part) => mix(look.name === "dark" ? 0.18 + 0.82 * part : 0.88 * part);
+const lineScale = (look) => Array.from({ length: 11 }, (_, at) => [at / 10, lineShade(look, at / 10)]);
 
 /** The axes that vary and the results of the other figures, as positions 0 to 1. */
 function rulers() {
@@ -9,7 +13,9 @@ function rulers() {
     if (!axis.numeric) return { label: axis.label, value: (row) => axis.codes[row], low: 0, high: axis.texts.length - 1, ticks: axis.texts.map((_, at) => at), texts: axis.shorts };
     const bend = axis.log ? Math.log10 : (value) => value;
     const numbers = axis.numbers;
-    const kept = numbers.length <= 12 ? numbers : Array.from({ length: 6 }, (_, at) => numbers[Math.round((at * (numbers.length - 1)) / 5)]);
+    const [first, last] = [numbers[0], numbers[numbers.length - 1]];
+    const round = () => (axis.log ? logTicks(first, last).tickvals ?? [first, last] : roundTicks(first, last, 6)).filter((mark) => mark >= first && mark <= last);
+    const kept = numbers.length <= 12 ? numbers : round();
     return { label: axis.label, value: (row) => bend(axis.column.number(row)), low: bend(numbers[0]), high: bend(numbers[numbers.length - 1]),
       ticks: kept.map(bend), texts: kept.map((value) => plain(Number(value.toPrecision(3)))) };
   });
@@ -23,7 +29,8 @@ function rulers() {
       const bend = (value) => (log ? Math.log10(value * scale.by) : value * scale.by);
       const ends = [bend(low), bend(high)];
       if (!(ends[1] > ends[0])) ends[1] = ends[0] + 1;
-      const ticks = Array.from({ length: 6 }, (_, at) => ends[0] + ((ends[1] - ends[0]) * at) / 5);
+      const marks = log ? logTicks(low * scale.by, high * scale.by).tickvals ?? [] : roundTicks(ends[0], ends[1], 5);
+      const ticks = marks.map((mark) => (log ? Math.log10(mark) : mark)).filter((mark) => mark >= ends[0] && mark <= ends[1]);
       return { label: titled(column.label, scale.sign), value: (row) => { const value = column.number(row); return value === null ? null : bend(value); },
         low: ends[0], high: ends[1], ticks, texts: ticks.map((tick) => plain(Number((log ? 10 ** tick : tick).toPrecision(3)))) };
     });
@@ -49,18 +56,22 @@ function parallel(look, width) {
   for (const value of values) [low, high] = [Math.min(low, value), Math.max(high, value)];
   if (!(high > low)) high = low + 1e-9;
   const bar = { title: { text: titled(y.label, scale.sign), side: "right", font: { size: 13, color: look.ink } }, thickness: 14, outlinewidth: 0,
-    tickfont: { size: 12.5, color: look.soft }, nticks: 7 };
+    tickfont: { size: 12.5, color: look.soft }, tickvals: roundTicks(low, high, 5) };
   // Too narrow for upright names: they lean.
   const step = (width - 190) / (lines.length - 1);
   const most = Math.max(8, Math.floor(step / 7.2));
   const crowded = lines.some((one) => one.label.length > most);
   const height = crowded ? 430 : 400;
-  const words = `One line a run, ${plain(all)} finished runs, coloured by ${y.label}.`;
+  const gl = hasGl && !onPaper;
+  const stride = Math.ceil(all / (gl ? linesMostGl : linesMost));
+  rows = rows.filter((_, at) => at % stride === 0);
+  const thinned = rows.length < all ? ` ${plain(rows.length)} of them are drawn, evenly picked.` : "";
+  const words = `One line a run, ${plain(all)} finished runs, coloured by ${y.label}.${thinned}`;
   const label = `Parallel coordinates of ${plain(all)} runs: ${lines.map((one) => one.label).join(", ")}`;
-  if (hasGl && !onPaper && !state.plainLines) {
+  if (gl) {
     const data = [{
       type: "parcoords", labelangle: crowded ? -18 : 0, labelside: "top", labelfont: { size: 13, color: look.ink }, tickfont: { size: 12, color: look.soft },
-      rangefont: { size: 1, color: "rgba(0,0,0,0)" }, line: { color: values, cmin: low, cmax: high, colorscale: colourScale, showscale: true, colorbar: bar },
+      rangefont: { size: 1, color: "rgba(0,0,0,0)" }, line: { color: rows.map((row) => y.number(row) * scale.by), cmin: low, cmax: high, colorscale: lineScale(look), showscale: true, colorbar: bar },
       unselected: { line: { color: look.grid, opacity: 0.35 } },
       dimensions: lines.map((one) => ({ label: escapeText(one.label), values: rows.map(one.value), range: [one.low, one.high], tickvals: one.ticks, ticktext: one.texts })),
       meta: { kind: "parallel" },
@@ -69,8 +80,7 @@ function parallel(look, width) {
     return { data, layout, label, caption: `${words} Drag along an axis to keep a range of it; drag a name to move the axis.` };
   }
   // Without WebGL: thin lines in a few shades, and as many as can still be told apart.
-  const stride = Math.ceil(rows.length / linesMost);
-  const kept = rows.map((row, at) => [row, values[at]]).filter((_, at) => at % stride === 0);
+  const kept = rows.map((row) => [row, y.number(row) * scale.by]);
   const place = (one, row) => (one.high > one.low ? (one.value(row) - one.low) / (one.high - one.low) : 0.5);
   const data = [];
   for (let shade = 0; shade < shades; shade++) {
@@ -82,11 +92,11 @@ function parallel(look, width) {
       xs.push(null);
       ys.push(null);
     }
-    data.push({ type: "scatter", mode: "lines", x: xs, y: ys, line: { width: 1, color: mix((shade + 0.5) / shades) }, opacity: 0.65, hoverinfo: "skip", showlegend: false,
+    data.push({ type: "scatter", mode: "lines", x: xs, y: ys, line: { width: 1, color: lineShade(look, (shade + 0.5) / shades) }, opacity: 0.65, hoverinfo: "skip", showlegend: false,
       meta: { kind: "parallel" } });
   }
   data.push({ type: "scatter", mode: "markers", x: [null], y: [null], showlegend: false, hoverinfo: "skip",
-    marker: { color: [low], cmin: low, cmax: high, colorscale: colourScale, showscale: true, colorbar: bar }, meta: { kind: "key" } });
+    marker: { color: [low], cmin: low, cmax: high, colorscale: lineScale(look), showscale: true, colorbar: bar }, meta: { kind: "key" } });
   const notes = lines.flatMap((one, at) => [
     { text: escapeText(one.label), x: at, y: 1, yref: "paper", yanchor: "bottom", yshift: 12, xanchor: crowded ? "left" : "center", textangle: crowded ? -18 : 0, showarrow: false, font: { size: 13, color: look.ink } },
     ...one.ticks.map((tick, i) => ({ text: escapeText(one.texts[i]), x: at, y: one.high > one.low ? (tick - one.low) / (one.high - one.low) : 0.5, xanchor: "right", xshift: -3,
@@ -97,6 +107,5 @@ function parallel(look, width) {
     margin: { l: 60, r: 16, t: crowded ? 96 : 56, b: 18 }, annotations: notes, shapes,
     xaxis: { visible: false, range: [-0.12, lines.length - 0.92], fixedrange: true }, yaxis: { visible: false, range: [-0.03, 1.03], fixedrange: true },
   });
-  const thinned = kept.length < all ? ` ${plain(kept.length)} of them are drawn, evenly picked.` : "";
-  return { data, layout, label, caption: `${words}${thinned}` };
+  return { data, layout, label, caption: words };
 }

@@ -75,7 +75,7 @@ function pareto(look, width) {
     data.push({ type: "scatter", x: [null], y: [null], mode: "markers", name, legendgroup: String(kind), showlegend: Boolean(grouped), hoverinfo: "skip",
       marker: { color: style.colour, symbol: style.symbol, size: 8 }, meta: { kind: "key" } });
     if (chosen.length) {
-      data.push({ ...trace(chosen, { name, legendgroup: String(kind), showlegend: false, error_x: { ...bars(chosen), color: fade(style.colour, 0.8) },
+      data.push({ ...trace(chosen, { name, legendgroup: String(kind), showlegend: false, error_x: { ...bars(chosen), color: fade(style.colour, best.length > 10 ? 0.45 : 0.8) },
         marker: { color: style.colour, symbol: style.symbol, size: 9, line: { color: look.ink, width: 1.2 } }, meta: { kind: "chosen" } }), type: "scatter" });
     }
   }

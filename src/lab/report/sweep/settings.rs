@@ -51,6 +51,12 @@ impl<'a> Levels<'a> {
         self.texts.len() > 1
     }
 
+    /// Whether it is drawn on a log scale.
+    pub(super) fn log(&self) -> bool {
+        let positive = |numbers: &Vec<f64>| numbers.iter().all(|number| *number > 0.0);
+        self.axis.log && self.numbers.as_ref().is_some_and(positive)
+    }
+
     /// Whether its values were drawn from a range.
     pub(super) fn drawn(&self) -> bool {
         self.numbers.is_some() && self.axis.order.is_empty() && self.texts.len() > 12
@@ -82,7 +88,8 @@ pub(super) fn less_is_better(column: &Column) -> bool {
 
 impl<'a> Settings<'a> {
     pub(super) fn new(view: &'a SweepView<'a>) -> Self {
-        let known = view.axes.iter().filter_map(|axis| Some((axis, view.table.column(&axis.name)?)));
+        let known =
+            view.axes.iter().filter_map(|axis| Some((axis, view.table.column(&axis.name)?)));
         let axes: Vec<_> = known.map(|(axis, column)| Levels::new(axis, column)).collect();
         let mut places: BTreeMap<Vec<Option<usize>>, usize> = BTreeMap::new();
         let mut groups: Vec<Vec<usize>> = Vec::new();
@@ -143,7 +150,11 @@ impl<'a> Settings<'a> {
     }
 
     /// Axes that vary, are not `shown`, and the value each is held at: that of the best setting; none where it pools.
-    pub(super) fn held(&self, measure: Measure<'_>, shown: &[&str]) -> Vec<(&Levels<'a>, Option<usize>)> {
+    pub(super) fn held(
+        &self,
+        measure: Measure<'_>,
+        shown: &[&str],
+    ) -> Vec<(&Levels<'a>, Option<usize>)> {
         let best = self.best(measure).and_then(|(rows, _)| rows.first().copied());
         let others = self.axes.iter().filter(|axis| axis.varies());
         let others = others.filter(|axis| !shown.contains(&axis.axis.name.as_str()));
