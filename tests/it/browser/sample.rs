@@ -4,23 +4,23 @@ use dalean::lab::report::sweep::{Axis, Figures, Refused, SweepView};
 use dalean::lab::table::{Column, Role, Table, Unit, Values};
 
 /// A sweep that owns what its view borrows.
-pub struct Sample {
-    pub name: &'static str,
-    pub table: Table,
-    pub axes: Vec<Axis>,
-    pub figures: Figures,
-    pub refused: Vec<Refused>,
+pub(crate) struct Sample {
+    pub(crate) name: &'static str,
+    pub(crate) table: Table,
+    pub(crate) axes: Vec<Axis>,
+    pub(crate) figures: Figures,
+    pub(crate) refused: Vec<Refused>,
 }
 
 /// Words between 0 and 1, the same every time.
-pub struct Dice(u64);
+pub(crate) struct Dice(u64);
 
 impl Dice {
-    pub fn new(seed: u64) -> Self {
+    pub(crate) fn new(seed: u64) -> Self {
         Self(seed)
     }
 
-    pub fn roll(&mut self) -> f64 {
+    pub(crate) fn roll(&mut self) -> f64 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let mut word = self.0;
         word = (word ^ (word >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
@@ -29,16 +29,16 @@ impl Dice {
     }
 
     /// About normal: mean 0, deviation 1.
-    pub fn bell(&mut self) -> f64 {
+    pub(crate) fn bell(&mut self) -> f64 {
         (0..12).map(|_| self.roll()).sum::<f64>() - 6.0
     }
 }
 
-pub fn column(name: &str, unit: Unit, role: Role, values: Values) -> Column {
+pub(crate) fn column(name: &str, unit: Unit, role: Role, values: Values) -> Column {
     Column { name: name.into(), label: name.replace('_', " "), unit, role, values }
 }
 
-pub fn axis(name: &str, number: bool, log: bool, order: &[&str]) -> Axis {
+pub(crate) fn axis(name: &str, number: bool, log: bool, order: &[&str]) -> Axis {
     let order = order.iter().map(|&value| value.to_owned()).collect();
     Axis { name: name.into(), label: name.replace('_', " "), number, log, order }
 }
@@ -47,7 +47,7 @@ const ROUNDINGS: [&str; 3] = ["nearest", "stochastic", "separable"];
 const RULES: [&str; 2] = ["ed", "bp"];
 
 impl Sample {
-    pub fn view(&self) -> SweepView<'_> {
+    pub(crate) fn view(&self) -> SweepView<'_> {
         SweepView {
             name: self.name,
             title: "How many level bits does learning need?",
@@ -59,14 +59,17 @@ impl Sample {
             figures: self.figures.clone(),
             refused: &self.refused,
             not_simulated: NOTES.get_or_init(|| {
-                vec!["drift = \"5 % a decade\"".into(), "read_disturb = \"none below 0.3 V\"".into()]
+                vec![
+                    "drift = \"5 % a decade\"".into(),
+                    "read_disturb = \"none below 0.3 V\"".into(),
+                ]
             }),
             version: "0.1.0",
         }
     }
 
     /// 12 level bits x 3 roundings x 2 rules x 3 seeds = 216 points; some not finished, some refused.
-    pub fn grid() -> Self {
+    pub(crate) fn grid() -> Self {
         let mut dice = Dice::new(1);
         let (mut bits, mut roundings, mut rules, mut seeds) = (vec![], vec![], vec![], vec![]);
         let mut results: [Vec<Option<f64>>; 6] = Default::default();
@@ -81,7 +84,8 @@ impl Sample {
                         let knee = if rounding == "nearest" { 7.0 } else { 3.2 };
                         let top = if rule == "bp" { 0.975 } else { 0.962 };
                         let rise = 1.0 / (1.0 + (-(bit as f64 - knee) * 1.1).exp());
-                        let accuracy = 0.1 + (top - 0.1) * rise + 0.012 * dice.bell() * (1.2 - rise);
+                        let accuracy =
+                            0.1 + (top - 0.1) * rise + 0.012 * dice.bell() * (1.2 - rise);
                         let accuracy = (accuracy.clamp(0.08, 0.99) * 1797.0).round() / 1797.0;
                         let joules = 2.1e-6 * 1.31f64.powi(bit as i32) * (1.0 + 0.1 * dice.roll());
                         let joules = joules * if rounding == "nearest" { 0.8 } else { 1.0 };
@@ -90,7 +94,14 @@ impl Sample {
                         roundings.push(Some(rounding.to_owned()));
                         rules.push(Some(rule.to_owned()));
                         seeds.push(Some(seed));
-                        let numbers = [accuracy, accuracy + 0.006, joules, joules * 0.4, joules * 3.1, 0.31 + 0.2 * rise];
+                        let numbers = [
+                            accuracy,
+                            accuracy + 0.006,
+                            joules,
+                            joules * 0.4,
+                            joules * 3.1,
+                            0.31 + 0.2 * rise,
+                        ];
                         for (column, number) in results.iter_mut().zip(numbers) {
                             column.push(done.then_some(number));
                         }
@@ -103,7 +114,8 @@ impl Sample {
             }
         }
         let [accuracy, validation, joules, low, high, floor] = results;
-        let real = |name: &str, unit, values| column(name, unit, Role::Result, Values::Real(values));
+        let real =
+            |name: &str, unit, values| column(name, unit, Role::Result, Values::Real(values));
         let columns = vec![
             column("level_bits", Unit::Plain, Role::Axis, Values::Whole(bits)),
             column("rounding", Unit::Plain, Role::Axis, Values::Text(roundings)),
@@ -129,7 +141,12 @@ impl Sample {
             name: "bits-by-rounding",
             table: Table { columns },
             axes: vec![
-                axis("level_bits", true, false, &["1", "2", "3", "4", "5", "6", "7", "8", "9", "10", "11", "12"]),
+                axis(
+                    "level_bits",
+                    true,
+                    false,
+                    &["1", "2", "3", "4", "5", "6", "7", "8", "9", "10", "11", "12"],
+                ),
                 axis("rounding", false, false, &ROUNDINGS),
                 axis("rule", false, false, &RULES),
             ],
@@ -146,7 +163,7 @@ impl Sample {
     }
 
     /// Values drawn at random: `rows` x 25 columns, no repetitions.
-    pub fn large(rows: usize) -> Self {
+    pub(crate) fn large(rows: usize) -> Self {
         let mut dice = Dice::new(2);
         let mut columns = Vec::new();
         let noise: Vec<f64> = (0..rows).map(|_| 10f64.powf(-4.0 + 3.0 * dice.roll())).collect();
@@ -169,16 +186,28 @@ impl Sample {
         let scores = (0..rows).map(|row| done(row).then(|| score(row, &mut dice))).collect();
         columns.push(column("test_accuracy", Unit::Fraction, Role::Result, Values::Real(scores)));
         let joules = (0..rows)
-            .map(|row| done(row).then(|| 1e-9 * 1.9f64.powi(bits[row] as i32) * (0.5 + rate[row]) * (0.8 + 0.4 * dice.roll())))
+            .map(|row| {
+                done(row).then(|| {
+                    1e-9 * 1.9f64.powi(bits[row] as i32)
+                        * (0.5 + rate[row])
+                        * (0.8 + 0.4 * dice.roll())
+                })
+            })
             .collect();
         columns.push(column("joules", Unit::Joules, Role::Result, Values::Real(joules)));
         for more in columns.len()..23 {
             let values = (0..rows).map(|row| done(row).then(|| 1e6 * dice.roll())).collect();
-            columns.push(column(&format!("count_{more}"), Unit::Count, Role::Result, Values::Real(values)));
+            columns.push(column(
+                &format!("count_{more}"),
+                Unit::Count,
+                Role::Result,
+                Values::Real(values),
+            ));
         }
         let hashes = (0..rows).map(|row| done(row).then(|| format!("{row:064x}"))).collect();
         columns.push(column("state_hash", Unit::Plain, Role::Name, Values::Text(hashes)));
-        let runs = (0..rows).map(|row| done(row).then(|| format!("runs/{row:05}/report.html"))).collect();
+        let runs =
+            (0..rows).map(|row| done(row).then(|| format!("runs/{row:05}/report.html"))).collect();
         columns.push(column("run", Unit::Plain, Role::Name, Values::Text(runs)));
         Self {
             name: "drawn-at-random",
@@ -186,7 +215,12 @@ impl Sample {
             axes: vec![
                 axis("write_noise", true, true, &[]),
                 axis("learning_rate", true, false, &[]),
-                axis("level_bits", true, false, &["1", "2", "3", "4", "5", "6", "7", "8", "9", "10", "11", "12"]),
+                axis(
+                    "level_bits",
+                    true,
+                    false,
+                    &["1", "2", "3", "4", "5", "6", "7", "8", "9", "10", "11", "12"],
+                ),
                 axis("rule", false, false, &RULES),
             ],
             figures: Figures {
@@ -202,8 +236,9 @@ impl Sample {
     }
 
     /// One text axis, no seed, no cost, no names.
-    pub fn words() -> Self {
-        let devices = ["ideal", "prime", "isaac", "</script><b>a very long name of a device & more"];
+    pub(crate) fn words() -> Self {
+        let devices =
+            ["ideal", "prime", "isaac", "</script><b>a very long name of a device & more"];
         let values = devices.iter().map(|&name| Some(name.to_owned())).collect();
         let scores = vec![Some(0.97), Some(0.91), None, Some(0.88)];
         Self {
@@ -215,18 +250,24 @@ impl Sample {
                 ],
             },
             axes: vec![axis("device", false, false, &devices)],
-            figures: Figures { x: "device".into(), y: "test_accuracy".into(), ..Figures::default() },
+            figures: Figures {
+                x: "device".into(),
+                y: "test_accuracy".into(),
+                ..Figures::default()
+            },
             refused: vec![],
         }
     }
 
     /// Nothing has finished.
-    pub fn hollow() -> Self {
+    pub(crate) fn hollow() -> Self {
         let mut sample = Self::grid();
         for column in &mut sample.table.columns {
             match &mut column.values {
                 Values::Real(values) => values.iter_mut().for_each(|value| *value = None),
-                Values::Whole(values) if column.role == Role::Result => values.iter_mut().for_each(|value| *value = None),
+                Values::Whole(values) if column.role == Role::Result => {
+                    values.iter_mut().for_each(|value| *value = None)
+                }
                 _ => {}
             }
         }
@@ -234,7 +275,7 @@ impl Sample {
     }
 
     /// No rows at all.
-    pub fn empty() -> Self {
+    pub(crate) fn empty() -> Self {
         let table = Table { columns: vec![] };
         Self { name: "empty", table, axes: vec![], figures: Figures::default(), refused: vec![] }
     }

@@ -43,12 +43,14 @@ pub fn figures(view: &SweepView<'_>) -> Vec<StaticFigure> {
 
 /// A picture of `size` units that holds `body`; `says` in words what it shows.
 pub(super) fn sheet([width, height]: [f64; 2], says: &str, body: &str) -> String {
+    // Letters of the upright title lean out to the left.
+    let width = width + 10.0;
     let [wide, high] = [width, height].map(|units| place(units / COLUMN * COLUMN_MM));
     let [width, height] = [width, height].map(place);
     format!(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" class=\"paper\" width=\"{wide}mm\" height=\"{high}mm\" \
-         viewBox=\"0 0 {width} {height}\" role=\"img\" aria-label=\"{}\"><style>{STYLE}</style>\
-         <rect width=\"{width}\" height=\"{height}\" fill=\"#fff\"/>{body}</svg>\n",
+         viewBox=\"-6 0 {width} {height}\" role=\"img\" aria-label=\"{}\"><style>{STYLE}</style>\
+         <rect x=\"-6\" width=\"{width}\" height=\"{height}\" fill=\"#fff\"/>{body}</svg>\n",
         escape(says)
     )
 }
