@@ -71,7 +71,7 @@ fn curves_are_the_means_of_the_table_and_bands_their_intervals() {
     let sample = Sample::grid();
     let steps = "await drawn(); const first = look(); choose('choose-y', 'joules'); choose('choose-panel', ''); \
                  const second = look(); return { ...first, second };";
-    let Some(found) = open(&html(&sample.view()), steps, Graphics::Software) else { return };
+    let Some(found) = open(&html(&sample.view()), steps, Graphics::Played) else { return };
     check(&found);
     let curves = traces(&found, "curves", "mean");
     assert_eq!(curves.len(), 6, "3 roundings x 2 rules");
@@ -93,6 +93,9 @@ fn curves_are_the_means_of_the_table_and_bands_their_intervals() {
             close(&curve["customdata"][at][2], half(&values));
         }
     }
+    let parallel = traces(&found, "parallel", "parallel")[0];
+    assert_eq!(parallel["type"], "parcoords");
+    assert_eq!(parallel["dimensions"].as_array().unwrap().len(), 5, "3 axes, cost and result");
     let bands = traces(&found, "curves", "band");
     assert_eq!(bands.len(), 6);
     for (curve, band) in curves.iter().zip(bands) {
@@ -241,6 +244,7 @@ fn ten_thousand_rows_open_quickly() {
             "10 000 x 25, {graphics:?}: {} bytes, all drawn after {ready} ms, {nodes} nodes",
             page.len()
         );
+        println!("milliseconds: {}", found["marks"]);
         assert!(ready < 20_000.0, "{ready} ms");
         assert!(nodes < 12_000, "{nodes} nodes");
         let caption = found["figures"]["curves"]["caption"].as_str().unwrap();

@@ -93,3 +93,6 @@ pub struct Refused {
     /// Why.
     pub why: String,
 }
+
+#[cfg(test)]
+mod tests;

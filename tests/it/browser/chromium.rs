@@ -20,9 +20,10 @@ const NAMES: [&str; 3] = ["chromium", "chromium-browser", "google-chrome"];
 /// One browser at a time: they are heavy, and times are measured.
 static ALONE: Mutex<()> = Mutex::new(());
 
-/// With the processor as a graphics card, or with no WebGL at all.
+/// With the processor as a graphics card, which the page may take for one or not, or with no WebGL at all.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Graphics {
+    Played,
     Software,
     None,
 }
@@ -46,8 +47,9 @@ pub(crate) fn open(page: &str, steps: &str, graphics: Graphics) -> Option<Value>
     let _alone = ALONE.lock().unwrap_or_else(|broken| broken.into_inner());
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("page.html");
+    let played = if graphics == Graphics::Played { "anyGl();" } else { "" };
     let head = format!(
-        "<head><meta http-equiv=\"Content-Security-Policy\" content=\"{POLICY}\"><script>{WATCH}{READ}</script>"
+        "<head><meta http-equiv=\"Content-Security-Policy\" content=\"{POLICY}\"><script>{WATCH}{READ}{played}</script>"
     );
     let tail = format!(
         "<script>(async () => {{ try {{ finish(await (async () => {{ {steps} }})()); }} catch (error) {{ \
@@ -70,7 +72,7 @@ pub(crate) fn open(page: &str, steps: &str, graphics: Graphics) -> Option<Value>
         .args(["--host-resolver-rules=MAP * ~NOTFOUND", "--window-size=1300,1000", "--dump-dom"])
         .arg(format!("--user-data-dir={}", folder.path().join("profile").display()));
     match graphics {
-        Graphics::Software => {
+        Graphics::Played | Graphics::Software => {
             command.args(["--use-angle=swiftshader", "--enable-unsafe-swiftshader"])
         }
         Graphics::None => command.args(["--disable-gpu", "--disable-3d-apis"]),

@@ -23,6 +23,7 @@ window.look = () => {
     };
   }
   return {
+    marks: performance.getEntriesByType("mark").map((mark) => `${mark.name} ${Math.round(mark.startTime)}`),
     ready: Number(document.documentElement.dataset.ready), figures, hash: location.hash,
     nodes: document.querySelectorAll("*").length,
     head: [...document.querySelectorAll("#table thead th")].map((cell) => cell.textContent),

@@ -7,6 +7,13 @@ window.probe = { errors: [], requests: [] };
   addEventListener("unhandledrejection", (event) => wrong(event.reason));
   addEventListener("securitypolicyviolation", (event) => note("requests")(`${event.violatedDirective} ${event.blockedURI}`));
   for (const name of ["error", "warn"]) console[name] = (...words) => wrong(words.join(" "));
+  // A page asks for a real graphics card; a test may give it the processor instead.
+  window.anyGl = () => {
+    const given = HTMLCanvasElement.prototype.getContext;
+    HTMLCanvasElement.prototype.getContext = function (kind, wishes) {
+      return given.call(this, kind, wishes && { ...wishes, failIfMajorPerformanceCaveat: false });
+    };
+  };
   // A page counts as loading while a frame in it loads: frame after frame, until the probe is done.
   const hold = (before) => {
     const frame = document.createElement("iframe");

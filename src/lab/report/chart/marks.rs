@@ -175,30 +175,36 @@ impl Chart {
         (self.width - self.left - self.right, self.base() - self.top)
     }
 
-    /// One entry of a key, right of the frame; `line` is where, from 0 on top.
+    /// Words over a key, right of the frame.
+    pub(in crate::lab::report) fn key_title(&mut self, text: &str) {
+        self.text("note", self.width - self.right + 14.0, self.top + 14.0, text);
+    }
+
+    /// One entry of a key; `entry` counts from 1 on top. With a line through the marker, or without.
     pub(in crate::lab::report) fn key(
         &mut self,
-        line: usize,
-        number: Option<usize>,
+        entry: usize,
+        number: usize,
         colour: &str,
         text: &str,
+        lined: bool,
     ) {
         let x = self.width - self.right + 14.0;
-        let y = self.top + 10.0 + 19.0 * crate::lab::report::number::size(line);
-        let Some(number) = number else {
-            self.text("note", x, y + 4.0, text);
-            return;
-        };
-        let [left, right, middle] = [x, x + 30.0, y].map(place);
-        let dash = dashes(number);
-        let dash = if dash.is_empty() { "none" } else { dash };
-        let _ = write!(
-            self.body,
-            "<path fill=\"none\" stroke=\"{colour}\" stroke-width=\"1.8\" stroke-dasharray=\"{dash}\" \
-             d=\"M{left} {middle}L{right} {middle}\"/>{} fill=\"{colour}\" stroke=\"#fff\" stroke-width=\"0.7\"/>",
-            outline(number, x + 15.0, y, 3.6)
-        );
-        self.text("tick", x + 37.0, y + 4.0, text);
+        let y = self.top + 10.0 + 19.0 * crate::lab::report::number::size(entry);
+        let middle = if lined { x + 15.0 } else { x + 5.0 };
+        if lined {
+            let [left, right, middle] = [x, x + 30.0, y].map(place);
+            let dash = if dashes(number).is_empty() { "none" } else { dashes(number) };
+            let _ = write!(
+                self.body,
+                "<path fill=\"none\" stroke=\"{colour}\" stroke-width=\"1.8\" stroke-dasharray=\"{dash}\" \
+                 d=\"M{left} {middle}L{right} {middle}\"/>"
+            );
+        }
+        let shape = outline(number, middle, y, 3.6);
+        let _ =
+            write!(self.body, "{shape} fill=\"{colour}\" stroke=\"#fff\" stroke-width=\"0.7\"/>");
+        self.text("tick", middle + if lined { 22.0 } else { 11.0 }, y + 4.0, text);
     }
 
     /// What has been drawn, moved to a place, as part of a larger picture.

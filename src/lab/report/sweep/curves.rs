@@ -99,23 +99,30 @@ pub(super) fn draw(settings: &Settings<'_>) -> Option<String> {
         let own: Vec<&Line> = all.iter().filter(|line| line.panel == panel_at).collect();
         lines(&mut chart, &own, x, pooled, scale.by);
         if let (Some(series), true) = (series, last) {
-            chart.key(0, None, "", &short(&series.axis.label));
+            chart.key_title(&short(&series.axis.label));
             let kinds: std::collections::BTreeSet<usize> =
                 all.iter().map(|line| line.series).collect();
             for (entry, &kind) in kinds.iter().enumerate() {
-                chart.key(entry + 1, Some(kind), hue(kind), &short(&series.texts[kind]));
+                chart.key(entry + 1, kind, hue(kind), &short(&series.texts[kind]), true);
             }
         }
         body += &chart.part(size(number % across) * each, size(number / across) * high_each);
     }
     let down = panels.len().div_ceil(across);
     let says = format!(
-        "{} against {}, means{}",
+        "{} against {}, means of {}{}",
         measure.column.label,
         x.axis.label,
+        runs(all.iter().flat_map(|line| &line.points).map(|(_, point)| point.n)),
         held_words(&held, pooled)
     );
     Some(sheet([width, size(down) * high_each + 4.0], &says, &body))
+}
+
+/// `n = 2 to 3 runs`.
+pub(super) fn runs(counts: impl Iterator<Item = usize> + Clone) -> String {
+    let (least, most) = (counts.clone().min().unwrap_or(0), counts.max().unwrap_or(0));
+    if least == most { format!("n = {most} runs") } else { format!("n = {least} to {most} runs") }
 }
 
 /// What is held where, for the words of a figure.

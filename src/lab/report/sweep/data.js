@@ -1,4 +1,5 @@
 // The table: columns, distinct values, numbers in their units, means and intervals.
+performance.mark("library read");
 const sweep = JSON.parse(document.getElementById("sweep").textContent);
 const rowCount = sweep.rows;
 const gap = "\u202f";
@@ -98,7 +99,7 @@ function plain(value) {
   if (size >= 1e15 || size < 1e-5) return Number(value.toPrecision(4)).toExponential().replace("-", "−").replace("+", "");
   const text = Number.isInteger(value) ? String(value) : String(Number(value.toPrecision(6)));
   const [whole, part] = text.replace("-", "−").split(".");
-  const grouped = whole.length > 5 ? whole.replace(/\B(?=(\d{3})+$)/g, gap) : whole;
+  const grouped = whole.length > 4 ? whole.replace(/\B(?=(\d{3})+$)/g, gap) : whole;
   return part ? `${grouped}.${part}` : grouped;
 }
 

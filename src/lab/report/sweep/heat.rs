@@ -1,6 +1,6 @@
 //! Mean of a result over two axes, as coloured cells with their values.
 
-use super::curves::held_words;
+use super::curves::{held_words, runs};
 use super::paper::{COLUMN, Drawn, marks, sheet, short, wide};
 use super::settings::{Levels, Settings};
 use crate::lab::report::chart::Chart;
@@ -29,8 +29,8 @@ pub(super) fn draw(settings: &Settings<'_>) -> Option<String> {
             cells[j * across + i].push(row);
         }
     }
-    let means: Vec<Option<f64>> =
-        cells.iter().map(|rows| Some(settings.summary(measure, rows)?.mean)).collect();
+    let cells: Vec<_> = cells.iter().map(|rows| settings.summary(measure, rows)).collect();
+    let means: Vec<Option<f64>> = cells.iter().map(|cell| Some(cell.as_ref()?.mean)).collect();
     let low = means.iter().flatten().copied().reduce(f64::min)?;
     let high = means.iter().flatten().copied().reduce(f64::max)?;
     let scale = Drawn::new(measure.column.unit, low.abs().max(high.abs()));
@@ -88,10 +88,11 @@ pub(super) fn draw(settings: &Settings<'_>) -> Option<String> {
         digits,
     );
     let says = format!(
-        "{} by {} and {}, means{}",
+        "{} by {} and {}, means of {}{}",
         measure.column.label,
         x.axis.label,
         y.axis.label,
+        runs(cells.iter().flatten().map(|cell| cell.n)),
         held_words(&held, pooled)
     );
     Some(sheet([width, height + 2.0], &says, &body))

@@ -93,9 +93,10 @@ function spanOf(axis) {
   return [ends[0] - room, ends[1] + room];
 }
 
+// A processor that plays the graphics card is slower at this than plain drawing.
 const hasGl = (() => {
   try {
-    const gl = document.createElement("canvas").getContext("webgl");
+    const gl = document.createElement("canvas").getContext("webgl", { failIfMajorPerformanceCaveat: true });
     if (!gl) return false;
     gl.getExtension("WEBGL_lose_context")?.loseContext();
     return true;

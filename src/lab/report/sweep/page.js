@@ -120,10 +120,12 @@ function wireChoices() {
 
 // --- start ---
 
+performance.mark("table read");
 recall();
 settle();
 wireChoices();
 wireRows();
+performance.mark("rows listed");
 figure("curves", curves);
 figure("heat", heat);
 figure("pareto", pareto);
@@ -142,6 +144,7 @@ function drawFrom(at) {
     return;
   }
   draw(figures[at]);
+  performance.mark(`drawn ${figures[at].id}`);
   setTimeout(() => drawFrom(at + 1), 0);
 }
 drawFrom(0);

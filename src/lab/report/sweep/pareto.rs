@@ -51,7 +51,7 @@ pub(super) fn draw(settings: &Settings<'_>) -> Option<String> {
     let points: Vec<Point> = settings.groups.iter().filter_map(point).collect();
     let pairs: Vec<(f64, f64)> = points.iter().map(|point| (point.cost, point.value)).collect();
     let best = front(&pairs, value.less);
-    let few = best.len() <= 12;
+    let few = best.len() <= 24;
 
     let shown = points.iter().enumerate().filter(|(at, _)| few && best.contains(at));
     let bounds = shown.filter_map(|(_, point)| point.bounds).flatten();
@@ -109,9 +109,9 @@ pub(super) fn draw(settings: &Settings<'_>) -> Option<String> {
         chart.marker(at(&points[one]), points[one].kind, hue(points[one].kind), false);
     }
     if let Some(series) = series {
-        chart.key(0, None, "", &short(&series.axis.label));
+        chart.key_title(&short(&series.axis.label));
         for (kind, text) in series.texts.iter().enumerate() {
-            chart.key(kind + 1, Some(kind), hue(kind), &short(text));
+            chart.key(kind + 1, kind, hue(kind), &short(text), false);
         }
     }
     let says = format!(
