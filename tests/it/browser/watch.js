@@ -13,6 +13,10 @@ window.probe = { errors: [], requests: [] };
     HTMLCanvasElement.prototype.getContext = function (kind, wishes) {
       return given.call(this, kind, wishes && { ...wishes, failIfMajorPerformanceCaveat: false });
     };
+    const asked = WebGLRenderingContext.prototype.getParameter;
+    WebGLRenderingContext.prototype.getParameter = function (what) {
+      return what === 0x9246 ? "a card" : asked.call(this, what);
+    };
   };
   // A page counts as loading while a frame in it loads: frame after frame, until the probe is done.
   const hold = (before) => {

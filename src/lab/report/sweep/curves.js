@@ -46,10 +46,6 @@ function hover(point, measure, head, pooled) {
   return lines.join("<br>");
 }
 
-function escapeText(text) {
-  return text.replace(/&/g, "&amp;").replace(/</g, "&lt;").replace(/>/g, "&gt;");
-}
-
 function curves(look, width) {
   const x = axisOf.get(state.x);
   const y = columnOf.get(state.y);
@@ -134,7 +130,7 @@ function curves(look, width) {
       own.sort((a, b) => a.xAt - b.xAt);
       if (own.length === 0) return;
       const style = series ? styleOf(series, seriesAt, look) : styleOf(null, 0, look);
-      const name = series ? series.shorts[seriesAt] : y.label;
+      const name = escapeText(series ? series.shorts[seriesAt] : y.label);
       // Words have no distance: their points stand side by side and are not joined.
       const dodge = x.numeric ? 0 : ((order + 0.5) / lines.length - 0.5) * 0.5;
       const place = (point) => (x.numeric ? x.numbers[point.xAt] : point.xAt + dodge);

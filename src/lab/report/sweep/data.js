@@ -92,6 +92,11 @@ function short(text, most) {
   return text.length > most ? text.slice(0, most - 1) + "…" : text;
 }
 
+/** Words that Plotly would read as markup. */
+function escapeText(text) {
+  return text.replace(/&/g, "&amp;").replace(/</g, "&lt;").replace(/>/g, "&gt;");
+}
+
 /** Six significant digits at most, no zeros behind them. */
 function plain(value) {
   if (value === 0) return "0";

@@ -65,17 +65,23 @@ function heat(look, width) {
   const places = (cells, room) => {
     const stride = Math.max(1, Math.ceil(cells.texts.length / Math.max(2, Math.floor(room))));
     const at = cells.texts.map((_, i) => i).filter((i) => i % stride === 0);
-    return { tickvals: at, ticktext: at.map((i) => cells.texts[i]) };
+    return { tickvals: at, ticktext: at.map((i) => escapeText(cells.texts[i])) };
   };
   const widest = Math.max(...across.texts.map((one) => one.length)) * 7.4 + 8;
   const data = [{
     type: "heatmap", x: across.texts.map((_, i) => i), y: down.texts.map((_, i) => i), z, zmin: low, zmax: high > low ? high : low + 1e-9,
-    text, ...(roomy ? { texttemplate: "%{text}", textfont: { size: 12.5 } } : {}), customdata: tips, hovertemplate: "%{customdata}<extra></extra>",
+    text, customdata: tips, hovertemplate: "%{customdata}<extra></extra>",
     colorscale: colourScale, xgap: cellWidth > 8 ? 1.5 : 0, ygap: cellHeight > 8 ? 1.5 : 0, hoverongaps: false,
-    colorbar: { title: { text: titled(value.label, scale.sign), side: "right", font: { size: 13, color: look.ink } }, thickness: 14, outlinewidth: 0,
+    colorbar: { title: { text: escapeText(titled(value.label, scale.sign)), side: "right", font: { size: 13, color: look.ink } }, thickness: 14, outlinewidth: 0,
       tickfont: { size: 12.5, color: look.soft }, ticks: "outside", ticklen: 3, tickcolor: look.soft, len: 1, tickvals: roundTicks(low, high, 5) },
     meta: { kind: "heat" },
   }];
+  if (roomy) {
+    // Dark words on light cells, light on dark.
+    const inks = parts.map(([j, i]) => (high > low && (z[j][i] - low) / (high - low) < 0.55 ? "#ffffff" : "#131a22"));
+    data.push({ type: "scatter", mode: "text", x: parts.map(([, i]) => i), y: parts.map(([j]) => j), text: parts.map(([j, i]) => text[j][i]),
+      textfont: { size: 12.5, color: inks }, hoverinfo: "skip", showlegend: false, cliponaxis: false, meta: { kind: "words" } });
+  }
   const layout = layoutLook(look, width, height, {
     margin: { l: left, r: 12, t: 12, b: bottom },
     xaxis: axisLook(look, { title: x.label, type: "linear", showgrid: false, showline: false, ...places(across, turned ? width / 20 : (width - left - barWidth) / widest),

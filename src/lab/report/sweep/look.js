@@ -46,7 +46,7 @@ function axisLook(look, extra) {
   return {
     color: look.soft, gridcolor: look.grid, linecolor: look.soft, tickcolor: look.soft, zeroline: false, showline: true,
     ticks: "outside", ticklen: 4, automargin: true, tickfont: { size: 12.5 }, minor: { ticks: "" }, ...extra,
-    title: { text: extra.title, standoff: 10, font: { size: 13.5, color: look.ink } },
+    title: { text: escapeText(extra.title), standoff: 10, font: { size: 13.5, color: look.ink } },
   };
 }
 
@@ -65,6 +65,7 @@ function layoutLook(look, width, height, extra) {
 function ticksAt(axis, width) {
   const all = axis.numeric ? axis.numbers : axis.texts.map((_, at) => at);
   const texts = axis.numeric ? axis.numbers.map(plain) : axis.shorts;
+  const safe = texts.map(escapeText);
   if (axis.drawn || (axis.numeric && all.length > 40)) return { type: axis.log ? "log" : "linear", nticks: 8 };
   // As many as there is room for, the first kept: on a log axis by place, not by number.
   const place = (value) => (axis.log ? Math.log10(value) : value);
@@ -81,7 +82,7 @@ function ticksAt(axis, width) {
   const widest = Math.max(...texts.map((text) => text.length)) * 7;
   const room = width / Math.max(1, all.length);
   return {
-    type: axis.log ? "log" : "linear", tickvals: kept.map((at) => all[at]), ticktext: kept.map((at) => texts[at]),
+    type: axis.log ? "log" : "linear", tickvals: kept.map((at) => all[at]), ticktext: kept.map((at) => safe[at]),
     tickangle: !axis.numeric && widest > room ? -35 : 0,
   };
 }
@@ -98,8 +99,10 @@ const hasGl = (() => {
   try {
     const gl = document.createElement("canvas").getContext("webgl", { failIfMajorPerformanceCaveat: true });
     if (!gl) return false;
+    const named = gl.getExtension("WEBGL_debug_renderer_info");
+    const played = named && /swiftshader|llvmpipe|software|basic render/i.test(gl.getParameter(named.UNMASKED_RENDERER_WEBGL));
     gl.getExtension("WEBGL_lose_context")?.loseContext();
-    return true;
+    return !played;
   } catch {
     return false;
   }

@@ -99,7 +99,8 @@ function wireChoices() {
   choose("cost", list(results), ["pareto", "parallel"]);
   const holds = document.getElementById("holds");
   for (const axis of varied) {
-    if (axis.numeric && axis.texts.length > 60) continue;
+    // One axis is always shown; a range of drawn values is always pooled.
+    if (varied.length < 2 || (axis.numeric && axis.texts.length > 60)) continue;
     const label = document.createElement("label");
     label.className = "choice";
     const select = document.createElement("select");
@@ -115,7 +116,8 @@ function wireChoices() {
     holds.append(label);
   }
   if (holds.children.length) holds.prepend(cell("p", "Where a figure does not show an axis, it holds it at", "note"));
-  document.getElementById("shared").hidden = false;
+  for (const key of ["series", "panel"]) document.getElementById(`choose-${key}`).closest("label").hidden = varied.length < 2;
+  document.getElementById("shared").hidden = results.length < 2 && holds.children.length === 0;
 }
 
 // --- start ---

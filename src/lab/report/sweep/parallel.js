@@ -10,7 +10,8 @@ const lineScale = (look) => Array.from({ length: 11 }, (_, at) => [at / 10, line
 function rulers() {
   const cost = columnOf.get(state.cost);
   const ofAxis = axes.filter((axis) => axis.varies).slice(0, 10).map((axis) => {
-    if (!axis.numeric) return { label: axis.label, value: (row) => axis.codes[row], low: 0, high: axis.texts.length - 1, ticks: axis.texts.map((_, at) => at), texts: axis.shorts };
+    if (!axis.numeric) return { label: axis.label, value: (row) => axis.texts.length - 1 - axis.codes[row], low: 0, high: axis.texts.length - 1,
+      ticks: axis.texts.map((_, at) => axis.texts.length - 1 - at), texts: axis.shorts };
     const bend = axis.log ? Math.log10 : (value) => value;
     const numbers = axis.numbers;
     const [first, last] = [numbers[0], numbers[numbers.length - 1]];
@@ -55,13 +56,14 @@ function parallel(look, width) {
   let [low, high] = [Infinity, -Infinity];
   for (const value of values) [low, high] = [Math.min(low, value), Math.max(high, value)];
   if (!(high > low)) high = low + 1e-9;
-  const bar = { title: { text: titled(y.label, scale.sign), side: "right", font: { size: 13, color: look.ink } }, thickness: 14, outlinewidth: 0,
+  const bar = { title: { text: escapeText(titled(y.label, scale.sign)), side: "right", font: { size: 13, color: look.ink } }, thickness: 14, outlinewidth: 0,
     tickfont: { size: 12.5, color: look.soft }, tickvals: roundTicks(low, high, 5) };
   // Too narrow for upright names: they lean.
   const step = (width - 190) / (lines.length - 1);
   const most = Math.max(8, Math.floor(step / 7.2));
   const crowded = lines.some((one) => one.label.length > most);
   const height = crowded ? 430 : 400;
+  const left = Math.max(60, 10 + 7 * Math.max(...lines[0].texts.map((text) => text.length)));
   const gl = hasGl && !onPaper;
   const stride = Math.ceil(all / (gl ? linesMostGl : linesMost));
   rows = rows.filter((_, at) => at % stride === 0);
@@ -73,10 +75,10 @@ function parallel(look, width) {
       type: "parcoords", labelangle: crowded ? -18 : 0, labelside: "top", labelfont: { size: 13, color: look.ink }, tickfont: { size: 12, color: look.soft },
       rangefont: { size: 1, color: "rgba(0,0,0,0)" }, line: { color: rows.map((row) => y.number(row) * scale.by), cmin: low, cmax: high, colorscale: lineScale(look), showscale: true, colorbar: bar },
       unselected: { line: { color: look.grid, opacity: 0.35 } },
-      dimensions: lines.map((one) => ({ label: escapeText(one.label), values: rows.map(one.value), range: [one.low, one.high], tickvals: one.ticks, ticktext: one.texts })),
+      dimensions: lines.map((one) => ({ label: escapeText(one.label), values: rows.map(one.value), range: [one.low, one.high], tickvals: one.ticks, ticktext: one.texts.map(escapeText) })),
       meta: { kind: "parallel" },
     }];
-    const layout = layoutLook(look, width, height, { margin: { l: 60, r: 40, t: crowded ? 90 : 56, b: 26 } });
+    const layout = layoutLook(look, width, height, { margin: { l: left, r: 40, t: crowded ? 90 : 56, b: 26 } });
     return { data, layout, label, caption: `${words} Drag along an axis to keep a range of it; drag a name to move the axis.` };
   }
   // Without WebGL: thin lines in a few shades, and as many as can still be told apart.
@@ -104,7 +106,7 @@ function parallel(look, width) {
   ]);
   const shapes = lines.map((_, at) => ({ type: "line", x0: at, x1: at, y0: 0, y1: 1, line: { color: look.soft, width: 1 }, layer: "above" }));
   const layout = layoutLook(look, width, height, {
-    margin: { l: 60, r: 16, t: crowded ? 96 : 56, b: 18 }, annotations: notes, shapes,
+    margin: { l: left, r: 16, t: crowded ? 96 : 56, b: 18 }, annotations: notes, shapes,
     xaxis: { visible: false, range: [-0.12, lines.length - 0.92], fixedrange: true }, yaxis: { visible: false, range: [-0.03, 1.03], fixedrange: true },
   });
   return { data, layout, label, caption: words };

@@ -66,7 +66,7 @@ function pareto(look, width) {
     const style = grouped ? styleOf(series, kind, look) : { colour: look.soft, symbol: "circle" };
     const list = points.filter((point) => !onFront.has(point) && (!grouped || series.codes[point.rows[0]] === kind));
     const chosen = best.filter((point) => !grouped || series.codes[point.rows[0]] === kind);
-    const name = grouped ? series.shorts[kind] : "settings";
+    const name = grouped ? escapeText(series.shorts[kind]) : "settings";
     if (list.length) {
       data.push(trace(list, { name, legendgroup: String(kind), showlegend: false, error_x: few ? { ...bars(list), color: fade(style.colour, 0.4) } : undefined,
         marker: { color: style.colour, symbol: style.symbol, size: all > 400 ? 4.5 : 7, opacity: all > 400 ? 0.3 : 0.4 }, meta: { kind: "settings" } }));
