@@ -2,9 +2,8 @@
 
 use super::paper::{COLUMN, Drawn, INK, hue, sheet, short, wide};
 use super::settings::Settings;
-use super::statistics::{Summary, front};
+use super::statistics::front;
 use crate::lab::report::chart::Chart;
-use crate::lab::report::number::size;
 use crate::lab::report::scale::Axis;
 use crate::lab::table::{Column, Unit};
 
@@ -45,7 +44,7 @@ pub(super) fn draw(settings: &Settings<'_>) -> Option<String> {
         };
         let bounds = ends.and_then(|[low, high]| Some([mean(low)?, mean(high)?]));
         let kind = series.and_then(|axis| axis.codes[*rows.first()?]).unwrap_or(0);
-        let ([cost, value], _): ([Summary; 2], ()) = ([of(cost)?, of(value)?], ());
+        let (cost, value) = (of(cost)?, of(value)?);
         Some(Point { cost: cost.mean, value: value.mean, bounds, kind })
     };
     let points: Vec<Point> = settings.groups.iter().filter_map(point).collect();
@@ -118,7 +117,7 @@ pub(super) fn draw(settings: &Settings<'_>) -> Option<String> {
         "{} against {}: {} settings, {} of them on the Pareto front",
         value.column.label,
         cost.column.label,
-        size(points.len()),
+        points.len(),
         best.len()
     );
     Some(sheet([width, 324.0], &says, &chart.part(0.0, 0.0)))
