@@ -85,7 +85,7 @@ enum Command {
     Profile(price::ProfileArgs),
     /// Price a finished run: joules and seconds, with its own constants or another chip's
     Price(price::PriceArgs),
-    /// Draw the page of a run again, from what is in its folder
+    /// Draw the page of a run again, or the page and the figures of a sweep
     Report(report::ReportArgs),
     /// Show and fetch data sets
     #[command(subcommand)]

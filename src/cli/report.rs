@@ -7,11 +7,16 @@ use serde_json::json;
 
 use super::{Done, data_root, say};
 use crate::lab::run;
+use crate::lab::store::index::{INDEX, Store};
+use crate::lab::sweep;
 
 #[derive(Debug, Args)]
 pub(super) struct ReportArgs {
-    /// Folder of a run
+    /// Folder of a run, or a store
     run: PathBuf,
+    /// A store: which sweep; needed when it has several
+    #[arg(long, value_name = "NAME")]
+    sweep: Option<String>,
     /// Folder of data sets, for pictures of wrong answers [default: data, or DALEAN_DATA]
     #[arg(long, value_name = "DIR")]
     data_dir: Option<PathBuf>,
@@ -24,7 +29,28 @@ pub(super) struct ReportArgs {
 }
 
 pub(super) fn execute(args: &ReportArgs) -> Done {
-    run(&args.run, args)
+    if args.run.join(INDEX).is_file() { sweep(&args.run, args) } else { run(&args.run, args) }
+}
+
+/// Draws the page and the figures of a sweep.
+fn sweep(path: &Path, args: &ReportArgs) -> Done {
+    let store = Store::existing(path)?;
+    let record = sweep::find(&store, args.sweep.as_deref())?;
+    let made = sweep::report(&store, &record, true)?;
+    let page = made.page.display().to_string();
+    if args.json {
+        let figures: Vec<_> = made.figures.iter().map(|path| path.display().to_string()).collect();
+        say(&json!({"event": "report", "sweep": record.name, "page": page, "figures": figures,
+            "points": made.points, "finished": made.finished})
+        .to_string());
+        return Ok(());
+    }
+    if !args.quiet {
+        say(&format!("{}: {} of {} points finished", record.name, made.finished, made.points));
+        made.figures.iter().for_each(|path| say(&format!("figure   {}", path.display())));
+    }
+    say(&format!("report   {page}"));
+    Ok(())
 }
 
 /// Draws the page of one run again.

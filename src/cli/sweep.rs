@@ -88,11 +88,12 @@ pub(super) fn execute(args: &SweepArgs) -> Done {
     let seconds = meter.lock().unwrap_or_else(std::sync::PoisonError::into_inner).finish();
     let Carried { runs, finished, failed } = carried?;
     let name = &plan.sweep.name;
-    let page = path.join(format!("{name}.html"));
+    let record = sweep::find(&store, Some(name))?;
+    let page = sweep::report(&store, &record, true)?.page;
     if shared.json {
         say(&json!({"event": "done", "sweep": name, "store": path.display().to_string(),
             "points": plan.points.len(), "runs": runs, "finished": finished, "failed": failed,
-            "seconds": seconds})
+            "seconds": seconds, "page": page.display().to_string()})
         .to_string());
     } else {
         say(&format!(
@@ -100,8 +101,9 @@ pub(super) fn execute(args: &SweepArgs) -> Done {
             if failed > 0 { format!(", {failed} failed") } else { String::new() },
             clock(Duration::from_secs_f64(seconds)),
         ));
+        say(&format!("report   {}", page.display()));
+        say(&format!("table    dalean export {} --sweep {name}", path.display()));
     }
-    let _ = page;
     if failed > 0 {
         let message = format!("{failed} runs failed; the report of the sweep says why");
         return Err(Failure { code: 1, message });

@@ -3,6 +3,7 @@
 //! ```text
 //! html(view)            one self-contained page: inline SVG, PNG data URIs, no external resource
 //! text::summary(view)   the table at the end of `dalean train`
+//! sweep::html(view)     the page of many runs, with the script that draws it; figures for papers beside it
 //! ```
 //!
 //! Counts come as the records give them; all division happens here (docs/GLOSSARY.md, docs/MODEL.md, 4).

@@ -8,6 +8,7 @@
 mod anchors;
 mod bad_input;
 mod bench;
+mod browser;
 mod hardware;
 mod laws;
 mod oracle;

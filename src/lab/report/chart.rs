@@ -5,6 +5,8 @@ mod margin;
 
 use std::fmt::Write as _;
 
+mod marks;
+
 use super::number::{escape, place};
 use super::scale::Axis;
 
@@ -63,10 +65,20 @@ pub(super) struct Chart {
 impl Chart {
     /// Axes and grid; `right` units are left free for labels at the line ends.
     pub(super) fn new(width: f64, height: f64, right: f64, x: Axis, y: Axis) -> Self {
+        Self::framed([width, height], [12.0, right], x, y)
+    }
+
+    /// The same with `[top, right]` units left free.
+    pub(super) fn framed(
+        [width, height]: [f64; 2],
+        [top, right]: [f64; 2],
+        x: Axis,
+        y: Axis,
+    ) -> Self {
         let digits = y.ticks.iter().map(|(_, text)| text.chars().count()).max().unwrap_or(1);
         let left = 30.0 + 6.9 * super::number::size(digits);
         let body = String::new();
-        let mut chart = Self { width, height, left, right, top: 12.0, bottom: 42.0, x, y, body };
+        let mut chart = Self { width, height, left, right, top, bottom: 42.0, x, y, body };
         chart.axes();
         chart
     }

@@ -43,6 +43,23 @@ pub(super) fn ratio(value: Option<f64>) -> String {
     }
 }
 
+/// Six significant digits at most, and no zeros behind them.
+pub(super) fn significant(value: f64) -> String {
+    if value == 0.0 || !value.is_finite() {
+        return if value == 0.0 { "0".into() } else { "–".into() };
+    }
+    let power = value.abs().log10().floor();
+    if !(-5.0..15.0).contains(&power) {
+        let text = format!("{value:.3e}");
+        let (digits, power) = text.split_once('e').unwrap_or((&text, "0"));
+        return format!("{}e{power}", digits.trim_end_matches('0').trim_end_matches('.'));
+    }
+    let decimals = (5.0 - power).max(0.0) as usize;
+    let text = format!("{value:.decimals$}");
+    let text = if decimals > 0 { text.trim_end_matches('0').trim_end_matches('.') } else { &text };
+    text.replace('-', "\u{2212}")
+}
+
 /// All digits, in groups of three: `1 234 567`.
 pub(super) fn count(count: u64) -> String {
     let digits = count.to_string();
@@ -163,6 +180,22 @@ mod tests {
         ];
         for (value, text) in cases {
             assert_eq!(short_with(value, " "), text);
+        }
+    }
+
+    #[test]
+    fn significant_digits_are_six_and_no_zeros_trail() {
+        let cases = [
+            (0.0, "0"),
+            (1200.0, "1200"),
+            (0.1 + 0.2, "0.3"),
+            (-2.5, "\u{2212}2.5"),
+            (0.000_123_456_78, "0.000123457"),
+            (1e-7, "1e-7"),
+            (1e20, "1e20"),
+        ];
+        for (value, text) in cases {
+            assert_eq!(significant(value), text);
         }
     }
 

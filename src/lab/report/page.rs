@@ -6,7 +6,7 @@ use super::number::{
 use super::{RunView, figures};
 use crate::lab::price::{Cost, prefixed};
 
-const STYLE: &str = include_str!("page.css");
+const STYLE: &str = concat!(include_str!("page.css"), include_str!("chart.css"));
 const SCRIPT: &str = include_str!("page.js");
 
 /// The whole page.

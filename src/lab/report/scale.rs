@@ -4,7 +4,7 @@
 //! place = start + (end - start) * (s(value) - s(from)) / (s(to) - s(from))      s = identity, log2, square root
 //! ```
 
-use super::number::{float, short, size};
+use super::number::{float, short, significant, size};
 use crate::lab::price::prefixed;
 
 /// The curve of a scale.
@@ -187,6 +187,54 @@ impl Axis {
         Self { scale: Scale { curve: Curve::Log, from, to }, ticks, label: label.into() }
     }
 
+    /// Given marks; `ends` are drawn a little inside the frame.
+    pub(super) fn marked(
+        ticks: Vec<(f64, String)>,
+        ends: (f64, f64),
+        log: bool,
+        label: &str,
+    ) -> Self {
+        let (from, to) = ends;
+        let (from, to) = if log {
+            let room = (to / from).powf(0.03).max(1.01);
+            (from / room, to * room)
+        } else {
+            let room = if to > from { 0.03 * (to - from) } else { 0.5 };
+            (from - room, to + room)
+        };
+        let curve = if log { Curve::Log } else { Curve::Linear };
+        Self { scale: Scale { curve, from, to }, ticks, label: label.into() }
+    }
+
+    /// Any numbers, with round marks; `low` and `high` stay where they are.
+    pub(super) fn round(low: f64, high: f64, label: &str) -> Self {
+        let high = if high > low { high } else { low + low.abs().max(1.0) };
+        let step = step(high - low, 5.0);
+        let show = |tick: f64| if tick.abs() < 0.5 * step { "0".into() } else { significant(tick) };
+        let ticks = multiples(low, high, step).map(|tick| (tick, show(tick))).collect();
+        Self {
+            scale: Scale { curve: Curve::Linear, from: low, to: high },
+            ticks,
+            label: label.into(),
+        }
+    }
+
+    /// Positive numbers over several powers of ten.
+    pub(super) fn powers(low: f64, high: f64, label: &str) -> Self {
+        let (from, to) = (low.log10().floor(), high.log10().ceil());
+        let leads: &[f64] = match to - from {
+            span if span > 4.0 => &[1.0],
+            span if span > 2.0 => &[1.0, 3.0],
+            _ => &[1.0, 2.0, 5.0],
+        };
+        let stride = ((to - from) / 8.0).ceil().max(1.0);
+        let marks = multiples(from, to, stride);
+        let marks = marks.flat_map(|power| leads.iter().map(move |lead| lead * 10f64.powf(power)));
+        let inside = marks.filter(|mark| (low..=high).contains(mark));
+        let ticks = inside.map(|mark| (mark, significant(mark))).collect();
+        Self { scale: Scale { curve: Curve::Log, from: low, to: high }, ticks, label: label.into() }
+    }
+
     /// Levels from 0.
     pub(super) fn levels(end: f64, label: &str) -> Self {
         let to = end.max(1.0);
@@ -244,6 +292,10 @@ mod tests {
             Axis::picojoules([2.9e5, 3e5].into_iter(), ""),
             Axis::picojoules([1e-3, 1e9].into_iter(), ""),
             Axis::levels(0.0, ""),
+            Axis::round(0.0, 0.0, ""),
+            Axis::round(-0.4, 97.0, ""),
+            Axis::powers(0.9, 3.3, ""),
+            Axis::powers(1e-9, 2e7, ""),
             Axis::levels(255.0, ""),
         ];
         for axis in axes {

@@ -1,4 +1,28 @@
-//! The page of a sweep and its figures: what it needs to know.
+//! The page of a sweep and its figures for papers.
+//!
+//! ```text
+//! html(view)      one self-contained page: table, figures and the script that draws them; loads nothing
+//! figures(view)   the same figures, as they are at first, as stand-alone SVG
+//! png(svg)        such a figure as a picture of 300 dots an inch
+//! ```
+//!
+//! The script on the page computes its means, intervals and fronts itself, from the table, so that a reader can change
+//! what is shown; `statistics` holds the law, and tests/it/browser.rs compares.
+
+mod curves;
+mod heat;
+mod json;
+mod library;
+mod page;
+mod paper;
+mod pareto;
+mod raster;
+mod settings;
+mod statistics;
+
+pub use page::html;
+pub use paper::{StaticFigure, figures};
+pub use raster::png;
 
 use crate::lab::table::Table;
 
@@ -69,3 +93,6 @@ pub struct Refused {
     /// Why.
     pub why: String,
 }
+
+#[cfg(test)]
+mod tests;

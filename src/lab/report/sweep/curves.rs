@@ -1,0 +1,213 @@
+//! Mean of a result against an axis: a line and a band for each value of one axis, a panel for each of another.
+
+use super::paper::{COLUMN, Drawn, hue, marks, sheet, short, wide};
+use super::settings::{Levels, Settings};
+use super::statistics::Summary;
+use crate::lab::report::chart::Chart;
+use crate::lab::report::number::size;
+use crate::lab::report::scale::Axis;
+use crate::lab::table::Unit;
+
+/// Lines and panels drawn at most.
+const LINES_MAX: usize = 8;
+const PANELS_MAX: usize = 6;
+
+/// One line of one panel: places on the abscissa and what lies there.
+#[derive(Debug, Clone)]
+struct Line {
+    panel: usize,
+    series: usize,
+    points: Vec<(usize, Summary)>,
+}
+
+/// The figure, or nothing where no run has finished.
+pub(super) fn draw(settings: &Settings<'_>) -> Option<String> {
+    let wanted = &settings.view.figures;
+    let x = settings.axis(&wanted.x)?;
+    let measure = settings.measure(&wanted.y)?;
+    let named = |name: &Option<String>| settings.axis(name.as_ref()?);
+    let (series, panel) = (named(&wanted.series), named(&wanted.panel));
+    let shown: Vec<&str> = [Some(x), series, panel]
+        .into_iter()
+        .flatten()
+        .map(|axis| axis.axis.name.as_str())
+        .collect();
+    let held = settings.held(measure, &shown);
+    let pooled = held.iter().any(|(_, value)| value.is_none());
+    let mut all: Vec<Line> = Vec::new();
+    for panel_at in 0..panel.map_or(1, |axis| axis.texts.len()).min(PANELS_MAX) {
+        for series_at in 0..series.map_or(1, |axis| axis.texts.len()).min(LINES_MAX) {
+            let point = |x_at: usize| {
+                let is = |axis: Option<&Levels<'_>>, row: usize, at| {
+                    axis.is_none_or(|axis| axis.codes[row] == Some(at))
+                };
+                let fits = |&row: &usize| {
+                    x.codes[row] == Some(x_at)
+                        && is(series, row, series_at)
+                        && is(panel, row, panel_at)
+                        && held
+                            .iter()
+                            .all(|(axis, value)| value.is_none() || axis.codes[row] == *value)
+                };
+                let rows: Vec<usize> = (0..settings.view.table.len()).filter(fits).collect();
+                Some((x_at, settings.summary(measure, &rows)?))
+            };
+            // Drawn values would meet one run each.
+            let points: Vec<_> =
+                if x.drawn() { vec![] } else { (0..x.texts.len()).filter_map(point).collect() };
+            if !points.is_empty() {
+                all.push(Line { panel: panel_at, series: series_at, points });
+            }
+        }
+    }
+    if all.is_empty() {
+        return None;
+    }
+    let fraction = measure.column.unit == Unit::Fraction;
+    let scale = Drawn::new(measure.column.unit, greatest(&all));
+    let (low, high) = range(&all, pooled, fraction);
+    let title = scale.title(&measure.column.label);
+    let panels: Vec<usize> = {
+        let mut panels: Vec<usize> = all.iter().map(|line| line.panel).collect();
+        panels.dedup();
+        panels
+    };
+    let key = series.map_or(8.0, |axis| {
+        let texts = axis.texts.iter().take(LINES_MAX).map(|text| wide(&short(text)));
+        texts.fold(wide(&short(&axis.axis.label)), f64::max) + 60.0
+    });
+    let across = panels.len().min(3);
+    let width = if panels.len() > 1 { 2.0 * COLUMN } else { COLUMN };
+    let (each, high_each) =
+        ((width - key) / size(across), if panels.len() > 1 { 262.0 } else { 300.0 });
+    let mut body = String::new();
+    for (number, &panel_at) in panels.iter().enumerate() {
+        let (first, last) = (number % across == 0, number + 1 == across.min(panels.len()));
+        let right = if last { key } else { 10.0 };
+        let y_axis = Axis::round(low * scale.by, high * scale.by, if first { &title } else { "" });
+        let abscissa = abscissa(x, each - 70.0);
+        let size_each = [if last { each + key } else { each }, high_each];
+        let mut chart = Chart::framed(
+            size_each,
+            [if panel.is_some() { 30.0 } else { 12.0 }, right],
+            abscissa,
+            y_axis,
+        );
+        if let Some(panel) = panel {
+            chart.heading(&format!("{} {}", panel.axis.label, short(&panel.texts[panel_at])));
+        }
+        let own: Vec<&Line> = all.iter().filter(|line| line.panel == panel_at).collect();
+        lines(&mut chart, &own, x, pooled, scale.by);
+        if let (Some(series), true) = (series, last) {
+            chart.key_title(&short(&series.axis.label));
+            let kinds: std::collections::BTreeSet<usize> =
+                all.iter().map(|line| line.series).collect();
+            for (entry, &kind) in kinds.iter().enumerate() {
+                chart.key(entry + 1, kind, hue(kind), &short(&series.texts[kind]), true);
+            }
+        }
+        body += &chart.part(size(number % across) * each, size(number / across) * high_each);
+    }
+    let down = panels.len().div_ceil(across);
+    let says = format!(
+        "{} against {}, means of {}{}",
+        measure.column.label,
+        x.axis.label,
+        runs(all.iter().flat_map(|line| &line.points).map(|(_, point)| point.n)),
+        held_words(&held, pooled)
+    );
+    Some(sheet([width, size(down) * high_each + 4.0], &says, &body))
+}
+
+/// `n = 2 to 3 runs`.
+pub(super) fn runs(counts: impl Iterator<Item = usize> + Clone) -> String {
+    let (least, most) = (counts.clone().min().unwrap_or(0), counts.max().unwrap_or(0));
+    if least == most { format!("n = {most} runs") } else { format!("n = {least} to {most} runs") }
+}
+
+/// What is held where, for the words of a figure.
+pub(super) fn held_words(held: &[(&Levels<'_>, Option<usize>)], pooled: bool) -> String {
+    let mut words = if pooled {
+        " with the range of pooled settings".to_owned()
+    } else {
+        " with 95 % confidence intervals".to_owned()
+    };
+    for (axis, value) in held {
+        match value {
+            Some(at) => words += &format!("; {} = {}", axis.axis.label, axis.texts[*at]),
+            None => words += &format!("; {} pooled", axis.axis.label),
+        }
+    }
+    words
+}
+
+fn greatest(all: &[Line]) -> f64 {
+    let highs = all.iter().flat_map(|line| &line.points).map(|(_, point)| point.high.abs());
+    highs.fold(0.0, f64::max)
+}
+
+/// Ends of the ordinate: those of the means, stretched by intervals by no more than 0.6 of it.
+fn range(all: &[Line], pooled: bool, fraction: bool) -> (f64, f64) {
+    let points = || all.iter().flat_map(|line| &line.points).map(|(_, point)| point);
+    let low = points().map(|point| point.mean).fold(f64::INFINITY, f64::min);
+    let high = points().map(|point| point.mean).fold(f64::NEG_INFINITY, f64::max);
+    let span = if high > low { high - low } else { (high.abs() * 0.1).max(1e-12) };
+    let bands = || points().filter_map(|point| ends(point, pooled));
+    let from = bands().map(|band| band.0).fold(low, f64::min).max(low - 0.6 * span) - 0.05 * span;
+    let to = bands().map(|band| band.1).fold(high, f64::max).min(high + 0.6 * span) + 0.05 * span;
+    if fraction {
+        (from.max(0.0), to.min(1.0))
+    } else {
+        (if low >= 0.0 { from.max(0.0) } else { from }, to)
+    }
+}
+
+/// The interval of a point, or the range where settings are pooled.
+fn ends(point: &Summary, pooled: bool) -> Option<(f64, f64)> {
+    if pooled {
+        return (point.n > 1).then_some((point.low, point.high));
+    }
+    point.half.map(|half| (point.mean - half, point.mean + half))
+}
+
+fn abscissa(x: &Levels<'_>, room: f64) -> Axis {
+    let marks = marks(x, room);
+    let ends = match &x.numbers {
+        Some(numbers) => (numbers[0], numbers[numbers.len() - 1]),
+        None => (-0.4, size(x.texts.len()) - 0.6),
+    };
+    Axis::marked(marks, ends, x.log(), &x.axis.label)
+}
+
+fn lines(chart: &mut Chart, own: &[&Line], x: &Levels<'_>, pooled: bool, by: f64) {
+    let many = size(own.len());
+    let place = |line: usize, at: usize| match &x.numbers {
+        Some(numbers) => numbers[at],
+        // Words have no distance: their points stand side by side and are not joined.
+        None => size(at) + ((size(line) + 0.5) / many - 0.5) * 0.5,
+    };
+    for (number, line) in own.iter().enumerate() {
+        let colour = hue(line.series);
+        let banded = |(at, point): &(usize, Summary)| {
+            let (low, high) = ends(point, pooled)?;
+            Some((place(number, *at), low * by, high * by))
+        };
+        // Neighbours that have an interval share a band.
+        for run in line.points.chunk_by(|a, b| banded(a).is_some() == banded(b).is_some()) {
+            let run: Vec<_> = run.iter().filter_map(banded).collect();
+            if x.numbers.is_some() && run.len() > 1 {
+                chart.band(&run, colour);
+            } else {
+                run.iter().for_each(|&(at, low, high)| chart.error_y(at, low, high, colour));
+            }
+        }
+    }
+    for (number, line) in own.iter().enumerate() {
+        let points: Vec<_> =
+            line.points.iter().map(|(at, point)| (place(number, *at), point.mean * by)).collect();
+        if x.numbers.is_some() && points.len() > 1 {
+            chart.stroke(&points, hue(line.series), line.series);
+        }
+        points.iter().for_each(|&at| chart.marker(at, line.series, hue(line.series), false));
+    }
+}

@@ -1,0 +1,135 @@
+// The table of all rows: find, sort, pages, CSV.
+const pageRows = 50;
+const listedColumns = columns.filter((column) => column.name !== "run");
+let found = [];
+
+/** Rows that every word fits: a word anywhere in the row, or `column=value`. */
+function find(text) {
+  const wanted = text.trim().toLowerCase().split(/\s+/).filter(Boolean).map((word) => {
+    const [name, ...rest] = word.split("=");
+    const column = rest.length ? columnOf.get(name) : null;
+    return column ? { column, value: rest.join("=") } : { word };
+  });
+  const kept = [];
+  for (let row = 0; row < rowCount; row++) {
+    const fits = wanted.every(({ column, value, word }) => (column
+      ? column.text(row).toLowerCase() === value
+      : listedColumns.some((one) => one.text(row).toLowerCase().includes(word) || (!one.words && one.show(row).toLowerCase().includes(word)))));
+    if (fits) kept.push(row);
+  }
+  return kept;
+}
+
+/** Missing cells last, whichever way. */
+function sorted(rows, column, down) {
+  if (!column) return rows;
+  const way = down ? -1 : 1;
+  const axis = axisOf.get(column.name);
+  const key = (row) => (axis && !axis.numeric ? (axis.codes[row] < 0 ? null : axis.codes[row]) : column.words ? column.text(row) || null : column.number(row));
+  return rows.map((row) => [key(row), row]).sort(([a, i], [b, j]) => {
+    if (a === null || b === null) return (a === null) - (b === null) || i - j;
+    return (a < b ? -way : a > b ? way : 0) || i - j;
+  }).map(([, row]) => row);
+}
+
+function csv(rows) {
+  const quote = (text) => (/[",\n\r]/.test(text) ? `"${text.replace(/"/g, '""')}"` : text);
+  const lines = [columns.map((column) => quote(column.name)).join(",")];
+  for (const row of rows) lines.push(columns.map((column) => quote(column.text(row))).join(","));
+  return `${lines.join("\n")}\n`;
+}
+
+function drawHead() {
+  const head = document.querySelector("#table thead");
+  const line = document.createElement("tr");
+  line.append(cell("th", "run"));
+  for (const column of listedColumns) {
+    const one = document.createElement("th");
+    const button = cell("button", column.label);
+    button.type = "button";
+    button.title = column.name;
+    one.className = column.words ? "word" : "";
+    const own = state.sort === column.name;
+    one.setAttribute("aria-sort", own ? (state.down ? "descending" : "ascending") : "none");
+    button.addEventListener("click", () => {
+      // Results are wanted best first.
+      const first = column.role === "result" && !column.less;
+      state.down = state.sort === column.name ? !state.down : first;
+      state.sort = column.name;
+      state.page = 0;
+      drawRows();
+      remember();
+    });
+    one.append(button);
+    line.append(one);
+  }
+  head.replaceChildren(line);
+}
+
+function drawRows() {
+  drawHead();
+  found = sorted(find(state.find), columnOf.get(state.sort), state.down);
+  const pages = Math.max(1, Math.ceil(found.length / pageRows));
+  state.page = Math.min(state.page, pages - 1);
+  const body = document.createElement("tbody");
+  for (const row of found.slice(state.page * pageRows, (state.page + 1) * pageRows)) {
+    const line = body.insertRow();
+    line.dataset.row = row;
+    const first = cell("td", "");
+    first.append(isDone(row) ? runLink(row) : cell("span", `${row + 1}, no result`, "note"));
+    line.append(first);
+    for (const column of listedColumns) {
+      const text = column.show(row);
+      const one = cell("td", column.words ? short(text, 20) : text, column.words ? "word" : "");
+      if (column.words && text.length > 20) one.title = text;
+      else if (!column.words) one.title = column.text(row);
+      line.append(one);
+    }
+  }
+  document.querySelector("#table tbody").replaceWith(body);
+  document.getElementById("found").textContent = found.length === rowCount ? `${plain(rowCount)} rows` : `${plain(found.length)} of ${plain(rowCount)} rows`;
+  const pager = document.getElementById("pager");
+  const go = (text, to, label) => {
+    const button = cell("button", text);
+    button.type = "button";
+    button.setAttribute("aria-label", label);
+    button.disabled = to < 0 || to >= pages || to === state.page;
+    button.addEventListener("click", () => { state.page = to; drawRows(); remember(); });
+    return button;
+  };
+  pager.hidden = pages === 1;
+  pager.replaceChildren(go("first", 0, "first page"), go("back", state.page - 1, "page before"), cell("span", `page ${state.page + 1} of ${pages}`),
+    go("next", state.page + 1, "next page"), go("last", pages - 1, "last page"));
+}
+
+function wireRows() {
+  const box = document.getElementById("find");
+  box.value = state.find;
+  let wait = 0;
+  box.addEventListener("input", () => {
+    clearTimeout(wait);
+    wait = setTimeout(() => { state.find = box.value; state.page = 0; drawRows(); remember(); }, 150);
+  });
+  document.getElementById("csv-save").addEventListener("click", () => {
+    const address = URL.createObjectURL(new Blob([csv(found)], { type: "text/csv" }));
+    download(`${sweep.name}.csv`, address);
+    setTimeout(() => URL.revokeObjectURL(address), 1000);
+  });
+  const copy = document.getElementById("csv-copy");
+  copy.addEventListener("click", async () => {
+    const text = csv(found);
+    try {
+      await navigator.clipboard.writeText(text);
+    } catch {
+      const area = document.createElement("textarea");
+      area.value = text;
+      document.body.append(area);
+      area.select();
+      document.execCommand("copy");
+      area.remove();
+    }
+    copy.textContent = "copied";
+    setTimeout(() => (copy.textContent = "copy CSV"), 1500);
+  });
+  drawRows();
+}

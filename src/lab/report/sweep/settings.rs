@@ -1,0 +1,164 @@
+//! The points of a sweep as settings: runs that differ in the seed alone belong together.
+
+use std::collections::BTreeMap;
+
+use super::statistics::{Summary, summary};
+use super::{Axis, SweepView};
+use crate::lab::table::{Column, Role, Unit};
+
+/// One axis: its distinct values in order, and which of them each row has.
+#[derive(Debug, Clone)]
+pub(super) struct Levels<'a> {
+    pub axis: &'a Axis,
+    /// Each value as text.
+    pub texts: Vec<String>,
+    /// Each value as a number, where all are.
+    pub numbers: Option<Vec<f64>>,
+    /// Place in `texts` by row.
+    pub codes: Vec<Option<usize>>,
+}
+
+impl<'a> Levels<'a> {
+    fn new(axis: &'a Axis, column: &Column) -> Self {
+        let rows = column.values.len();
+        let mut found: BTreeMap<String, Option<f64>> = BTreeMap::new();
+        let cells: Vec<_> = (0..rows).map(|row| column.values.text(row)).collect();
+        for (row, cell) in cells.iter().enumerate() {
+            if let Some(text) = cell {
+                found.insert(text.clone(), column.values.number(row));
+            }
+        }
+        let place = |text: &String| axis.order.iter().position(|known| known == text);
+        let mut values: Vec<(String, Option<f64>)> = found.into_iter().collect();
+        let numbers = !column.values.is_text() && values.iter().all(|(_, number)| number.is_some());
+        values.sort_by(|a, b| match (numbers, a.1, b.1) {
+            (true, Some(a), Some(b)) => a.total_cmp(&b),
+            _ => {
+                let key = |text| place(text).unwrap_or(usize::MAX);
+                key(&a.0).cmp(&key(&b.0)).then(a.0.cmp(&b.0))
+            }
+        });
+        let index: BTreeMap<&str, usize> =
+            values.iter().enumerate().map(|(at, (text, _))| (text.as_str(), at)).collect();
+        let codes = cells.iter().map(|cell| index.get(cell.as_deref()?).copied()).collect();
+        let texts = values.iter().map(|(text, _)| text.clone()).collect();
+        let numbers = numbers.then(|| values.iter().filter_map(|(_, number)| *number).collect());
+        Self { axis, texts, numbers, codes }
+    }
+
+    /// Whether there is something to compare.
+    pub(super) fn varies(&self) -> bool {
+        self.texts.len() > 1
+    }
+
+    /// Whether it is drawn on a log scale.
+    pub(super) fn log(&self) -> bool {
+        let positive = |numbers: &Vec<f64>| numbers.iter().all(|number| *number > 0.0);
+        self.axis.log && self.numbers.as_ref().is_some_and(positive)
+    }
+
+    /// Whether its values were drawn from a range.
+    pub(super) fn drawn(&self) -> bool {
+        self.numbers.is_some() && self.axis.order.is_empty() && self.texts.len() > 12
+    }
+}
+
+/// A result that figures can show: its column, and whether less of it is better.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Measure<'a> {
+    pub column: &'a Column,
+    pub less: bool,
+}
+
+/// The table of a sweep, sorted out.
+#[derive(Debug, Clone)]
+pub(super) struct Settings<'a> {
+    pub view: &'a SweepView<'a>,
+    /// Every axis that is in the table.
+    pub axes: Vec<Levels<'a>>,
+    /// Rows of each setting, in the order of the table.
+    pub groups: Vec<Vec<usize>>,
+}
+
+/// Whether less of a result is better: costs, losses and errors.
+pub(super) fn less_is_better(column: &Column) -> bool {
+    let lossy = ["loss", "error"].iter().any(|word| column.name.contains(word));
+    lossy || !matches!(column.unit, Unit::Plain | Unit::Fraction)
+}
+
+impl<'a> Settings<'a> {
+    pub(super) fn new(view: &'a SweepView<'a>) -> Self {
+        let known =
+            view.axes.iter().filter_map(|axis| Some((axis, view.table.column(&axis.name)?)));
+        let axes: Vec<_> = known.map(|(axis, column)| Levels::new(axis, column)).collect();
+        let mut places: BTreeMap<Vec<Option<usize>>, usize> = BTreeMap::new();
+        let mut groups: Vec<Vec<usize>> = Vec::new();
+        for row in 0..view.table.len() {
+            let key = axes.iter().map(|axis| axis.codes[row]).collect();
+            let next = groups.len();
+            let place = *places.entry(key).or_insert(next);
+            if place == next {
+                groups.push(Vec::new());
+            }
+            groups[place].push(row);
+        }
+        Self { view, axes, groups }
+    }
+
+    /// An axis by name.
+    pub(super) fn axis(&self, name: &str) -> Option<&Levels<'a>> {
+        self.axes.iter().find(|axis| axis.axis.name == name)
+    }
+
+    /// A result by name, if it has numbers.
+    pub(super) fn measure(&self, name: &str) -> Option<Measure<'a>> {
+        let column = self.view.table.column(name)?;
+        let less = less_is_better(column);
+        (!column.values.is_text()).then_some(Measure { column, less })
+    }
+
+    /// Rows that have a result.
+    pub(super) fn finished(&self) -> usize {
+        let results: Vec<_> = self.view.table.with_role(Role::Result).collect();
+        let done = |row: &usize| results.iter().any(|one| one.values.text(*row).is_some());
+        (0..self.view.table.len()).filter(done).count()
+    }
+
+    /// Numbers of some rows.
+    pub(super) fn summary(&self, measure: Measure<'_>, rows: &[usize]) -> Option<Summary> {
+        let values = rows.iter().filter_map(|&row| measure.column.values.number(row));
+        summary(&values.filter(|value| value.is_finite()).collect::<Vec<_>>())
+    }
+
+    /// The setting with the best mean among those with most runs, and its numbers.
+    pub(super) fn best(&self, measure: Measure<'_>) -> Option<(&[usize], Summary)> {
+        let all: Vec<_> = self
+            .groups
+            .iter()
+            .filter_map(|rows| Some((rows.as_slice(), self.summary(measure, rows)?)))
+            .collect();
+        let most = all.iter().map(|(_, summary)| summary.n).max()?;
+        let worth = |summary: &Summary| if measure.less { -summary.mean } else { summary.mean };
+        let full = all.into_iter().filter(|(_, summary)| summary.n == most);
+        // The first of equals.
+        full.reduce(|best, next| if worth(&next.1) > worth(&best.1) { next } else { best })
+    }
+
+    /// Settings that have a mean of it.
+    pub(super) fn with_mean(&self, measure: Measure<'_>) -> usize {
+        self.groups.iter().filter(|rows| self.summary(measure, rows).is_some()).count()
+    }
+
+    /// Axes that vary, are not `shown`, and the value each is held at: that of the best setting; none where it pools.
+    pub(super) fn held(
+        &self,
+        measure: Measure<'_>,
+        shown: &[&str],
+    ) -> Vec<(&Levels<'a>, Option<usize>)> {
+        let best = self.best(measure).and_then(|(rows, _)| rows.first().copied());
+        let others = self.axes.iter().filter(|axis| axis.varies());
+        let others = others.filter(|axis| !shown.contains(&axis.axis.name.as_str()));
+        let value = |axis: &Levels<'_>| if axis.drawn() { None } else { axis.codes[best?] };
+        others.map(|axis| (axis, value(axis))).collect()
+    }
+}

@@ -1,0 +1,176 @@
+//! Laws of the page and of figures for papers: complete, escaped, no word that is no number, the same every time.
+
+use super::settings::Settings;
+use super::{Axis, Figures, Refused, SweepView, figures, html, json, png};
+use crate::lab::table::{Column, Role, Table, Unit, Values};
+
+struct Sample {
+    table: Table,
+    axes: Vec<Axis>,
+    figures: Figures,
+    refused: Vec<Refused>,
+    notes: Vec<String>,
+}
+
+const NASTY: &str = "</script><b>\"'&\u{2028}";
+
+fn column(name: &str, unit: Unit, role: Role, values: Values) -> Column {
+    Column { name: name.into(), label: name.into(), unit, role, values }
+}
+
+fn axis(name: &str, number: bool, order: &[&str]) -> Axis {
+    let order = order.iter().map(|&text| text.to_owned()).collect();
+    Axis { name: name.into(), label: name.into(), number, log: false, order }
+}
+
+impl Sample {
+    /// Bits 1, 2, 4 by two words by two seeds; the last row has no result.
+    fn new() -> Self {
+        let (mut bits, mut words, mut seeds) = (vec![], vec![], vec![]);
+        let (mut scores, mut joules, mut lows, mut highs) = (vec![], vec![], vec![], vec![]);
+        for bit in [1i64, 2, 4] {
+            for word in ["z", NASTY] {
+                for seed in 0..2i64 {
+                    let done = !(bit == 4 && word == NASTY && seed == 1);
+                    let score = 0.5 + 0.1 * bit as f64 + 0.01 * seed as f64;
+                    bits.push(Some(bit));
+                    words.push(Some(word.to_owned()));
+                    seeds.push(Some(i64::MAX - seed));
+                    scores.push(done.then_some(score));
+                    joules.push(done.then_some(1e-9 * score));
+                    lows.push(done.then_some(0.5e-9 * score));
+                    highs.push(done.then_some(4e-9 * score));
+                }
+            }
+        }
+        let real = |name, unit, values| column(name, unit, Role::Result, Values::Real(values));
+        Self {
+            table: Table {
+                columns: vec![
+                    column("bits", Unit::Plain, Role::Axis, Values::Whole(bits)),
+                    column("word", Unit::Plain, Role::Axis, Values::Text(words)),
+                    column("seed", Unit::Plain, Role::Seed, Values::Whole(seeds)),
+                    real("score", Unit::Fraction, scores),
+                    real("joules", Unit::Joules, joules),
+                    real("joules_low", Unit::Joules, lows),
+                    real("joules_high", Unit::Joules, highs),
+                ],
+            },
+            axes: vec![axis("bits", true, &["1", "2", "4"]), axis("word", false, &["z", NASTY])],
+            figures: Figures {
+                x: "bits".into(),
+                y: "score".into(),
+                series: Some("word".into()),
+                panel: None,
+                heat: Some(["bits".into(), "word".into()]),
+                cost: Some("joules".into()),
+            },
+            refused: vec![Refused { point: 13, what: NASTY.into(), why: NASTY.into() }],
+            notes: vec![NASTY.into()],
+        }
+    }
+
+    fn view(&self) -> SweepView<'_> {
+        SweepView {
+            name: "name",
+            title: NASTY,
+            about: "One.\n\n<Two>.",
+            table: &self.table,
+            axes: &self.axes,
+            figures: self.figures.clone(),
+            refused: &self.refused,
+            not_simulated: &self.notes,
+            version: "0.0.0",
+        }
+    }
+
+    /// Every cell of a result gone.
+    fn hollow() -> Self {
+        let mut sample = Self::new();
+        for column in &mut sample.table.columns {
+            if let Values::Real(values) = &mut column.values {
+                values.iter_mut().for_each(|value| *value = None);
+            }
+        }
+        sample
+    }
+}
+
+#[test]
+fn text_of_the_table_cannot_end_or_start_anything_on_the_page() {
+    for sample in [Sample::new(), Sample::hollow()] {
+        let page = html(&sample.view());
+        assert!(!page.contains(NASTY) && !page.contains("<Two>"));
+        assert_eq!((page.matches("<script").count(), page.matches("</script>").count()), (4, 4));
+        assert!(page.contains("<p>One.</p><p>&lt;Two&gt;.</p>"));
+        assert!(page.contains("dalean verify STORE --sample N"));
+    }
+}
+
+#[test]
+fn the_best_setting_is_the_best_mean_among_those_with_most_runs() {
+    let sample = Sample::new();
+    let view = sample.view();
+    let settings = Settings::new(&view);
+    assert_eq!((settings.groups.len(), settings.finished()), (6, 11));
+    let measure = settings.measure("score").unwrap();
+    let (rows, best) = settings.best(measure).unwrap();
+    assert_eq!((rows, best.n), ([8, 9].as_slice(), 2), "the other setting with 4 bits has one run");
+    let cheapest = settings.best(settings.measure("joules").unwrap()).unwrap();
+    assert_eq!(cheapest.0, [0, 1], "less energy is better");
+    assert!(html(&view).contains("90.50<small>"));
+}
+
+#[test]
+fn numbers_beyond_a_scripts_are_words_and_missing_cells_are_null() {
+    let sample = Sample::new();
+    let view = sample.view();
+    let text = json::data(&Settings::new(&view));
+    assert!(text.contains("9223372036854775807") && !text.contains('<'));
+    let data: serde_json::Value = serde_json::from_str(&text).unwrap();
+    assert_eq!(data["columns"][2]["words"][0], "9223372036854775807");
+    assert_eq!(
+        data["columns"][1]["codes"],
+        serde_json::json!([0, 0, 1, 1, 0, 0, 1, 1, 0, 0, 1, 1])
+    );
+    assert!(data["columns"][3]["values"][11].is_null());
+    assert_eq!(data["columns"][3]["values"][0], 0.6);
+}
+
+#[test]
+fn figures_for_papers_stand_alone() {
+    let sample = Sample::new();
+    let drawn = figures(&sample.view());
+    let names: Vec<&str> = drawn.iter().map(|figure| figure.name.as_str()).collect();
+    assert_eq!(names, ["curves", "heat", "pareto"]);
+    for figure in &drawn {
+        let svg = &figure.svg;
+        assert!(svg.starts_with("<svg xmlns=") && svg.contains("fill=\"#fff\"/>"));
+        for bad in ["NaN", "inf", "var(", "http:", "</script", "url("] {
+            assert!(
+                !svg.replace("xmlns=\"http://www.w3.org/2000/svg\"", "").contains(bad),
+                "{bad}"
+            );
+        }
+        assert!(svg.contains("score (%)"), "{} has its unit", figure.name);
+        // A picture of a column's width at about 300 dots an inch.
+        let picture = png(svg);
+        let reader = png::Decoder::new(std::io::Cursor::new(&picture)).read_info().unwrap();
+        assert!((1000..=2600).contains(&reader.info().width), "{}", reader.info().width);
+        assert_eq!(picture, png(svg), "the same bytes again");
+    }
+    assert!(drawn[0].svg.contains("n = 1 to 2 runs"));
+    assert!(figures(&Sample::hollow().view()).is_empty());
+    assert!(png("no svg").is_empty());
+}
+
+#[test]
+fn letters_are_drawn() {
+    let text = |words: &str| {
+        let svg = "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"90\" height=\"30\"><text y=\"20\" \
+                   font-family=\"sans-serif\">";
+        png(&format!("{svg}{words}</text></svg>"))
+    };
+    assert_ne!(text("µJ"), text(""));
+    assert_ne!(text("µJ"), text("nJ"));
+}

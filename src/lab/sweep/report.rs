@@ -1,0 +1,73 @@
+//! The page of a sweep and its figures, beside the runs they link to.
+#![expect(clippy::disallowed_methods, reason = "pages live in files")]
+
+use std::fs;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+use super::{Results, SweepError, results};
+use crate::lab::report::sweep::{SweepView, figures, html, png};
+use crate::lab::store::index::{Store, StoreError, SweepRecord};
+
+/// Files that were written.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct SweepPage {
+    /// The page.
+    pub page: PathBuf,
+    /// Figures for papers.
+    pub figures: Vec<PathBuf>,
+    /// Points.
+    pub points: usize,
+    /// Of these, finished.
+    pub finished: usize,
+}
+
+/// Draws `STORE/NAME.html` and, if `pictures` are wanted, `STORE/figures/NAME-*.svg` and `.png`.
+///
+/// # Errors
+/// When the index or the system refuses.
+pub fn report(store: &Store, record: &SweepRecord, pictures: bool) -> Result<SweepPage, SweepError> {
+    let found = results(store, record)?;
+    let view = view(&found);
+    let page = store.path().join(format!("{}.html", record.name));
+    write(&page, html(&view).as_bytes())?;
+    let mut made = Vec::new();
+    if pictures {
+        let folder = store.path().join("figures");
+        let fail = |error| StoreError::Io { doing: "make folder", path: folder.clone(), error };
+        fs::create_dir_all(&folder).map_err(fail)?;
+        for figure in figures(&view) {
+            let base = format!("{}-{}", record.name, figure.name);
+            for (ending, bytes) in [("svg", figure.svg.clone().into_bytes()), ("png", png(&figure.svg))] {
+                let path = folder.join(format!("{base}.{ending}"));
+                write(&path, &bytes)?;
+                made.push(path);
+            }
+        }
+    }
+    Ok(SweepPage { page, figures: made, points: found.table.len(), finished: found.finished })
+}
+
+fn view(found: &Results) -> SweepView<'_> {
+    SweepView {
+        name: &found.sweep.name,
+        title: &found.sweep.title,
+        about: &found.sweep.about,
+        table: &found.table,
+        axes: &found.axes,
+        figures: found.figures.clone(),
+        refused: &found.refused,
+        not_simulated: &found.not_simulated,
+        version: env!("CARGO_PKG_VERSION"),
+    }
+}
+
+/// Writes a file whole: beside its place, then moved into it.
+fn write(path: &Path, bytes: &[u8]) -> Result<(), SweepError> {
+    let fail = |error| StoreError::Io { doing: "write", path: path.into(), error };
+    let folder = path.parent().unwrap_or_else(|| Path::new("."));
+    let mut part = tempfile::NamedTempFile::new_in(folder).map_err(fail)?;
+    part.write_all(bytes).map_err(fail)?;
+    part.persist(path).map_err(|error| fail(error.error))?;
+    Ok(())
+}
