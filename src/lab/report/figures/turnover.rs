@@ -59,7 +59,7 @@ pub(super) fn charts(view: &RunView<'_>) -> Vec<Option<String>> {
             ));
         }
         chart.rule(0.0, "");
-        let end = sums(layer).last().into_iter();
+        let end = sums(layer).next_back().into_iter();
         chart.beside(end.flat_map(|(_, births, deaths, cells)| {
             let half = |count: u64| drawn_percent(count, cells) / 2.0;
             [(half(births), "births", births), (-half(deaths), "deaths", deaths)]
