@@ -78,9 +78,11 @@ function curves(look, width) {
   const wide = width >= 620;
   const legendWidth = series && wide ? Math.min(220, 74 + 7 * Math.max(series.label.length - 4, ...lines.map((at) => series.shorts[at].length))) : 16;
   const panelHeight = panels.length === 1 ? Math.round(Math.min(460, Math.max(320, width * 0.42))) : 250;
-  const legendRows = series && !wide ? lines.length * 21 + 30 : 0;
+  const legendRows = series && !wide ? lines.length * 25 + 36 : 0;
   const margin = { l: 70, r: legendWidth, t: panel ? 30 : 14, b: 56 + legendRows };
-  const height = down * panelHeight + (down - 1) * 52 + margin.t + margin.b;
+  // High enough for the whole key, which would scroll otherwise and be cut on paper.
+  const keyHeight = series && wide ? lines.length * 25 + 44 : 0;
+  const height = Math.max(down * panelHeight + (down - 1) * 52, keyHeight) + margin.t + margin.b;
   const inner = { width: width - margin.l - margin.r, height: height - margin.t - margin.b };
   const gapX = across > 1 ? 0.035 : 0;
   const cellX = (1 - gapX * (across - 1)) / across;

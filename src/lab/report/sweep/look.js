@@ -32,7 +32,7 @@ const theme = () => (isDark() && !onPaper ? themes.dark : themes.light);
 function styleOf(axis, at, look) {
   const many = axis && axis.numeric && axis.texts.length > 8;
   const along = many ? at / (axis.texts.length - 1) : 0;
-  const colour = many ? mix(look.name === "dark" ? 0.15 + 0.85 * along : 0.9 * along) : look.hues[at % look.hues.length];
+  const colour = many ? mix(look.name === "dark" ? 0.15 + 0.85 * along : 0.82 * along) : look.hues[at % look.hues.length];
   return { colour, dash: dashes[at % dashes.length], symbol: symbols[at % symbols.length] };
 }
 

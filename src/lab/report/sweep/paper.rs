@@ -67,10 +67,14 @@ pub(super) fn wide(text: &str) -> f64 {
 
 /// The head of a text that is too long for a key.
 pub(super) fn short(text: &str) -> String {
-    if text.chars().count() <= 22 {
+    cut(text, 22)
+}
+
+fn cut(text: &str, most: usize) -> String {
+    if text.chars().count() <= most {
         return text.into();
     }
-    text.chars().take(21).chain(['…']).collect()
+    text.chars().take(most.saturating_sub(1)).chain(['…']).collect()
 }
 
 /// How numbers are drawn: times `by`, in units of `sign`.
@@ -117,7 +121,10 @@ impl Drawn {
 /// Marks of an axis at its values, as many as there is room for in `room` units.
 pub(super) fn marks(levels: &super::settings::Levels<'_>, room: f64) -> Vec<(f64, String)> {
     let Some(numbers) = &levels.numbers else {
-        let texts = levels.texts.iter().map(|text| short(text));
+        // A cast saturates: without a limit of room, the head of the text.
+        let each = room / crate::lab::report::number::size(levels.texts.len().max(1));
+        let most = ((each / wide(" ")) as usize).clamp(4, 22);
+        let texts = levels.texts.iter().map(|text| cut(text, most));
         return (0..).map(crate::lab::report::number::size).zip(texts).collect();
     };
     let bend = |value: f64| if levels.log() { value.log10() } else { value };

@@ -100,7 +100,7 @@ function parallel(look, width) {
   data.push({ type: "scatter", mode: "markers", x: [null], y: [null], showlegend: false, hoverinfo: "skip",
     marker: { color: [low], cmin: low, cmax: high, colorscale: lineScale(look), showscale: true, colorbar: bar }, meta: { kind: "key" } });
   const notes = lines.flatMap((one, at) => [
-    { text: escapeText(one.label), x: at, y: 1, yref: "paper", yanchor: "bottom", yshift: 12, xanchor: crowded ? "left" : "center", textangle: crowded ? -18 : 0, showarrow: false, font: { size: 13, color: look.ink } },
+    { text: escapeText(one.label), x: at, y: 1, yref: "paper", yanchor: "bottom", yshift: 12, xanchor: crowded && at + 1 < lines.length ? "left" : "center", textangle: crowded ? -18 : 0, showarrow: false, font: { size: 13, color: look.ink } },
     ...one.ticks.map((tick, i) => ({ text: escapeText(one.texts[i]), x: at, y: one.high > one.low ? (tick - one.low) / (one.high - one.low) : 0.5, xanchor: "right", xshift: -3,
       showarrow: false, font: { size: 12, color: look.soft }, bgcolor: fade(look.card, 0.75), borderpad: 0 })),
   ]);

@@ -18,7 +18,8 @@ function logTicks(low, high) {
 
 function pareto(look, width) {
   const [cost, y] = [columnOf.get(state.cost), columnOf.get(state.y)];
-  if (!cost || !y || cost === y) return { none: "There is no cost to set against this result." };
+  if (cost && cost === y) return { none: `Choose a cost other than ${y.label}.` };
+  if (!cost || !y) return { none: "There is no cost to set against this result." };
   const bounds = ["low", "high"].map((end) => columnOf.get(`${cost.name}_${end}`));
   const bounded = bounds.every(Boolean);
   let points = [];
@@ -85,8 +86,9 @@ function pareto(look, width) {
   data.unshift(data.pop());
   const wide = width >= 620;
   const legendWidth = grouped && wide ? Math.min(220, 84 + 7 * Math.max(series.label.length - 4, 5, ...kinds.map((at) => series.shorts[at].length))) : 16;
-  const below = wide ? 0 : (grouped ? kinds.length + 2 : 1) * 21 + 14;
-  const height = Math.round(Math.min(480, Math.max(340, width * 0.45))) + below;
+  const below = wide ? 0 : (grouped ? kinds.length + 2 : 1) * 25 + 14;
+  const keyHeight = grouped && wide ? (kinds.length + 2) * 25 + 100 : 0;
+  const height = Math.max(Math.round(Math.min(480, Math.max(340, width * 0.45))), keyHeight) + below;
   const inner = height - 14 - 56 - below;
   const ends = points.flatMap((point) => (bounded && (few || onFront.has(point)) && point.bounds.every((end) => end > 0) ? point.bounds : [point.cost.mean]));
   const span = [Math.min(least, ...ends), Math.max(most, ...ends)].map((end) => end * by.x.by);
