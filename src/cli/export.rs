@@ -9,6 +9,7 @@ use serde_json::json;
 
 use super::sweep::store_path;
 use super::{Done, Failure, say, usage};
+use crate::lab::store::folder::write_whole;
 use crate::lab::store::index::Store;
 use crate::lab::sweep::{self, SweepError};
 use crate::lab::table::Format;
@@ -56,13 +57,11 @@ pub(super) fn execute(args: &ExportArgs) -> Done {
         }
         Some(out) => {
             let place = out.display().to_string();
-            // beside its place and then into it: a file that is there is a whole one
-            let folder = out.parent().filter(|folder| !folder.as_os_str().is_empty());
-            let folder = folder.unwrap_or_else(|| std::path::Path::new("."));
-            let part = tempfile::NamedTempFile::new_in(folder).map_err(|e| failure(&place, &e))?;
-            let file: &File = part.as_file();
-            results.table.write(format, BufWriter::new(file)).map_err(|e| failure(&place, &e))?;
-            part.persist(out).map_err(|e| failure(&place, &e.error))?;
+            let write = |file: &mut File| {
+                let out = BufWriter::new(file);
+                results.table.write(format, out).map_err(std::io::Error::other)
+            };
+            write_whole(out, write).map_err(|e| failure(&place, &e))?;
             let (points, finished) = (results.table.len(), results.finished);
             if args.json {
                 say(&json!({"event": "done", "sweep": record.name, "file": place,

@@ -250,7 +250,7 @@ fn sample(args: &VerifyArgs, count: usize, machine: Machine, stop: &AtomicBool) 
     let shared = &args.shared;
     let store = Store::existing(&args.run)?;
     // whoever made the store shall not know which runs will be looked at
-    let seed = args.sample_seed.unwrap_or_else(|| super::progress::moment());
+    let seed = args.sample_seed.unwrap_or_else(super::progress::moment);
     let mut same = 0;
     let mut different = None;
     let mut on_run = |number: usize, sampled: &Sampled| match &sampled.verdict {

@@ -69,7 +69,9 @@ fn a_sweep_fills_its_table_and_is_not_done_again() {
     std::fs::write(&empty, "").unwrap();
     let mut train = dalean();
     train.arg("train").arg(&empty).args(["--json", "--seed", "2", "--out"]).arg(store.path());
-    settings.iter().for_each(|setting| drop(train.args(["--set", setting])));
+    for setting in settings {
+        train.args(["--set", setting]);
+    }
     let trained = run(&mut train).last();
     let wanted =
         |event: &&Value| event["values"] == serde_json::json!([4, "bp"]) && event["seed"] == 2;
@@ -256,4 +258,34 @@ fn exports_agree() {
     assert!(ran.code == Some(1) && ran.stderr.contains("it has small"), "{ran:?}");
     let ran = run(dalean().arg("export").arg(store.path().join("nowhere")));
     assert!(ran.code == Some(1) && ran.stderr.contains("is no store"), "{ran:?}");
+}
+
+/// A small part of `tests/golden/many.toml`, whose ten thousand points are measured by hand (docs/results/sweeps.md).
+#[test]
+fn a_sample_of_many_axes_fills_store_page_and_figures() {
+    let store = tempfile::tempdir().unwrap();
+    let many = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/golden/many.toml");
+    let text = std::fs::read_to_string(many).unwrap().replace("points = 10000", "points = 60");
+    let file = store.path().join("many.toml");
+    std::fs::write(&file, text).unwrap();
+    let ran = run(dalean().arg("sweep").arg(&file).args(["--json", "--store"]).arg(store.path()));
+    assert_eq!((ran.code, ran.last()["finished"].as_u64()), (Some(0), Some(60)), "{ran:?}");
+    let page = std::fs::read_to_string(store.path().join("many.html")).unwrap();
+    let ran = run(dalean().arg("report").arg(store.path()).arg("--json"));
+    assert_eq!(ran.last()["finished"], 60, "{ran:?}");
+    let figures = ran.last()["figures"].as_array().unwrap().clone();
+    assert!(figures.len() >= 4, "{figures:?}");
+    for figure in figures {
+        let path = figure.as_str().unwrap();
+        let bytes = std::fs::read(path).unwrap();
+        assert!(bytes.starts_with(b"<svg") || bytes.starts_with(b"\x89PNG"), "{path}");
+    }
+    assert_eq!(std::fs::read_to_string(store.path().join("many.html")).unwrap(), page);
+    // every link leads to the page of its run
+    let links: Vec<_> = page.match_indices("runs/").map(|(at, _)| &page[at..]).collect();
+    assert!(links.len() >= 60, "{}", links.len());
+    for link in links {
+        let end = link.find(".html").unwrap() + 5;
+        assert!(store.path().join(&link[..end]).is_file(), "{}", &link[..end]);
+    }
 }

@@ -225,6 +225,8 @@ struct Run<'a> {
     keeping: Keeping,
     /// When files were written last.
     written: Instant,
+    /// Whether epochs have ended since.
+    pending: bool,
     /// The best state so far and its epoch, while it is not on disk.
     best: Option<(u32, Vec<u8>)>,
 }
@@ -249,6 +251,7 @@ impl<'a> Run<'a> {
             records,
             keeping,
             written,
+            pending: false,
             best: None,
         }
     }
@@ -293,6 +296,7 @@ impl<'a> Run<'a> {
         let best = chosen(self.config.select, &self.records);
         let is_best = self.config.select == Select::BestValidation && best == Some(epoch);
         let due = self.written.elapsed() >= self.keeping.every;
+        self.pending = true;
         if !is_best && !due {
             return Ok(());
         }
@@ -303,14 +307,19 @@ impl<'a> Run<'a> {
         if !due {
             return Ok(());
         }
+        self.flush(&state)
+    }
+
+    /// Writes down all epochs so far; `state` is the present one.
+    fn flush(&mut self, state: &[u8]) -> Result<(), RunError> {
         if let Some((epoch, state)) = self.best.take() {
             self.folder.write(&RunFolder::best_name(epoch), &state)?;
         }
         self.folder.write_metrics(&self.records)?;
-        self.folder.write(names::CHECKPOINT, &state)?;
+        self.folder.write(names::CHECKPOINT, state)?;
         self.folder.write_receipt(&self.receipt("running", None))?;
-        self.folder.tidy(best);
-        self.written = Instant::now();
+        self.folder.tidy(chosen(self.config.select, &self.records));
+        (self.written, self.pending) = (Instant::now(), false);
         Ok(())
     }
 
@@ -333,6 +342,9 @@ impl<'a> Run<'a> {
     }
 
     fn finish(mut self) -> Result<Outcome, RunError> {
+        if self.keeping.states && self.pending {
+            self.flush(&self.session.checkpoint())?;
+        }
         let ledger = LedgerRecord::of(self.session.trainer().driver().engine());
         self.folder.write_metrics(&self.records)?;
         self.folder.write(names::LEDGER, ledger.to_json().as_bytes())?;

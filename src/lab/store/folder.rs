@@ -137,24 +137,7 @@ impl RunFolder {
     /// When the system refuses; the old file is then still there.
     pub fn write(&self, name: &str, bytes: &[u8]) -> Result<(), FolderError> {
         let place = self.path.join(name);
-        let mut builder = tempfile::Builder::new();
-        builder.prefix(".part-");
-        #[cfg(unix)]
-        let builder = {
-            // readable by whom the user's mask allows, as any other file
-            use std::os::unix::fs::PermissionsExt;
-            builder.permissions(fs::Permissions::from_mode(0o666))
-        };
-        let file = builder.tempfile_in(&self.path);
-        let mut file = file.map_err(|e| io_error("write", &place, e))?;
-        let written = file.write_all(bytes).and_then(|()| file.as_file().sync_all());
-        written.map_err(|e| io_error("write", &place, e))?;
-        file.persist(&place).map_err(|e| io_error("write", &place, e.error))?;
-        // the move itself has to reach the disk; not every file system lets a folder be flushed
-        if let Ok(folder) = File::open(&self.path) {
-            let _ = folder.sync_all();
-        }
-        Ok(())
+        write_whole(&place, |file| file.write_all(bytes)).map_err(|e| io_error("write", &place, e))
     }
 
     /// Writes the records of all epochs.
@@ -213,6 +196,35 @@ impl RunFolder {
             }
         }
     }
+}
+
+/// Writes a file whole: beside its place, flushed, then moved into it.
+///
+/// # Errors
+/// When the system or `write` refuses; the old file is then still there.
+pub fn write_whole(
+    place: &Path,
+    write: impl FnOnce(&mut File) -> io::Result<()>,
+) -> io::Result<()> {
+    let folder = place.parent().filter(|folder| !folder.as_os_str().is_empty());
+    let folder = folder.unwrap_or_else(|| Path::new("."));
+    let mut builder = tempfile::Builder::new();
+    builder.prefix(".part-");
+    #[cfg(unix)]
+    let builder = {
+        // readable by whom the user's mask allows, as any other file
+        use std::os::unix::fs::PermissionsExt;
+        builder.permissions(fs::Permissions::from_mode(0o666))
+    };
+    let mut part = builder.tempfile_in(folder)?;
+    write(part.as_file_mut())?;
+    part.as_file().sync_all()?;
+    part.persist(place).map_err(|error| error.error)?;
+    // the move itself has to reach the disk; not every file system lets a folder be flushed
+    if let Ok(folder) = File::open(folder) {
+        let _ = folder.sync_all();
+    }
+    Ok(())
 }
 
 /// Reads a file of a run, up to a limit.

@@ -213,7 +213,7 @@ impl<'a> Crew<'a> {
                     }
                 }
                 Err(Trouble::Place(error)) => {
-                    lock(&self.broken).get_or_insert(error);
+                    lock(&self.broken).get_or_insert(*error);
                 }
             }
         }
@@ -224,7 +224,7 @@ impl<'a> Crew<'a> {
         let folder = match RunFolder::take(&path) {
             Ok(folder) => folder,
             Err(FolderError::Held { .. }) => return Ok(Came::Held),
-            Err(error) => return Err(Trouble::Place(RunError::from(error).into())),
+            Err(error) => return Err(Trouble::place(RunError::from(error))),
         };
         let data = &self.plan.data[task.data];
         if is_finished(&path, task, &data.hash) {
@@ -257,17 +257,17 @@ impl<'a> Crew<'a> {
                 Ok(Came::Done { row, seconds, elsewhere: false })
             }
             Err(RunError::Stopped { .. }) => Ok(Came::Stopped),
-            Err(error @ RunError::Folder(_)) => Err(Trouble::Place(error.into())),
+            Err(error @ RunError::Folder(_)) => Err(Trouble::place(error)),
             Err(error) => Err(Trouble::Run(error.to_string())),
         }
     }
 
     /// Puts a finished run into the index.
     fn index(&self, task: &Task, path: &Path) -> Result<(Row, f64), Trouble> {
-        let (row, seconds) = row(path).map_err(Trouble::Place)?;
+        let (row, seconds) = row(path).map_err(Trouble::place)?;
         let text = serde_json::to_string(&row).expect("rows have a JSON form");
         let kept = lock(&self.store).keep(&[(task.key.clone(), text, seconds)]);
-        kept.map_err(|error| Trouble::Place(error.into()))?;
+        kept.map_err(Trouble::place)?;
         Ok((row, seconds))
     }
 }
@@ -275,7 +275,13 @@ impl<'a> Crew<'a> {
 /// What went wrong: with this run alone, or with the place all runs are kept in.
 enum Trouble {
     Run(String),
-    Place(SweepError),
+    Place(Box<SweepError>),
+}
+
+impl Trouble {
+    fn place(error: impl Into<SweepError>) -> Self {
+        Self::Place(Box::new(error.into()))
+    }
 }
 
 /// Whether a folder holds the finished run of this task.

@@ -7,7 +7,6 @@ use super::filter::Filter;
 use super::row::RESULTS;
 use super::{Axis, SweepError};
 use crate::lab::config::ConfigError;
-use crate::lab::config::file::ExperimentFile;
 use crate::lab::config::sweep::{ReportFile, SampleFile, SeedsFile, SweepFile};
 use crate::lab::report::sweep::Figures;
 
@@ -126,7 +125,7 @@ impl Sweep {
         names.push("seed");
         let filter = Filter::new(&file.filter.unwrap_or_default(), &names)?;
         let figures = figures(file.report.unwrap_or_default(), &axes)?;
-        let base = super::table(&file.base.unwrap_or_else(ExperimentFile::default));
+        let base = super::table(&file.base.unwrap_or_default());
         let title = file.title.unwrap_or_else(|| name.clone());
         let about = file.about.unwrap_or_default();
         Ok(Self {

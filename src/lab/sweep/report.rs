@@ -1,5 +1,4 @@
 //! The page of a sweep and its figures, beside the runs they link to.
-#![expect(clippy::disallowed_methods, reason = "pages live in files")]
 
 use std::fs;
 use std::io::Write;
@@ -7,6 +6,7 @@ use std::path::{Path, PathBuf};
 
 use super::{Results, SweepError, results};
 use crate::lab::report::sweep::{SweepView, figures, html, png};
+use crate::lab::store::folder::write_whole;
 use crate::lab::store::index::{Store, StoreError, SweepRecord};
 
 /// Files that were written.
@@ -26,7 +26,11 @@ pub struct SweepPage {
 ///
 /// # Errors
 /// When the index or the system refuses.
-pub fn report(store: &Store, record: &SweepRecord, pictures: bool) -> Result<SweepPage, SweepError> {
+pub fn report(
+    store: &Store,
+    record: &SweepRecord,
+    pictures: bool,
+) -> Result<SweepPage, SweepError> {
     let found = results(store, record)?;
     let view = view(&found);
     let page = store.path().join(format!("{}.html", record.name));
@@ -38,7 +42,9 @@ pub fn report(store: &Store, record: &SweepRecord, pictures: bool) -> Result<Swe
         fs::create_dir_all(&folder).map_err(fail)?;
         for figure in figures(&view) {
             let base = format!("{}-{}", record.name, figure.name);
-            for (ending, bytes) in [("svg", figure.svg.clone().into_bytes()), ("png", png(&figure.svg))] {
+            for (ending, bytes) in
+                [("svg", figure.svg.clone().into_bytes()), ("png", png(&figure.svg))]
+            {
                 let path = folder.join(format!("{base}.{ending}"));
                 write(&path, &bytes)?;
                 made.push(path);
@@ -62,12 +68,8 @@ fn view(found: &Results) -> SweepView<'_> {
     }
 }
 
-/// Writes a file whole: beside its place, then moved into it.
 fn write(path: &Path, bytes: &[u8]) -> Result<(), SweepError> {
     let fail = |error| StoreError::Io { doing: "write", path: path.into(), error };
-    let folder = path.parent().unwrap_or_else(|| Path::new("."));
-    let mut part = tempfile::NamedTempFile::new_in(folder).map_err(fail)?;
-    part.write_all(bytes).map_err(fail)?;
-    part.persist(path).map_err(|error| fail(error.error))?;
+    write_whole(path, |file| file.write_all(bytes)).map_err(fail)?;
     Ok(())
 }

@@ -72,7 +72,14 @@ function curves(look, width) {
   const lines = allSeries.slice(0, curvesMost);
   const scale = drawn(y.unit, points.map((point) => point.high));
 
-  // Frame: panels in rows, a shared ordinate.
+  // Panels share a scale, unless one of them would be pressed flat by another.
+  const framed = (list) => rangeOf(list, y.unit, pooled);
+  const whole = framed(points);
+  const byPanel = new Map(panels.map((at) => [at, framed(points.filter((point) => point.panelAt === at))]));
+  const own = panels.length > 1 && Math.min(...[...byPanel.values()].map((one) => one.range[1] - one.range[0])) < (whole.range[1] - whole.range[0]) / 4;
+  const cut = own ? [...byPanel.values()].some((one) => one.cut) : whole.cut;
+
+  // Frame: panels in rows.
   const across = panels.length === 1 ? 1 : Math.min(panels.length === 4 && width < 1000 ? 2 : 3, panels.length, Math.max(1, Math.floor(width / 300)));
   const down = Math.ceil(panels.length / across);
   const wide = width >= 620;
@@ -84,26 +91,10 @@ function curves(look, width) {
   const keyHeight = series && wide ? lines.length * 25 + 44 : 0;
   const height = Math.max(down * panelHeight + (down - 1) * 52, keyHeight) + margin.t + margin.b;
   const inner = { width: width - margin.l - margin.r, height: height - margin.t - margin.b };
-  const gapX = across > 1 ? 0.035 : 0;
+  const gapX = across > 1 ? (own ? 56 / inner.width : 0.035) : 0;
   const cellX = (1 - gapX * (across - 1)) / across;
   const gapY = down > 1 ? 52 / inner.height : 0;
   const cellY = (1 - gapY * (down - 1)) / down;
-
-  // The ordinate follows the points; intervals may stretch it by as much again, and no share leaves 0 to 100 %.
-  let low = Infinity;
-  let high = -Infinity;
-  for (const point of points) [low, high] = [Math.min(low, point.mean), Math.max(high, point.mean)];
-  let [bandLow, bandHigh] = [low, high];
-  for (const point of points) {
-    const interval = ends(point, pooled);
-    if (interval) [bandLow, bandHigh] = [Math.min(bandLow, interval[0]), Math.max(bandHigh, interval[1])];
-  }
-  const span = high - low || Math.abs(high) * 0.1 || 1;
-  let range = [Math.max(bandLow, low - 0.6 * span), Math.min(bandHigh, high + 0.6 * span)];
-  range = [range[0] - 0.05 * span, range[1] + 0.05 * span];
-  if (y.unit === "fraction") range = [Math.max(range[0], -0.005), Math.min(range[1], 1.005)];
-  else if (low >= 0) range[0] = Math.max(range[0], -0.02 * span);
-  const cut = bandLow < range[0] || bandHigh > range[1];
 
   const data = [];
   const layout = {};
@@ -120,40 +111,40 @@ function curves(look, width) {
       showticklabels: lowest, title: lowest ? x.label : "", ...(number ? { matches: "x" } : {}),
     });
     layout[`yaxis${suffix}`] = axisLook(look, {
-      domain: [Math.max(0, top - cellY), top], anchor: `x${suffix}`, range: range.map((end) => end * scale.by), nticks: 7,
-      showticklabels: column === 0, ticklen: column === 0 ? 4 : 0, title: column === 0 ? titled(y.label, scale.sign) : "", ...(number ? { matches: "y" } : {}),
+      domain: [Math.max(0, top - cellY), top], anchor: `x${suffix}`, range: (own ? byPanel.get(panelAt) : whole).range.map((end) => end * scale.by), nticks: 7,
+      showticklabels: own || column === 0, ticklen: own || column === 0 ? 4 : 0, title: column === 0 ? titled(y.label, scale.sign) : "", ...(number && !own ? { matches: "y" } : {}),
     });
     if (panel) {
       notes.push({ text: `<b>${escapeText(panel.label)} ${escapeText(panel.shorts[panelAt])}</b>`, xref: "paper", yref: "paper", x: left, y: top,
         xanchor: "left", yanchor: "bottom", yshift: 4, showarrow: false, font: { size: 13, color: look.ink } });
     }
     lines.forEach((seriesAt, order) => {
-      const own = points.filter((point) => point.panelAt === panelAt && point.seriesAt === seriesAt);
-      own.sort((a, b) => a.xAt - b.xAt);
-      if (own.length === 0) return;
+      const line = points.filter((point) => point.panelAt === panelAt && point.seriesAt === seriesAt);
+      line.sort((a, b) => a.xAt - b.xAt);
+      if (line.length === 0) return;
       const style = series ? styleOf(series, seriesAt, look) : styleOf(null, 0, look);
       const name = escapeText(series ? series.shorts[seriesAt] : y.label);
       // Words have no distance: their points stand side by side and are not joined.
       const dodge = x.numeric ? 0 : ((order + 0.5) / lines.length - 0.5) * 0.5;
       const place = (point) => (x.numeric ? x.numbers[point.xAt] : point.xAt + dodge);
       const common = { xaxis: `x${suffix}`, yaxis: `y${suffix}`, legendgroup: String(seriesAt), type: "scatter" };
-      const band = x.numeric && !scatter ? bandOf(own, place, pooled, scale.by) : { alone: own.map(() => true) };
+      const band = x.numeric && !scatter ? bandOf(line, place, pooled, scale.by) : { alone: line.map(() => true) };
       if (band.x?.length) {
         data.push({ ...common, x: band.x, y: band.y, mode: "lines", line: { width: 0 }, fill: "toself", hoverinfo: "skip",
           fillcolor: fade(style.colour, lines.length > 4 ? 0.11 : 0.17), showlegend: false, meta: { kind: "band", series: name } });
       }
-      const bars = own.map((point, at) => (band.alone[at] ? ends(point, pooled) : null));
+      const bars = line.map((point, at) => (band.alone[at] ? ends(point, pooled) : null));
       const errors = bars.some(Boolean) ? { type: "data", symmetric: false, color: fade(style.colour, 0.75), thickness: 1.3, width: 3,
-        array: bars.map((bar, at) => (bar ? (bar[1] - own[at].mean) * scale.by : 0)),
-        arrayminus: bars.map((bar, at) => (bar ? (own[at].mean - bar[0]) * scale.by : 0)) } : undefined;
+        array: bars.map((bar, at) => (bar ? (bar[1] - line[at].mean) * scale.by : 0)),
+        arrayminus: bars.map((bar, at) => (bar ? (line[at].mean - bar[0]) * scale.by : 0)) } : undefined;
       data.push({
-        ...common, name, x: own.map(place), y: own.map((point) => point.mean * scale.by), error_y: errors,
+        ...common, name, x: line.map(place), y: line.map((point) => point.mean * scale.by), error_y: errors,
         mode: x.numeric && !scatter ? "lines+markers" : "markers",
         line: { color: style.colour, width: 2, dash: style.dash }, showlegend: series !== null && !data.some((trace) => trace.legendgroup === String(seriesAt) && trace.showlegend),
         marker: { color: style.colour, symbol: style.symbol, size: scatter ? 5 : 7, opacity: scatter ? 0.7 : 1 },
-        text: own.map((point) => hover(point, y, [`${x.label} = ${x.texts[point.xAt]}`, series && `${series.label} = ${series.texts[seriesAt]}`,
+        text: line.map((point) => hover(point, y, [`${x.label} = ${x.texts[point.xAt]}`, series && `${series.label} = ${series.texts[seriesAt]}`,
           panel && `${panel.label} = ${panel.texts[panelAt]}`], pooled)),
-        hovertemplate: "%{text}<extra></extra>", customdata: own.map((point) => [point.n, point.mean, point.half, point.xAt]),
+        hovertemplate: "%{text}<extra></extra>", customdata: line.map((point) => [point.n, point.mean, point.half, point.xAt]),
         meta: { kind: "mean", series: series ? series.texts[seriesAt] : "", panel: panel ? panel.texts[panelAt] : "" },
       });
     });
@@ -175,6 +166,7 @@ function curves(look, width) {
     caption = `Mean of runs that differ in the seed alone, ${countWords(counts)} a point. ${x.numeric ? "Bands are" : "Bars are"} its 95${gap}% ` +
       `confidence interval (Student's t)${Math.min(...counts) === 1 ? "; points with n = 1 have none" : ""}${Math.min(...counts.filter((n) => n > 1)) === 2 ? "; with n = 2 it is wide" : ""}.`;
   }
+  if (own) caption += " Each panel has a scale of its own.";
   if (cut) caption += " Some reach beyond the frame.";
   caption += held.text;
   if (x.drawn) caption += ` Values of ${x.label} were drawn from a range; points are not joined.`;
@@ -182,6 +174,24 @@ function curves(look, width) {
   if (panels.length < allPanels.length) caption += ` The first ${panels.length} of ${allPanels.length} panels are drawn.`;
   const label = `${y.label} against ${x.label}${series ? `, a curve for each ${series.label}` : ""}${panel ? `, a panel for each ${panel.label}` : ""}`;
   return { data, layout, caption, label };
+}
+
+/** Ends of the ordinate: it follows the points; intervals may stretch it by 0.6 as much, and no share leaves 0 to 100 %. */
+function rangeOf(points, unit, pooled) {
+  let low = Infinity;
+  let high = -Infinity;
+  for (const point of points) [low, high] = [Math.min(low, point.mean), Math.max(high, point.mean)];
+  let [bandLow, bandHigh] = [low, high];
+  for (const point of points) {
+    const interval = ends(point, pooled);
+    if (interval) [bandLow, bandHigh] = [Math.min(bandLow, interval[0]), Math.max(bandHigh, interval[1])];
+  }
+  const span = high - low || Math.abs(high) * 0.1 || 1;
+  let range = [Math.max(bandLow, low - 0.6 * span), Math.min(bandHigh, high + 0.6 * span)];
+  range = [range[0] - 0.05 * span, range[1] + 0.05 * span];
+  if (unit === "fraction") range = [Math.max(range[0], -0.005), Math.min(range[1], 1.005)];
+  else if (low >= 0) range[0] = Math.max(range[0], -0.02 * span);
+  return { range, cut: bandLow < range[0] || bandHigh > range[1] };
 }
 
 /** Polygons around neighbouring points that have an interval; a point with no such neighbour is `alone`. */

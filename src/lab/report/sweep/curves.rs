@@ -65,13 +65,20 @@ pub(super) fn draw(settings: &Settings<'_>) -> Option<String> {
     }
     let fraction = measure.column.unit == Unit::Fraction;
     let scale = Drawn::new(measure.column.unit, greatest(&all));
-    let (low, high) = range(&all, pooled, fraction);
+    let framed = |at: Option<usize>| {
+        range(all.iter().filter(|line| at.is_none_or(|at| line.panel == at)), pooled, fraction)
+    };
+    let whole = framed(None);
     let title = scale.title(&measure.column.label);
     let panels: Vec<usize> = {
         let mut panels: Vec<usize> = all.iter().map(|line| line.panel).collect();
         panels.dedup();
         panels
     };
+    // Panels share a scale, unless one of them would be pressed flat by another.
+    let span = |(low, high): (f64, f64)| high - low;
+    let least = panels.iter().map(|&at| span(framed(Some(at)))).fold(f64::INFINITY, f64::min);
+    let own_scale = panels.len() > 1 && 4.0 * least < span(whole);
     let key = series.map_or(8.0, |axis| {
         let texts = axis.texts.iter().take(LINES_MAX).map(|text| wide(&short(text)));
         texts.fold(wide(&short(&axis.axis.label)), f64::max) + 60.0
@@ -84,6 +91,7 @@ pub(super) fn draw(settings: &Settings<'_>) -> Option<String> {
     for (number, &panel_at) in panels.iter().enumerate() {
         let (first, last) = (number % across == 0, number + 1 == across.min(panels.len()));
         let right = if last { key } else { 10.0 };
+        let (low, high) = if own_scale { framed(Some(panel_at)) } else { whole };
         let y_axis = Axis::round(low * scale.by, high * scale.by, if first { &title } else { "" });
         let abscissa = abscissa(x, each - 70.0);
         let size_each = [if last { each + key } else { each }, high_each];
@@ -110,11 +118,12 @@ pub(super) fn draw(settings: &Settings<'_>) -> Option<String> {
     }
     let down = panels.len().div_ceil(across);
     let says = format!(
-        "{} against {}, means of {}{}",
+        "{} against {}, means of {}{}{}",
         measure.column.label,
         x.axis.label,
         runs(all.iter().flat_map(|line| &line.points).map(|(_, point)| point.n)),
-        held_words(&held, pooled)
+        held_words(&held, pooled),
+        if own_scale { "; each panel has a scale of its own" } else { "" }
     );
     Some(sheet([width, size(down) * high_each + 4.0], &says, &body))
 }
@@ -147,8 +156,12 @@ fn greatest(all: &[Line]) -> f64 {
 }
 
 /// Ends of the ordinate: those of the means, stretched by intervals by no more than 0.6 of it.
-fn range(all: &[Line], pooled: bool, fraction: bool) -> (f64, f64) {
-    let points = || all.iter().flat_map(|line| &line.points).map(|(_, point)| point);
+fn range<'a>(
+    all: impl Iterator<Item = &'a Line> + Clone,
+    pooled: bool,
+    fraction: bool,
+) -> (f64, f64) {
+    let points = || all.clone().flat_map(|line| &line.points).map(|(_, point)| point);
     let low = points().map(|point| point.mean).fold(f64::INFINITY, f64::min);
     let high = points().map(|point| point.mean).fold(f64::NEG_INFINITY, f64::max);
     let span = if high > low { high - low } else { (high.abs() * 0.1).max(1e-12) };
