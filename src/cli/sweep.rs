@@ -200,7 +200,6 @@ fn dry_run(args: &SweepArgs, plan: &Plan, machine: Machine, path: &std::path::Pa
             "seconds": seconds, "probes": estimate.probes})
         .to_string());
     } else {
-        say(&describe(plan));
         let shard = if args.shard.is_some() { " in this shard" } else { "" };
         say(&format!("{all} runs{shard}: {} finished, {} to do", all - todo.len(), todo.len()));
         say(&format!(

@@ -46,7 +46,7 @@ pub enum FolderError {
 fn io_error(doing: &'static str, path: &Path, error: io::Error) -> FolderError {
     let hint = match error.kind() {
         io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded | io::ErrorKind::FileTooLarge => {
-            "; free some space and continue with --resume: the last finished epoch is kept"
+            "; free some space and go on, with train --resume or with the same sweep: the last finished epoch is kept"
         }
         io::ErrorKind::NotFound => "; is this the folder of a run?",
         io::ErrorKind::PermissionDenied => "; choose another folder with --out",

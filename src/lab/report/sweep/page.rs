@@ -198,7 +198,9 @@ fn headline(settings: &Settings<'_>) -> String {
         Unit::Fraction => format!("{:.2}<small>\u{202f}%</small>", 100.0 * best.mean),
         unit => escape(&print(best.mean, unit)),
     };
-    let small = if measure.column.unit == Unit::Fraction { "" } else { " long" };
+    // 100.00 % is too wide for the largest letters
+    let short = measure.column.unit == Unit::Fraction && (0.0..0.999_95).contains(&best.mean);
+    let small = if short { "" } else { " long" };
     let way = if measure.less { "lowest" } else { "highest" };
     let where_: Vec<String> = settings
         .axes

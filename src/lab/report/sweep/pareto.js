@@ -31,6 +31,11 @@ function pareto(look, width) {
     points.push(point);
   });
   if (points.length === 0) return { none: `No finished run has both ${y.label} and ${cost.label}.` };
+  // A log axis has no place for 0, and a linear one would press the rest flat.
+  const paid = points.filter((point) => point.cost.mean > 0);
+  const spread = paid.map((point) => point.cost.mean);
+  const free = paid.length > 1 && Math.max(...spread) / Math.min(...spread) > 20 ? points.length - paid.length : 0;
+  if (free) points = paid;
   const order = front(points.map((point) => point.cost.mean), points.map((point) => point.y.mean), y.less);
   const best = order.map((at) => points[at]);
   const onFront = new Set(best);
@@ -106,6 +111,7 @@ function pareto(look, width) {
     `figures hold their axes. The line is the front: no setting has ${y.less ? "less" : "more"} ${y.label} for less ${cost.label}.` +
     (bounded ? ` Bars${few ? "" : " on the front"} run from the low to the high bound of the chip's constants.` : "") +
     " A front of measured means is flattered by chance, more so with few runs." +
+    (free ? ` ${plain(free)} more ${free === 1 ? "setting has" : "settings have"} 0 ${cost.label} and no place on this axis.` : "") +
     (points.length < all ? ` ${plain(points.length)} of the settings are drawn, evenly picked, the front whole.` : "");
   return { data, layout, caption, label: `${y.label} against ${cost.label}, with the Pareto front of ${best.length} settings`, more: [frontTable(best, y, cost)] };
 }

@@ -47,7 +47,13 @@ pub(super) fn draw(settings: &Settings<'_>) -> Option<String> {
         let (cost, value) = (of(cost)?, of(value)?);
         Some(Point { cost: cost.mean, value: value.mean, bounds, kind })
     };
-    let points: Vec<Point> = settings.groups.iter().filter_map(point).collect();
+    let mut points: Vec<Point> = settings.groups.iter().filter_map(point).collect();
+    // A log axis has no place for 0, and a linear one would press the rest flat.
+    let paid = || points.iter().map(|point| point.cost).filter(|&cost| cost > 0.0);
+    let spread = paid().reduce(f64::max).zip(paid().reduce(f64::min));
+    if spread.is_some_and(|(most, least)| most / least > LOG_FROM) {
+        points.retain(|point| point.cost > 0.0);
+    }
     let pairs: Vec<(f64, f64)> = points.iter().map(|point| (point.cost, point.value)).collect();
     let best = front(&pairs, value.less);
     let few = best.len() <= 24;
