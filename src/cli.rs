@@ -54,6 +54,8 @@ Start here:
   dalean train examples/mnist.toml          train it
   dalean train examples/mnist.toml --set hw.cell.level_bits=4 --hw prime
                                             4-bit cells, another chip
+  dalean sweep examples/sweeps/adc_tiles.toml
+                                            75 runs, one page with figures
   dalean verify runs/optdigits-ed-seed1     do a run again and compare every bit
   dalean hw show isaac                      what a chip model says, with sources
 

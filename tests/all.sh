@@ -56,4 +56,13 @@ for example in examples/*.toml; do
     "${CARGO_TARGET_DIR:-target}/release/dalean" train "$example" --set learning.epochs=1 --out "$runs" --quiet
 done
 
+for sweep in examples/sweeps/*.toml; do
+    if grep -Eq '^data.set = "(mnist|fashion-mnist|cifar10)"' "$sweep"; then
+        step "$sweep: SKIPPED, its data has to be fetched"
+        continue
+    fi
+    step "$sweep, one epoch"
+    "${CARGO_TARGET_DIR:-target}/release/dalean" sweep "$sweep" --set learning.epochs=1 --store "$runs/store" --quiet
+done
+
 step all passed

@@ -8,9 +8,9 @@ use clap::Args;
 use serde_json::json;
 
 use super::progress::Meter;
-use super::{Done, Failure, Shared, configuration, environment, say};
+use super::{Done, Failure, Shared, configuration, environment, say, usage};
 use crate::lab::run::{self, Event, Machine, Outcome, RunError, Verdict};
-use crate::lab::store::index::Store;
+use crate::lab::store::index::{INDEX, Store};
 use crate::lab::store::record::TestRecord;
 use crate::lab::sweep::{self, Sampled};
 
@@ -53,8 +53,8 @@ pub(super) struct VerifyArgs {
     #[arg(long, value_name = "N", conflicts_with = "sample")]
     epochs: Option<u32>,
     /// A store: draw N of its finished runs and do them again
-    #[arg(long, value_name = "N")]
-    sample: Option<usize>,
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    sample: Option<u32>,
     /// Which runs are drawn [default: from the clock, and printed]
     #[arg(long, value_name = "N", requires = "sample")]
     sample_seed: Option<u64>,
@@ -214,7 +214,13 @@ pub(super) fn verify(args: &VerifyArgs) -> Done {
     let stop = stop_flag();
     let machine = shared.machine()?;
     if let Some(count) = args.sample {
-        return sample(args, count, machine, &stop);
+        return sample(args, count as usize, machine, &stop);
+    }
+    if args.run.join(INDEX).is_file() {
+        let store = args.run.display();
+        return Err(usage(&format!(
+            "{store} is a store; say with --sample N how many of its runs are done again"
+        )));
     }
     let total = args.epochs.unwrap_or(0);
     let mut meter = Meter::new(shared.quiet || shared.json, total);

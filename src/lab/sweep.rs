@@ -99,6 +99,14 @@ pub enum SweepError {
         /// What it has.
         known: String,
     },
+    /// Several sweeps and no name.
+    #[error("{store} has {known}; name one with --sweep")]
+    Several {
+        /// Which store.
+        store: PathBuf,
+        /// What it has.
+        known: String,
+    },
     /// The same run with two results.
     #[error(
         "run {key} has the state {here} in {store} and {there} in {other}: one of the two machines is wrong; \

@@ -256,6 +256,8 @@ fn exports_agree() {
     assert!(std::fs::read(&out).unwrap().starts_with(b"PAR1"), "{ran:?}");
     let ran = run(dalean().arg("export").arg(store.path()).args(["--sweep", "other"]));
     assert!(ran.code == Some(1) && ran.stderr.contains("it has small"), "{ran:?}");
+    let ran = run(dalean().arg("verify").arg(store.path()));
+    assert!(ran.code == Some(2) && ran.stderr.contains("--sample"), "{ran:?}");
     let ran = run(dalean().arg("export").arg(store.path().join("nowhere")));
     assert!(ran.code == Some(1) && ran.stderr.contains("is no store"), "{ran:?}");
 }

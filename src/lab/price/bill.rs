@@ -279,7 +279,8 @@ impl Bill<'_> {
     pub fn assumed(&self) -> (f64, Vec<Share>) {
         let mut shares = self.shares();
         shares.retain(|share| share.kind == Kind::Assumed && share.share > 0.0);
-        (shares.iter().map(|share| share.share).sum(), shares)
+        // parts of a whole, each rounded, may add up to a little more than it
+        (shares.iter().map(|share| share.share).sum::<f64>().min(1.0), shares)
     }
 
     /// Everything as JSON: joules are `[low, typical, high]`.

@@ -137,7 +137,7 @@ impl Axis {
             _ => {
                 return Err(wrong(
                     "does not say what it varies",
-                    "give it `key` and `values`, or `key`, `from` and `to`, or one or more [[axis.case]]",
+                    "give it `key` and `values`, or `key`, `from` and `to`, or, without `key`, one or more [[axis.case]] that set keys",
                 ));
             }
         };

@@ -33,17 +33,17 @@ pub struct Results {
 pub fn find(store: &Store, name: Option<&str>) -> Result<SweepRecord, SweepError> {
     let mut sweeps = store.sweeps()?;
     let known = match sweeps.len() {
-        0 => "none yet".to_owned(),
+        0 => "no sweeps yet".to_owned(),
         _ => sweeps.iter().map(|sweep| &*sweep.name).collect::<Vec<_>>().join(", "),
     };
     let at = match name {
         Some(name) => sweeps.iter().position(|sweep| sweep.name == name),
         None => (sweeps.len() == 1).then_some(0),
     };
-    let missing = || SweepError::NoSweep {
-        store: store.path().into(),
-        name: name.unwrap_or("(none named)").into(),
-        known,
+    let store = store.path().into();
+    let missing = || match name {
+        Some(name) => SweepError::NoSweep { store, name: name.into(), known },
+        None => SweepError::Several { store, known },
     };
     at.map(|at| sweeps.swap_remove(at)).ok_or_else(missing)
 }
