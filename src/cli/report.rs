@@ -47,6 +47,7 @@ fn sweep(path: &Path, args: &ReportArgs) -> Done {
     }
     if !args.quiet {
         say(&format!("{}: {} of {} points finished", record.name, made.finished, made.points));
+        made.text.iter().for_each(|text| say(text));
         made.figures.iter().for_each(|path| say(&format!("figure   {}", path.display())));
     }
     say(&format!("report   {page}"));

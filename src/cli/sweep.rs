@@ -14,9 +14,6 @@ use crate::lab::run::{Keeping, Machine};
 use crate::lab::store::index::Store;
 use crate::lab::sweep::{self, Carried, Event, Options, Plan, Shard, Sweep, SweepError, Task};
 
-/// A killed sweep loses at most so much of each run at work.
-const CHECKPOINT_SECONDS: u64 = 10;
-
 #[derive(Debug, Args)]
 pub(super) struct SweepArgs {
     /// Sweep file
@@ -36,6 +33,9 @@ pub(super) struct SweepArgs {
     /// Keep the states of finished runs, for `eval` and for the levels in their reports
     #[arg(long)]
     keep_states: bool,
+    /// Write the states of runs at work at most every N seconds: what a kill may cost
+    #[arg(long, value_name = "N", default_value_t = 10)]
+    checkpoint_seconds: u64,
     #[command(flatten)]
     shared: Shared,
 }
@@ -72,8 +72,8 @@ pub(super) fn execute(args: &SweepArgs) -> Done {
     announce(shared, &plan, &path);
     let mut store = Store::open(&path).map_err(SweepError::from)?;
     let stop = stop_flag();
-    let keeping =
-        Keeping { states: args.keep_states, every: Duration::from_secs(CHECKPOINT_SECONDS) };
+    let every = Duration::from_secs(args.checkpoint_seconds);
+    let keeping = Keeping { states: args.keep_states, every };
     let options =
         Options { backend: machine.backend, jobs: machine.threads, keeping, shard: args.shard };
     let meter = Mutex::new(SweepMeter::new(shared.quiet || shared.json));
@@ -89,13 +89,15 @@ pub(super) fn execute(args: &SweepArgs) -> Done {
     let Carried { runs, finished, failed } = carried?;
     let name = &plan.sweep.name;
     let record = sweep::find(&store, Some(name))?;
-    let page = sweep::report(&store, &record, true)?.page;
+    let made = sweep::report(&store, &record, true)?;
+    let page = made.page;
     if shared.json {
         say(&json!({"event": "done", "sweep": name, "store": path.display().to_string(),
             "points": plan.points.len(), "runs": runs, "finished": finished, "failed": failed,
             "seconds": seconds, "page": page.display().to_string()})
         .to_string());
     } else {
+        made.text.iter().filter(|_| !shared.quiet).for_each(|text| say(&format!("{text}\n")));
         say(&format!(
             "{name}: {finished} of {runs} runs finished{} in {}",
             if failed > 0 { format!(", {failed} failed") } else { String::new() },

@@ -1,9 +1,13 @@
 //! Sweeps: nothing lost, nothing doubled, whatever is killed, shared, cut up or full.
+#![expect(
+    clippy::disallowed_types,
+    reason = "processes are killed at moments that the clock picks"
+)]
 
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::process::{Command, Stdio};
-use std::time::Duration;
+use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use serde_json::Value;
 
@@ -94,39 +98,86 @@ fn a_sweep_fills_its_table_and_is_not_done_again() {
 
 #[test]
 fn killed_ten_times_with_two_processes_the_table_is_that_of_an_undisturbed_sweep() {
-    let (_, _, wanted) = undisturbed();
-    let store = tempfile::tempdir().unwrap();
-    let start = || {
-        sweep(store.path())
-            .stdout(Stdio::piped())
-            .stderr(Stdio::null())
-            .spawn()
-            .expect("the program starts")
+    // long enough to be killed in the midst of runs, with and without checkpoints
+    let start = |store: &Path, number: u32| {
+        let seconds = if number.is_multiple_of(2) { "0" } else { "10" };
+        let mut command = sweep(store);
+        command.args(["--set", "learning.epochs=24", "--checkpoint-seconds", seconds]);
+        command.stdout(Stdio::piped()).stderr(Stdio::null()).spawn().expect("the program starts")
     };
+    let whole = tempfile::tempdir().unwrap();
+    let clock = Instant::now();
+    assert!(start(whole.path(), 1).wait_with_output().unwrap().status.success());
+    let (time, wanted) = (clock.elapsed(), table(whole.path()));
+    let store = tempfile::tempdir().unwrap();
     let mut killed = 0;
-    for number in 0..10u64 {
-        let mut children = [start(), start()];
-        // an odd mixture of moments: planning, first runs, between runs
-        let moment = 15 + number * number * 7 % 230;
-        std::thread::sleep(Duration::from_millis(moment));
+    for number in 0..10 {
+        let mut children = [start(store.path(), number), start(store.path(), number + 1)];
+        let nanos = SystemTime::now().duration_since(UNIX_EPOCH).unwrap().subsec_nanos();
+        let moment = time.mul_f64(f64::from(nanos % 1_000_003) / 1_000_003.0 / 5.0);
+        std::thread::sleep(moment.max(Duration::from_millis(5)));
         for child in &mut children {
             killed += usize::from(child.try_wait().unwrap().is_none());
             child.kill().unwrap();
             child.wait().unwrap();
         }
     }
-    assert!(killed >= 6, "only {killed} processes were still at work when they were killed");
-    let pair = [start(), start()];
+    assert!(killed >= 5, "only {killed} processes were still at work when they were killed");
+    let pair = [start(store.path(), 0), start(store.path(), 1)];
     let pair = pair.map(|child| Ran::from(child.wait_with_output().unwrap()));
     for ran in &pair {
-        assert_eq!(
-            (ran.code, ran.last()["finished"].as_u64()),
-            (Some(0), Some(RUNS as u64)),
-            "{ran:?}"
-        );
+        let finished = ran.last()["finished"].as_u64();
+        assert_eq!((ran.code, finished), (Some(0), Some(RUNS as u64)), "{ran:?}");
     }
     assert_eq!(table(store.path()), wanted);
     assert_eq!(folders(store.path()), RUNS);
+}
+
+#[test]
+fn a_killed_run_of_a_sweep_goes_on_from_its_checkpoint() {
+    let file = tempfile::tempdir().unwrap();
+    let one = file.path().join("one.toml");
+    let text = "base.data.set = 'optdigits'\nbase.learning.epochs = 60\n[[axis]]\nkey = 'seed'\nname = 'draw'\nvalues = [5]\n";
+    std::fs::write(&one, text).unwrap();
+    let start = |store: &Path| {
+        let mut command = dalean();
+        command.arg("sweep").arg(&one).args(["--json", "--checkpoint-seconds", "0", "--store"]);
+        command.arg(store);
+        command
+    };
+    let log = |store: &Path| {
+        let group = std::fs::read_dir(store.join("runs")).unwrap().next().unwrap().unwrap().path();
+        let path = std::fs::read_dir(group).unwrap().next().unwrap().unwrap().path();
+        std::fs::read_to_string(path.join("metrics.jsonl")).unwrap()
+    };
+    let [whole, store] = [0, 1].map(|_| tempfile::tempdir().unwrap());
+    assert_eq!(run(&mut start(whole.path())).code, Some(0));
+    let mut child =
+        start(store.path()).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
+    let records = || {
+        let group = std::fs::read_dir(store.path().join("runs")).ok()?.next()?.ok()?.path();
+        let path = std::fs::read_dir(group).ok()?.next()?.ok()?.path();
+        // the receipt is the last file of an epoch
+        path.join("receipt.json").exists().then_some(())?;
+        Some(std::fs::read_to_string(path.join("metrics.jsonl")).ok()?.lines().count())
+    };
+    let clock = Instant::now();
+    while records().unwrap_or(0) < 6 {
+        assert!(clock.elapsed() < Duration::from_secs(120), "no epoch was written down");
+        std::thread::sleep(Duration::from_millis(2));
+    }
+    child.kill().unwrap();
+    child.wait().unwrap();
+    let kept = log(store.path());
+    let before: Vec<&str> = kept.lines().take(4).collect();
+    assert!(kept.lines().count() < 61, "the run outran the kill");
+    let ran = run(&mut start(store.path()));
+    assert_eq!(ran.code, Some(0), "{ran:?}");
+    assert_eq!(table(store.path()), table(whole.path()));
+    // records hold the seconds that an epoch took: those from before the kill are still the first process's
+    let after = log(store.path());
+    assert_eq!(after.lines().take(4).collect::<Vec<_>>(), before);
+    assert_eq!(after.lines().count(), 61);
 }
 
 #[test]

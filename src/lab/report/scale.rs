@@ -231,7 +231,9 @@ impl Axis {
         let marks = multiples(from, to, stride);
         let marks = marks.flat_map(|power| leads.iter().map(move |lead| lead * 10f64.powf(power)));
         let inside = marks.filter(|mark| (low..=high).contains(mark));
-        let ticks = inside.map(|mark| (mark, significant(mark))).collect();
+        let show =
+            |mark: f64| if mark >= 1e4 { short(mark.round() as u64) } else { significant(mark) };
+        let ticks = inside.map(|mark| (mark, show(mark))).collect();
         Self { scale: Scale { curve: Curve::Log, from: low, to: high }, ticks, label: label.into() }
     }
 

@@ -19,10 +19,12 @@ mod pareto;
 mod raster;
 mod settings;
 mod statistics;
+mod text;
 
 pub use page::html;
 pub use paper::{StaticFigure, figures};
 pub use raster::png;
+pub use text::text;
 
 use crate::lab::table::Table;
 

@@ -5,7 +5,7 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use super::{Results, SweepError, results};
-use crate::lab::report::sweep::{SweepView, figures, html, png};
+use crate::lab::report::sweep::{SweepView, figures, html, png, text};
 use crate::lab::store::folder::write_whole;
 use crate::lab::store::index::{Store, StoreError, SweepRecord};
 
@@ -16,6 +16,8 @@ pub struct SweepPage {
     pub page: PathBuf,
     /// Figures for papers.
     pub figures: Vec<PathBuf>,
+    /// The curves as a table for the terminal, where there is something to show.
+    pub text: Option<String>,
     /// Points.
     pub points: usize,
     /// Of these, finished.
@@ -51,7 +53,13 @@ pub fn report(
             }
         }
     }
-    Ok(SweepPage { page, figures: made, points: found.table.len(), finished: found.finished })
+    Ok(SweepPage {
+        page,
+        text: text(&view),
+        figures: made,
+        points: found.table.len(),
+        finished: found.finished,
+    })
 }
 
 fn view(found: &Results) -> SweepView<'_> {

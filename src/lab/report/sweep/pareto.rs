@@ -64,7 +64,13 @@ pub(super) fn draw(settings: &Settings<'_>) -> Option<String> {
     let low = costs().chain(bounds.clone()).reduce(f64::min)?;
     let high = costs().chain(bounds).reduce(f64::max)?;
     let log = low > 0.0 && high / low > LOG_FROM;
-    let x_scale = Drawn::new(cost.column.unit, if log { (low * high).sqrt() } else { high });
+    let counted = matches!(cost.column.unit, Unit::Count | Unit::Cycles);
+    let x_scale = match (log, counted) {
+        // powers of ten are named one by one
+        (true, true) => Drawn { by: 1.0, sign: String::new() },
+        (true, false) => Drawn::new(cost.column.unit, (low * high).sqrt()),
+        (false, _) => Drawn::new(cost.column.unit, high),
+    };
     let x_title = x_scale.title(&cost.column.label);
     let (low, high) = (low * x_scale.by, high * x_scale.by);
     let x_axis = if log {

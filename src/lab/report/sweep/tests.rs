@@ -1,7 +1,7 @@
 //! Laws of the page and of figures for papers: complete, escaped, no word that is no number, the same every time.
 
 use super::settings::Settings;
-use super::{Axis, Figures, Refused, SweepView, figures, html, json, png};
+use super::{Axis, Figures, Refused, SweepView, figures, html, json, png, text};
 use crate::lab::table::{Column, Role, Table, Unit, Values};
 
 struct Sample {
@@ -173,4 +173,21 @@ fn letters_are_drawn() {
     };
     assert_ne!(text("µJ"), text(""));
     assert_ne!(text("µJ"), text("nJ"));
+}
+
+#[test]
+fn the_table_for_the_terminal_has_means_and_intervals() {
+    let sample = Sample::new();
+    let text = text(&sample.view()).unwrap();
+    let line = |start: &str| {
+        let found = text.lines().find(|line| line.trim_start().starts_with(start));
+        found.unwrap_or_else(|| panic!("no line {start} in\n{text}")).to_owned()
+    };
+    // two seeds, 0.60 and 0.61: t is 12.706, s / sqrt(2) is 0.005
+    assert!(line("1 ").contains("60.50 ±6.35"), "{text}");
+    assert!(line("4 ").contains("90.50 ±6.35"), "{text}");
+    assert!(text.starts_with("score (%) against bits, mean of n = "), "{text}");
+    let mut empty = Sample::new();
+    empty.table.columns.retain(|column| column.name != "score");
+    assert_eq!(super::text(&empty.view()), None);
 }
