@@ -18,6 +18,7 @@ pub enum PerLayer<T> {
     Each(Vec<T>),
 }
 
+/// Structures of optional keys that refuse unknown ones.
 macro_rules! keys {
     ($($(#[$doc:meta])* $name:ident { $($(#[$field_doc:meta])* $field:ident: $kind:ty,)* })*) => {$(
         $(#[$doc])*
@@ -28,6 +29,8 @@ macro_rules! keys {
         }
     )*};
 }
+
+pub(super) use keys;
 
 keys! {
     /// An experiment file.

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::ConfigError;
-use super::file::ExperimentFile;
+use super::file::{ExperimentFile, keys};
 use super::layers::parse;
 
 /// Seeds of a sweep.
@@ -38,17 +38,6 @@ pub enum KeyFile {
     One(String),
     /// All of these, the same value.
     All(Vec<String>),
-}
-
-macro_rules! keys {
-    ($($(#[$doc:meta])* $name:ident { $($(#[$field_doc:meta])* $field:ident: $kind:ty,)* })*) => {$(
-        $(#[$doc])*
-        #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
-        #[serde(deny_unknown_fields)]
-        pub struct $name {
-            $($(#[$field_doc])* #[serde(skip_serializing_if = "Option::is_none")] pub $field: Option<$kind>,)*
-        }
-    )*};
 }
 
 keys! {
