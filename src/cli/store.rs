@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Subcommand;
+use indicatif::ProgressBar;
 use serde_json::json;
 
 use super::{Done, Failure, say};
@@ -57,7 +58,11 @@ pub(super) fn execute(command: &StoreCommand) -> Done {
             Ok(())
         }
         StoreCommand::Index { store, json } => {
-            let [finished, others] = sweep::reindex(&mut Store::open(store)?, &mut |_, _| {})?;
+            let bar = ProgressBar::new(0);
+            let found =
+                sweep::reindex(&mut Store::open(store)?, &mut |run, of| show(&bar, run, of));
+            bar.finish_and_clear();
+            let [finished, others] = found?;
             if *json {
                 say(&json!({"event": "done", "finished": finished, "unfinished": others})
                     .to_string());
@@ -67,6 +72,12 @@ pub(super) fn execute(command: &StoreCommand) -> Done {
             Ok(())
         }
     }
+}
+
+/// How far it is; a bar that is not on a terminal stays hidden.
+fn show(bar: &ProgressBar, run: usize, of: usize) {
+    bar.set_length(of as u64);
+    bar.set_position(run as u64);
 }
 
 fn list(store: &Store, json: bool) -> Done {
@@ -89,7 +100,10 @@ fn list(store: &Store, json: bool) -> Done {
 }
 
 fn merge(into: &mut Store, from: &Store, json: bool) -> Done {
-    let merged = sweep::merge(into, from, &mut |_, _| {})?;
+    let bar = ProgressBar::new(0);
+    let merged = sweep::merge(into, from, &mut |run, of| show(&bar, run, of));
+    bar.finish_and_clear();
+    let merged = merged?;
     let place = from.path().display().to_string();
     if json {
         say(&json!({"event": "done", "from": place, "runs": merged.runs, "shared": merged.shared,

@@ -239,7 +239,7 @@ fn shards_in_stores_of_their_own_merge_into_the_whole() {
 
 #[test]
 fn a_sample_of_a_store_is_done_again_and_lies_are_found() {
-    let (store, _, _) = undisturbed();
+    let (store, _, honest) = undisturbed();
     let verify = |count: &str| {
         let path = store.path();
         run(dalean().arg("verify").arg(path).args([
@@ -260,6 +260,26 @@ fn a_sample_of_a_store_is_done_again_and_lies_are_found() {
     let ran = verify("1");
     assert_eq!(ran.code, Some(4), "{ran:?}");
     assert!(ran.stderr.contains("the row of run"), "{ran:?}");
+    // what it claims does not come over: rows are read off the folders
+    let other = store.path().join("other");
+    let ran = run(dalean().args(["store", "merge", "--json"]).args([&other, store.path()]));
+    assert_eq!(ran.last()["runs"], RUNS, "{ran:?}");
+    assert_eq!(table(&other), honest);
+}
+
+#[test]
+fn a_finished_run_that_cannot_be_read_is_done_again() {
+    let (store, _, wanted) = undisturbed();
+    let key = wanted.lines().nth(1).unwrap().rsplit(',').nth(1).unwrap();
+    let folder = store.path().join("runs").join(&key[..2]).join(key);
+    std::fs::write(folder.join("metrics.jsonl"), "").unwrap();
+    std::fs::remove_file(store.path().join("index.sqlite")).unwrap();
+    let ran = run(&mut sweep(store.path()));
+    assert_eq!(ran.code, Some(0), "{ran:?}");
+    let done: Vec<_> =
+        events(&ran, "run").into_iter().filter(|e| e["elsewhere"] == false).collect();
+    assert_eq!((done.len(), &done[0]["key"]), (1, &key.into()));
+    assert_eq!(table(store.path()), wanted);
 }
 
 /// A limit on the size of files stands for a full disk.

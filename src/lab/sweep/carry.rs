@@ -227,8 +227,11 @@ impl<'a> Crew<'a> {
             Err(error) => return Err(Trouble::place(RunError::from(error))),
         };
         let data = &self.plan.data[task.data];
-        if is_finished(&path, task, &data.hash) {
-            let (row, seconds) = self.index(task, &path)?;
+        // a finished run that cannot be read, as a power cut may leave it, is done again
+        if is_finished(&path, task, &data.hash)
+            && let Ok((row, seconds)) = row(&path)
+        {
+            self.index(task, &row, seconds)?;
             (self.on_event)(Event::Work(task.work));
             return Ok(Came::Done { row, seconds, elsewhere: true });
         }
@@ -253,7 +256,8 @@ impl<'a> Crew<'a> {
         );
         match outcome {
             Ok(_) => {
-                let (row, seconds) = self.index(task, &path)?;
+                let (row, seconds) = row(&path).map_err(Trouble::place)?;
+                self.index(task, &row, seconds)?;
                 Ok(Came::Done { row, seconds, elsewhere: false })
             }
             Err(RunError::Stopped { .. }) => Ok(Came::Stopped),
@@ -263,12 +267,9 @@ impl<'a> Crew<'a> {
     }
 
     /// Puts a finished run into the index.
-    fn index(&self, task: &Task, path: &Path) -> Result<(Row, f64), Trouble> {
-        let (row, seconds) = row(path).map_err(Trouble::place)?;
-        let text = serde_json::to_string(&row).expect("rows have a JSON form");
-        let kept = lock(&self.store).keep(&[(task.key.clone(), text, seconds)]);
-        kept.map_err(Trouble::place)?;
-        Ok((row, seconds))
+    fn index(&self, task: &Task, row: &Row, seconds: f64) -> Result<(), Trouble> {
+        let kept = lock(&self.store).keep(&[(task.key.clone(), row.to_json(), seconds)]);
+        kept.map_err(Trouble::place)
     }
 }
 

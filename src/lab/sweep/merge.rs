@@ -52,7 +52,7 @@ pub fn merge(
     let mut merged = Merged::default();
     let rows = from.rows()?;
     let mut fresh = Vec::new();
-    for (number, (key, text, seconds)) in rows.iter().enumerate() {
+    for (number, (key, ..)) in rows.iter().enumerate() {
         on_run(number + 1, rows.len());
         let source = from.folder(key);
         let damaged =
@@ -60,7 +60,8 @@ pub fn merge(
         if address_of(&source)? != *key {
             return Err(RunError::from(damaged("does not hold the run its name says")).into());
         }
-        let (row, _) = row(&source)?;
+        // the folder is asked, not the other index
+        let (row, seconds) = row(&source)?;
         if let Some(here) = into.row(key)? {
             let here: Row = serde_json::from_str(&here)
                 .map_err(|error| RunError::from(damaged(&format!("has a row that {error}"))))?;
@@ -84,7 +85,7 @@ pub fn merge(
             }
             Err(error) => return Err(RunError::from(error).into()),
         }
-        fresh.push((key.clone(), text.clone(), *seconds));
+        fresh.push((key.clone(), row.to_json(), seconds));
         merged.runs += 1;
         if fresh.len() == BATCH {
             into.keep(&fresh)?;
@@ -142,11 +143,7 @@ pub fn reindex(
         let path = store.folder(key);
         let Ok((row, seconds)) = row(&path) else { continue };
         if address_of(&path).is_ok_and(|address| address == *key) {
-            rows.push((
-                key.clone(),
-                serde_json::to_string(&row).expect("rows have a JSON form"),
-                seconds,
-            ));
+            rows.push((key.clone(), row.to_json(), seconds));
             finished += 1;
         }
         if rows.len() == BATCH {

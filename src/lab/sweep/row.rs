@@ -112,6 +112,13 @@ pub struct Row {
     pub not_simulated: Vec<String>,
 }
 
+impl Row {
+    /// As an index keeps it.
+    pub(super) fn to_json(&self) -> String {
+        serde_json::to_string(self).expect("rows have a JSON form")
+    }
+}
+
 /// Reads a finished run; with it, the seconds its learning took.
 ///
 /// # Errors

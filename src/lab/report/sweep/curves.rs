@@ -38,19 +38,8 @@ pub(super) fn draw(settings: &Settings<'_>) -> Option<String> {
     for panel_at in 0..panel.map_or(1, |axis| axis.texts.len()).min(PANELS_MAX) {
         for series_at in 0..series.map_or(1, |axis| axis.texts.len()).min(LINES_MAX) {
             let point = |x_at: usize| {
-                let is = |axis: Option<&Levels<'_>>, row: usize, at| {
-                    axis.is_none_or(|axis| axis.codes[row] == Some(at))
-                };
-                let fits = |&row: &usize| {
-                    x.codes[row] == Some(x_at)
-                        && is(series, row, series_at)
-                        && is(panel, row, panel_at)
-                        && held
-                            .iter()
-                            .all(|(axis, value)| value.is_none() || axis.codes[row] == *value)
-                };
-                let rows: Vec<usize> = (0..settings.view.table.len()).filter(fits).collect();
-                Some((x_at, settings.summary(measure, &rows)?))
+                let places = [(Some(x), x_at), (series, series_at), (panel, panel_at)];
+                Some((x_at, settings.cell(measure, &held, &places)?))
             };
             // Drawn values would meet one run each.
             let points: Vec<_> =

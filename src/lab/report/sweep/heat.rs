@@ -2,7 +2,7 @@
 
 use super::curves::{held_words, runs};
 use super::paper::{COLUMN, Drawn, marks, sheet, short, wide};
-use super::settings::{Levels, Settings};
+use super::settings::{Levels, Settings, lies};
 use crate::lab::report::chart::Chart;
 use crate::lab::report::colour;
 use crate::lab::report::number::{place, size};
@@ -24,8 +24,7 @@ pub(super) fn draw(settings: &Settings<'_>) -> Option<String> {
     let (across, down) = (x.texts.len(), y.texts.len());
     let mut cells: Vec<Vec<usize>> = vec![Vec::new(); across * down];
     for row in 0..settings.view.table.len() {
-        let here = held.iter().all(|(axis, value)| value.is_none() || axis.codes[row] == *value);
-        if let (true, Some(i), Some(j)) = (here, x.codes[row], y.codes[row]) {
+        if let (true, Some(i), Some(j)) = (lies(&held, row), x.codes[row], y.codes[row]) {
             cells[j * across + i].push(row);
         }
     }

@@ -150,15 +150,36 @@ impl<'a> Settings<'a> {
     }
 
     /// Axes that vary, are not `shown`, and the value each is held at: that of the best setting; none where it pools.
-    pub(super) fn held(
-        &self,
-        measure: Measure<'_>,
-        shown: &[&str],
-    ) -> Vec<(&Levels<'a>, Option<usize>)> {
+    pub(super) fn held(&self, measure: Measure<'_>, shown: &[&str]) -> Vec<Held<'_, 'a>> {
         let best = self.best(measure).and_then(|(rows, _)| rows.first().copied());
         let others = self.axes.iter().filter(|axis| axis.varies());
         let others = others.filter(|axis| !shown.contains(&axis.axis.name.as_str()));
         let value = |axis: &Levels<'_>| if axis.drawn() { None } else { axis.codes[best?] };
         others.map(|axis| (axis, value(axis))).collect()
     }
+
+    /// Numbers of the rows that have these values and lie where the other axes are held; an axis that is not there
+    /// has every value.
+    pub(super) fn cell(
+        &self,
+        measure: Measure<'_>,
+        held: &[Held<'_, 'a>],
+        places: &[(Option<&Levels<'_>>, usize)],
+    ) -> Option<Summary> {
+        let has = |row: usize, axis: &Levels<'_>, at| axis.codes[row] == Some(at);
+        let fits = |&row: &usize| {
+            places.iter().all(|&(axis, at)| axis.is_none_or(|axis| has(row, axis, at)))
+                && lies(held, row)
+        };
+        let rows: Vec<usize> = (0..self.view.table.len()).filter(fits).collect();
+        self.summary(measure, &rows)
+    }
+}
+
+/// An axis that is not shown, and the place of the value it is held at; none where it pools.
+pub(super) type Held<'l, 'a> = (&'l Levels<'a>, Option<usize>);
+
+/// Whether a row lies where axes are held.
+pub(super) fn lies(held: &[Held<'_, '_>], row: usize) -> bool {
+    held.iter().all(|(axis, value)| value.is_none() || axis.codes[row] == *value)
 }

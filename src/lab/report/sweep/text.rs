@@ -28,17 +28,8 @@ pub fn text(view: &SweepView<'_>) -> Option<String> {
     let columns: Vec<[usize; 2]> =
         places(panel).flat_map(|p| places(series).map(move |s| [p, s])).collect();
     let cell = |x_at: usize, [panel_at, series_at]: [usize; 2]| {
-        let is = |axis: Option<&Levels<'_>>, row: usize, at| {
-            axis.is_none_or(|axis| axis.codes[row] == Some(at))
-        };
-        let fits = |&row: &usize| {
-            is(Some(x), row, x_at)
-                && is(panel, row, panel_at)
-                && is(series, row, series_at)
-                && held.iter().all(|(axis, value)| value.is_none() || axis.codes[row] == *value)
-        };
-        let rows: Vec<usize> = (0..view.table.len()).filter(fits).collect();
-        settings.summary(measure, &rows)
+        let places = [(Some(x), x_at), (series, series_at), (panel, panel_at)];
+        settings.cell(measure, &held, &places)
     };
     let lines: Vec<Vec<Option<Summary>>> = (0..x.texts.len().min(LINES_MAX))
         .map(|at| columns.iter().take(COLUMNS_MAX).map(|&column| cell(at, column)).collect())
