@@ -49,6 +49,18 @@ pub struct StripMut<'a> {
     pruned: Option<&'a mut [u64]>,
 }
 
+/// A half block of a byte plane.
+struct Part<'a> {
+    /// Place of the byte in a level.
+    shift: u32,
+    /// First row and column.
+    row: usize,
+    column: usize,
+    /// Columns that exist.
+    live: usize,
+    cells: &'a [u8],
+}
+
 impl Crossbar {
     /// Panels worth writing together: their gates and a block of drives stay in a processor's first cache.
     pub const STRIP_PANELS: usize = 4;
@@ -104,33 +116,51 @@ impl Crossbar {
     }
 
     /// The levels, row-major.
-    pub fn levels(&self) -> impl Iterator<Item = u16> + '_ {
+    pub fn levels(&self) -> impl Iterator<Item = u16> + use<> {
         let Layout { rows, columns } = self.layout;
-        (0..rows).flat_map(move |row| (0..columns).map(move |column| self.level(row, column)))
+        let mut levels = vec![0; rows * columns];
+        for Part { shift, row, column, live, cells } in self.parts() {
+            for (group, cells) in cells.as_chunks::<64>().0.iter().enumerate() {
+                for r in 0..rows.saturating_sub(row + group * 4).min(4) {
+                    let to = &mut levels[(row + group * 4 + r) * columns + column..][..live];
+                    let cells = cells.as_chunks::<4>().0;
+                    to.iter_mut().zip(cells).for_each(|(to, of)| *to |= u16::from(of[r]) << shift);
+                }
+            }
+        }
+        levels.into_iter()
     }
 
     /// Sums of the levels of each row.
     #[must_use]
     pub fn row_sums(&self) -> Vec<i64> {
         let mut sums = vec![0; self.layout.rows_padded()];
-        for (plane, shift) in [(Some(&self.low), 0), (self.high.as_ref(), 8)] {
-            for (at, half) in
-                plane.iter().flat_map(|plane| plane.chunks_exact(HALF_CELLS)).enumerate()
-            {
-                let (panel, block) = (at / 2 / self.layout.blocks(), at / 2 % self.layout.blocks());
-                let column = panel * PANEL_COLUMNS + at % 2 * HALF_COLUMNS;
-                let live = self.layout.columns.saturating_sub(column).min(HALF_COLUMNS);
-                for (group, cells) in half.as_chunks::<64>().0.iter().enumerate() {
-                    let mut rows = [0u16; 4];
-                    for cells in &cells.as_chunks::<4>().0[..live] {
-                        rows.iter_mut().zip(cells).for_each(|(row, &low)| *row += u16::from(low));
-                    }
-                    let to = &mut sums[block * BLOCK_ROWS + group * 4..][..4];
-                    to.iter_mut().zip(rows).for_each(|(sum, row)| *sum += i64::from(row) << shift);
+        for Part { shift, row, live, cells, .. } in self.parts() {
+            for (group, cells) in cells.as_chunks::<64>().0.iter().enumerate() {
+                let mut rows = [0u16; 4];
+                for cells in &cells.as_chunks::<4>().0[..live] {
+                    rows.iter_mut().zip(cells).for_each(|(row, &low)| *row += u16::from(low));
                 }
+                let to = &mut sums[row + group * 4..][..4];
+                to.iter_mut().zip(rows).for_each(|(sum, row)| *sum += i64::from(row) << shift);
             }
         }
         sums
+    }
+
+    /// Half blocks of both byte planes.
+    fn parts(&self) -> impl Iterator<Item = Part<'_>> {
+        let planes = [(Some(&self.low), 0), (self.high.as_ref(), 8)];
+        let planes = planes.into_iter().filter_map(|(plane, shift)| Some((plane?, shift)));
+        let (blocks, columns) = (self.layout.blocks(), self.layout.columns);
+        planes.flat_map(move |(plane, shift)| {
+            plane.chunks_exact(HALF_CELLS).enumerate().filter_map(move |(at, cells)| {
+                let column = at / 2 / blocks * PANEL_COLUMNS + at % 2 * HALF_COLUMNS;
+                let live = columns.saturating_sub(column).min(HALF_COLUMNS);
+                let row = at / 2 % blocks * BLOCK_ROWS;
+                (live > 0).then_some(Part { shift, row, column, live, cells })
+            })
+        })
     }
 
     /// The remainders behind the cells, row-major; `None` when the array has none.

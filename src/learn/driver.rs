@@ -9,7 +9,7 @@ use super::route::Delivery;
 use super::rule::{Rule, Step, UpdateMode, Words};
 use crate::chip::engine::{Engine, Operation, Side, Write};
 use crate::chip::ledger::{During, Event};
-use crate::num::fixed::{ErrorBits, rsh, sat};
+use crate::num::fixed::{ErrorBits, rail};
 
 /// How a network learns.
 #[derive(Debug, Clone)]
@@ -189,16 +189,25 @@ fn backward_words(
     bits: ErrorBits,
 ) -> (Vec<i16>, u64) {
     let shift = i64::from(level_bits) - i64::from(weight_max_log2) + 8 - i64::from(bits.get());
+    let rail = rail(bits.get());
     let mut saturated = 0;
+    // no branch: which sums saturate is hard to guess
     let mut bounded = |scaled: i64| {
-        let (word, changed) = sat(scaled, bits.get());
-        saturated += u64::from(changed);
+        let word = scaled.clamp(-rail, rail);
+        saturated += u64::from(word != scaled);
         word as i16
     };
-    let words = match u32::try_from(shift) {
-        Ok(right) => sums.iter().map(|&d| bounded(rsh(d, right))).collect(),
-        Err(_) => sums.iter().map(|&d| bounded(d << shift.unsigned_abs())).collect(),
-    };
+    let mut words = vec![0; sums.len()];
+    let pairs = words.iter_mut().zip(sums);
+    match u32::try_from(shift) {
+        Ok(0) => pairs.for_each(|(word, &d)| *word = bounded(d)),
+        // `rsh` of at most 63
+        Ok(right) => {
+            let right = right.min(63);
+            pairs.for_each(|(word, &d)| *word = bounded((d >> right) + (d >> (right - 1) & 1)));
+        }
+        Err(_) => pairs.for_each(|(word, &d)| *word = bounded(d << shift.unsigned_abs())),
+    }
     (words, saturated)
 }
 

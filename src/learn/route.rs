@@ -14,7 +14,7 @@
 
 use crate::chip::layer::Taps;
 use crate::num::draw::{Place, Site, below};
-use crate::num::fixed::{ErrorBits, log2_ceil, rsh, sat};
+use crate::num::fixed::{ErrorBits, log2_ceil, rail, rsh, sat};
 
 /// How errors reach hidden units.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -36,6 +36,9 @@ pub enum Route {
         shift: Option<u32>,
     },
 }
+
+/// Words of at most 9 bits, with any signs, that add up inside 16 bits.
+const DENSE_PART: usize = 128;
 
 /// A route built for one layer: what the error unit computes, and what the tile taps.
 #[derive(Debug, Clone)]
@@ -147,22 +150,44 @@ impl Delivery {
             Kind::Dense { signs, shift } => {
                 let units = signs.len() / outputs;
                 let mut words = Vec::with_capacity(output.len() / outputs * units);
-                let mut sums = vec![0i32; units];
+                let (mut sums, mut part) = (vec![0i32; units], vec![0i16; units]);
                 for sample in output.chunks_exact(outputs) {
-                    // one output after the other, so that units lie side by side: a word has at most 9 bits
                     sums.fill(0);
-                    for (&word, signs) in sample.iter().zip(signs.chunks_exact(units)) {
-                        for (sum, &sign) in sums.iter_mut().zip(signs) {
-                            *sum += i32::from(word) * i32::from(sign);
+                    let parts = sample.chunks(DENSE_PART).zip(signs.chunks(DENSE_PART * units));
+                    for (sample, signs) in parts {
+                        // one output after the other, so that units lie side by side
+                        part.fill(0);
+                        for (&word, signs) in sample.iter().zip(signs.chunks_exact(units)) {
+                            part.iter_mut().zip(signs).for_each(|(sum, sign)| *sum += word * sign);
                         }
+                        sums.iter_mut().zip(&part).for_each(|(sum, &p)| *sum += i32::from(p));
                     }
-                    words.extend(sums.iter().map(|&sum| bounded(i64::from(sum), *shift)));
+                    let from = words.len();
+                    words.resize(from + units, 0);
+                    saturated += bounded_all(&sums, *shift, self.bits, &mut words[from..]);
                 }
                 let products = (words.len() * outputs) as u64;
                 (words, saturated, products)
             }
         }
     }
+}
+
+/// `sat( rsh(sum, shift) )` of sums below 2^30, side by side; how many saturated.
+fn bounded_all(sums: &[i32], shift: u32, bits: ErrorBits, words: &mut [i16]) -> u64 {
+    let rail = rail(bits.get()) as i32;
+    // at 31 such sums are all rounded off
+    let shift = shift.min(31);
+    let half = if shift == 0 { 0 } else { 1 };
+    let before = shift.saturating_sub(1);
+    let mut saturated = 0u32;
+    for (word, &sum) in words.iter_mut().zip(sums) {
+        let rounded = (sum >> shift) + (sum >> before & half);
+        let bounded = rounded.clamp(-rail, rail);
+        saturated += u32::from(bounded != rounded);
+        *word = bounded as i16;
+    }
+    u64::from(saturated)
 }
 
 /// Words unit `unit` adds.
@@ -233,6 +258,24 @@ mod tests {
     }
 
     proptest! {
+        #[test]
+        fn sums_side_by_side_are_bounded_as_one(
+            sums in proptest::collection::vec(-(1i32 << 30) + 1..1 << 30, 1..40),
+            small in proptest::collection::vec(-2000i32..2000, 1..40),
+            shift in 0u32..70,
+            bits in 2i64..=9,
+        ) {
+            let bits = ErrorBits::new(bits).unwrap();
+            for sums in [sums, small] {
+                let mut words = vec![0; sums.len()];
+                let saturated = bounded_all(&sums, shift, bits, &mut words);
+                let want = sums.iter().map(|&sum| sat(rsh(i64::from(sum), shift), bits.get()));
+                let want: Vec<_> = want.collect();
+                prop_assert_eq!(saturated, want.iter().map(|w| u64::from(w.1)).sum::<u64>());
+                prop_assert!(words.iter().zip(&want).all(|(&word, w)| i64::from(word) == w.0));
+            }
+        }
+
         #[test]
         fn taps_of_a_unit_never_collide(unit in 0usize..5000, outputs in 1usize..40, taps in 1usize..=4) {
             let taps = taps.min(outputs);

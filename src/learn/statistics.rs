@@ -105,19 +105,27 @@ fn of(array: &Crossbar, hardware: &Hardware, start: &[bool]) -> PathwayStatistic
         idle: [[0; 2]; 3],
         histogram: vec![0; bins],
     };
-    for (i, (level, &was)) in array.levels().zip(start).enumerate() {
-        let (row, column) = (i / layout.columns, i % layout.columns);
-        let is = level == hardware.window.floor();
-        one.floor += u64::from(is);
-        one.zero += u64::from(level == 0);
-        one.births += u64::from(was && !is);
-        one.deaths += u64::from(is && !was);
-        one.levels += u64::from(level);
-        one.histogram[usize::from(level >> bin_shift)] += 1;
-        if !is {
-            rows[row] = false;
-            columns[column] = false;
-            tiles[row / tile_rows * across + column / tile_columns] = false;
+    let floor = hardware.window.floor();
+    let levels: Vec<u16> = array.levels().collect();
+    let by_row = levels.chunks_exact(layout.columns).zip(start.chunks_exact(layout.columns));
+    for (row, (levels, start)) in by_row.enumerate() {
+        let parts = levels.chunks(tile_columns).zip(start.chunks(tile_columns));
+        for (tile, (levels, start)) in parts.enumerate() {
+            let mut idle = true;
+            let columns = &mut columns[tile * tile_columns..];
+            for ((&level, &was), column) in levels.iter().zip(start).zip(columns) {
+                let is = level == floor;
+                one.floor += u64::from(is);
+                one.zero += u64::from(level == 0);
+                one.births += u64::from(was && !is);
+                one.deaths += u64::from(is && !was);
+                one.levels += u64::from(level);
+                one.histogram[usize::from(level >> bin_shift)] += 1;
+                *column &= is;
+                idle &= is;
+            }
+            rows[row] &= idle;
+            tiles[row / tile_rows * across + tile] &= idle;
         }
     }
     let count =

@@ -52,7 +52,7 @@ pub use self::{
     conv::{ConvPlan, ConvScratch, ConvShape, ConvTurned, Image, Pixels},
     data::{
         Banks, Cells, Conversion, Dither, Drives, Extremes, Half, LookUp, Peaks, Pulsed, Scratch,
-        Single, TOGETHER, Write, WriteCounts,
+        Single, TOGETHER, Write, WriteCounts, is_driven,
     },
 };
 
@@ -140,9 +140,9 @@ trait Loops: Copy {
         (turned, stride): (&[u8], usize),
         gates: &[i8],
         sums: &mut Half<i32>,
-        draws: &Draws,
-        (column, block): (usize, usize),
+        (draws, (column, block)): (&Draws, (usize, usize)),
         words: &mut Half<u8>,
+        _soon: &Half<u8>,
     ) {
         self.accumulate(turned, stride, gates, sums);
         self.dither(draws, column, block, words);
@@ -198,12 +198,12 @@ fn apart<L: Loops>(
         let group = start..(start + TOGETHER).min(samples.end);
         for first in (0..blocks).step_by(banks.tile_blocks) {
             let tile = first..(first + banks.tile_blocks).min(blocks);
-            for (bank, out) in scratch.currents[0].iter_mut().enumerate() {
+            for (bank, out) in scratch.currents.iter_mut().enumerate() {
                 let cells = &banks.cells[bank][tile.start * BLOCK_CELLS..tile.end * BLOCK_CELLS];
                 let drives = banks.drives[bank].of_blocks(tile.clone());
                 loops.read(cells, drives, group.clone(), &mut out[..codes.len()]);
             }
-            let [e, i] = [0, 1].map(|bank| &scratch.currents[0][bank][..codes.len()]);
+            let [e, i] = [0, 1].map(|bank| &scratch.currents[bank][..codes.len()]);
             let counts = loops.convert([e, i], banks.conversion, banks.live, codes);
             saturated.iter_mut().zip(counts).for_each(|(sum, count)| *sum += count);
         }
@@ -425,7 +425,7 @@ impl Kernel {
     }
 
     /// [`Kernel::accumulate`] and [`Kernel::dither`] of the half block at `(column, block)`, at once where that
-    /// is faster than one after the other.
+    /// is faster than one after the other. `soon` is what will be wanted next: it may be fetched meanwhile.
     ///
     /// # Panics
     /// When the sizes do not match.
@@ -434,14 +434,15 @@ impl Kernel {
         (turned, stride): (&[u8], usize),
         gates: &[i8],
         sums: &mut Half<i32>,
-        draws: &Draws,
-        at: (usize, usize),
+        from: (&Draws, (usize, usize)),
         words: &mut Half<u8>,
+        soon: &Half<u8>,
     ) {
         assert!(stride > 0 && stride.is_multiple_of(4), "samples are padded to words of four");
         assert_eq!(turned.len(), BLOCK_ROWS * stride, "64 rows");
         assert_eq!(gates.len(), HALF_COLUMNS * stride, "16 columns");
-        with!(self, loops => loops.accumulate_drawn((turned, stride), gates, sums, draws, at, words));
+        let turned = (turned, stride);
+        with!(self, loops => loops.accumulate_drawn(turned, gates, sums, from, words, soon));
     }
 
     /// Groups of four rows, a bit each, with a sum that does not round to 0 whatever its dither word of `bits` bits. In

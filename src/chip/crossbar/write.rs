@@ -7,7 +7,7 @@
 use std::ops::Range;
 
 use super::StripMut;
-use super::kernel::{Cells, Dither, Draws, Half, Kernel, Single, Write, WriteCounts};
+use super::kernel::{Cells, Dither, Draws, Half, Kernel, Single, Write, WriteCounts, is_driven};
 use super::layout::{BLOCK_CELLS, HALF_CELLS, HALF_COLUMNS, PANEL_COLUMNS};
 use super::pulses::{Collect, Collected, Collector, RowPeaks};
 use crate::chip::hardware::{DitherBits, DitherPattern};
@@ -15,6 +15,10 @@ use crate::num::draw::Place;
 
 /// 64-bit words of pruned bits in a half block.
 const HALF_WORDS: usize = HALF_CELLS / 64;
+
+/// Loud groups of a half block, at least, that let the next [`UNASKED`] be written without asking which of theirs are.
+const LOUD: u32 = 14;
+const UNASKED: usize = 7;
 
 /// Everything a write needs beside the cells and gates.
 #[derive(Debug, Clone, Copy)]
@@ -59,40 +63,53 @@ impl StripMut<'_> {
     pub fn write(&mut self, kernel: &Kernel, request: &WriteRequest<'_>, gates: &[i8]) -> Written {
         let stride = request.stride;
         let mut counts = WriteCounts::default();
-        let mut sums = Sums([0; HALF_CELLS]);
         let Range { start, end } = self.panels();
         let draws = Draws::new(request.place, self.layout.rows);
         if let Some(written) = self.write_single(kernel, request, gates, &draws) {
             return written;
         }
+        let mut sums = Sums([0; HALF_CELLS]);
         let columns = start * PANEL_COLUMNS..end * PANEL_COLUMNS;
         let mut collector = Collector::new(request.collect, self.layout, columns.clone());
         let mut words = Words::new(draws, columns);
         let live: Vec<_> = gates
             .chunks_exact(HALF_COLUMNS * stride)
             .enumerate()
-            .filter(|(_, gates)| gates.iter().any(|&gate| gate != 0))
+            .filter(|(_, gates)| is_driven(gates))
             .collect();
         // words are drawn beside the sums while sums are loud: then they are rarely drawn for nothing
         let bytes = (request.dither_bits, request.dither_pattern);
         let mut ahead = bytes == (DitherBits::Eight, DitherPattern::PerCell);
         let may_be_ahead = ahead;
+        let mut unasked = 0;
+        let mut write = request.write;
         for (block, turned) in request.turned.iter().enumerate() {
             let Some(turned) = turned else { continue };
             for &(half, gates) in &live {
                 let column = self.first * PANEL_COLUMNS + half * HALF_COLUMNS;
+                // made before the sums: what is put together behind tiles that are being stored waits for them
+                let mut cells = self.half(half, block);
+                cells.pulses = collector.half(kernel, (column, block));
                 let drawn = ahead;
                 if drawn {
                     let turned = (*turned, stride);
                     let Words { bytes, draws, .. } = &mut words;
-                    let at = (column, block);
-                    kernel.accumulate_drawn(turned, gates, &mut sums.0, draws, at, bytes);
+                    let (from, soon) = ((&*draws, (column, block)), &*cells.low);
+                    kernel.accumulate_drawn(turned, gates, &mut sums.0, from, bytes, soon);
                 } else {
                     kernel.accumulate(turned, stride, gates, &mut sums.0);
                 }
-                let groups = kernel.loud(&sums.0, &request.write, request.dither_bits.get());
-                ahead = may_be_ahead && groups != 0;
-                if groups == 0 {
+                write.groups = if drawn && unasked > 0 {
+                    unasked -= 1;
+                    u16::MAX
+                } else {
+                    kernel.loud(&sums.0, &write, request.dither_bits.get())
+                };
+                if unasked == 0 && write.groups.count_ones() >= LOUD {
+                    unasked = UNASKED;
+                }
+                ahead = may_be_ahead && write.groups != 0;
+                if write.groups == 0 {
                     continue;
                 }
                 let dither = if drawn {
@@ -100,11 +117,8 @@ impl StripMut<'_> {
                 } else {
                     words.draw(kernel, request, column, block)
                 };
-                let mut cells = self.half(half, block);
-                cells.pulses = collector.half(kernel, (column, block));
-                let write = Write { groups, ..request.write };
                 counts += kernel.program(cells, &sums.0, &write, dither);
-                collector.take(kernel, (column, block), groups);
+                collector.take(kernel, (column, block), write.groups);
             }
         }
         Written { counts, collected: collector.finish(kernel) }

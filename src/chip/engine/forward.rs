@@ -10,12 +10,14 @@
 //! ledger counts slices and tiles all the same. See docs/MODEL.md, 2.
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
+use std::ops::Range;
+
 use super::Engine;
 use super::each::each;
 use super::read::{Histogram, Mode, Part, Reader, Seen};
 use crate::chip::crossbar::kernel::{Kernel, LookUp, Scratch, TOGETHER};
 use crate::chip::crossbar::layout::{BLOCK_ROWS, PANEL_COLUMNS};
-use crate::chip::hardware::{Adc, Subtract};
+use crate::chip::hardware::{Adc, Hardware, Subtract};
 use crate::chip::ledger::{During, Event};
 use crate::chip::periphery;
 use crate::chip::population::Stream;
@@ -76,7 +78,8 @@ impl Engine {
             };
             let last = layer + 1 == self.layers.len();
             let mut accumulators = last.then(|| own.accumulators.chunks_mut(samples * BLOCK_ROWS));
-            let mut outs = Vec::new();
+            let mut outs: Vec<Vec<Out<'_>>> = Vec::new();
+            let together = blocks_together(&self.hardware);
             let [p, n] = &mut own.derivatives;
             for (&target, derivatives) in wiring.targets().iter().zip([p, n]) {
                 derivatives.resize(size, 0);
@@ -88,15 +91,19 @@ impl Engine {
                         Stream::P => accumulators.as_mut().and_then(Iterator::next),
                         Stream::N => None,
                     };
-                    outs.push(Out { target, block, values, derivatives, accumulators });
+                    let out = Out { target, block, values, derivatives, accumulators };
+                    match outs.last_mut() {
+                        Some(last) if block % together > 0 => Vec::push(last, out),
+                        _ => outs.push(vec![out]),
+                    }
                 }
             }
             let (backend, table) = (self.backend, &self.tables[layer]);
             let work = samples * this.layout.cells() * wiring.pathways().len();
-            let seen = each(work, outs, |out| {
+            let seen = each(work, outs, |outs| {
                 let kernel = Kernel::start(backend);
-                let target = out.target.index();
-                (target, put_out(&kernel, &readers[target], table, samples, out))
+                let target = outs[0].target.index();
+                (target, put_out(&kernel, &readers[target], table, samples, outs))
             });
             drop(readers);
             let mut total = vec![Seen::default(); wiring.targets().len()];
@@ -165,60 +172,91 @@ impl Engine {
     }
 }
 
-/// Reads a block of 64 units and looks it up, some samples at a time.
+/// Blocks of units read together: where each drive is cut into many slices that are converted, the slices of a few
+/// samples are more than the cells of these blocks, and stay near.
+fn blocks_together(hardware: &Hardware) -> usize {
+    let cut = hardware.adc != Adc::Ideal && hardware.slices() > 2;
+    if cut { 4 } else { 1 }
+}
+
+/// Reads some blocks of 64 units and looks them up, some samples at a time: all panels, while their drives are near.
 fn put_out(
     kernel: &Kernel,
     reader: &Reader<'_>,
     table: &LookUp,
     samples: usize,
-    out: Out<'_>,
+    mut outs: Vec<Out<'_>>,
 ) -> Seen {
     let mut seen = Seen::new(reader);
     let mut scratch = Scratch::new();
     let mut sums = [0; Scratch::SUMS];
-    let Out { block, values, derivatives, mut accumulators, .. } = out;
-    for half in 0..2 {
-        let (panel, from) = (2 * block + half, half * PANEL_COLUMNS);
-        let live = reader.columns.saturating_sub(panel * PANEL_COLUMNS).min(PANEL_COLUMNS);
-        if live == 0 {
-            for row in values.chunks_exact_mut(BLOCK_ROWS) {
-                row[from..from + PANEL_COLUMNS].fill(0);
-            }
-            for row in derivatives.chunks_exact_mut(BLOCK_ROWS) {
-                row[from..from + PANEL_COLUMNS].fill(0);
-            }
-            continue;
-        }
-        for start in (0..samples).step_by(TOGETHER) {
-            let group = start..(start + TOGETHER).min(samples);
-            let part = Part { panel, live, samples: group.clone() };
-            let at = start * BLOCK_ROWS + from;
-            let (values, derivatives) = (&mut values[at..], &mut derivatives[at..]);
-            let kept = accumulators.as_deref_mut().map(|all| &mut all[at..]);
-            if reader.is_narrow() {
-                let sums = &mut sums[..group.len() * PANEL_COLUMNS];
-                reader.read_narrow(kernel, &part, &mut scratch, sums, &mut seen);
-                seen.look_ups += kernel.look_up(sums, table, live, values, derivatives);
-                keep(kept, sums.iter().map(|&sum| i64::from(sum)));
-            } else {
-                let mut sums = [0; Scratch::SUMS];
-                let sums = &mut sums[..group.len() * PANEL_COLUMNS];
-                reader.read_wide(kernel, &part, sums, &mut seen);
-                let half = (table.entries.len() / 2) as i64;
-                for (sample, sums) in sums.chunks_exact(PANEL_COLUMNS).enumerate() {
-                    for (column, &sum) in sums.iter().enumerate() {
-                        let (index, saturated) = periphery::index(sum, table.shift, half);
-                        let entry = if column < live { table.entries[index] } else { 0 };
-                        let at = sample * BLOCK_ROWS + column;
-                        [values[at], derivatives[at], ..] = entry.to_le_bytes();
-                        seen.look_ups += u64::from(column < live && saturated);
-                    }
-                }
-                keep(kept, sums.iter().copied());
-            }
+    for start in (0..samples).step_by(TOGETHER) {
+        let group = start..(start + TOGETHER).min(samples);
+        for out in &mut outs {
+            put_out_group(kernel, reader, table, out, &group, (&mut scratch, &mut sums), &mut seen);
         }
     }
     seen
+}
+
+/// Reads the two panels of a block for a group of samples.
+fn put_out_group(
+    kernel: &Kernel,
+    reader: &Reader<'_>,
+    table: &LookUp,
+    out: &mut Out<'_>,
+    group: &Range<usize>,
+    (scratch, sums): (&mut Scratch, &mut [i32; Scratch::SUMS]),
+    seen: &mut Seen,
+) {
+    let cells = group.len() * PANEL_COLUMNS;
+    for half in 0..2 {
+        let (panel, from) = (2 * out.block + half, half * PANEL_COLUMNS);
+        let live = reader.columns.saturating_sub(panel * PANEL_COLUMNS).min(PANEL_COLUMNS);
+        let at = group.start * BLOCK_ROWS + from;
+        let (values, derivatives) = (&mut out.values[at..], &mut out.derivatives[at..]);
+        if live == 0 {
+            for rows in [values, derivatives] {
+                let rows = rows.chunks_mut(BLOCK_ROWS).take(group.len());
+                rows.for_each(|row| row[..PANEL_COLUMNS].fill(0));
+            }
+            continue;
+        }
+        let part = Part { panel, live, samples: group.clone() };
+        let kept = out.accumulators.as_deref_mut().map(|all| &mut all[at..]);
+        if reader.is_narrow() {
+            let sums = &mut sums[..cells];
+            reader.read_narrow(kernel, &part, scratch, sums, seen);
+            seen.look_ups += kernel.look_up(sums, table, live, values, derivatives);
+            keep(kept, sums.iter().map(|&sum| i64::from(sum)));
+        } else {
+            let mut sums = [0; Scratch::SUMS];
+            let sums = &mut sums[..cells];
+            reader.read_wide(kernel, &part, sums, seen);
+            look_up_wide(sums, table, live, [values, derivatives], seen);
+            keep(kept, sums.iter().copied());
+        }
+    }
+}
+
+/// Looks up accumulators (`[sample][32]`) of any size; values and derivatives lie `[sample][64]`.
+fn look_up_wide(
+    sums: &[i64],
+    table: &LookUp,
+    live: usize,
+    [values, derivatives]: [&mut [u8]; 2],
+    seen: &mut Seen,
+) {
+    let half = (table.entries.len() / 2) as i64;
+    for (sample, sums) in sums.chunks_exact(PANEL_COLUMNS).enumerate() {
+        for (column, &sum) in sums.iter().enumerate() {
+            let (index, saturated) = periphery::index(sum, table.shift, half);
+            let entry = if column < live { table.entries[index] } else { 0 };
+            let at = sample * BLOCK_ROWS + column;
+            [values[at], derivatives[at], ..] = entry.to_le_bytes();
+            seen.look_ups += u64::from(column < live && saturated);
+        }
+    }
 }
 
 /// Keeps a panel's accumulators, `[sample][64]`.

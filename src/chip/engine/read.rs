@@ -187,7 +187,7 @@ impl<'a> Reader<'a> {
             return;
         }
         let ([e], [i]) = (&excites[..], &inhibits[..]) else { unreachable!("read in one piece") };
-        for ((array, read), out) in self.arrays.iter().zip([e, i]).zip(&mut scratch.currents[0]) {
+        for ((array, read), out) in self.arrays.iter().zip([e, i]).zip(&mut scratch.currents) {
             let out = &mut out[..sums.len()];
             let drives = Drives::new(&read.codes, self.samples);
             kernel.read(array.low(panel, read.blocks.clone()), drives, samples.clone(), out);
@@ -196,7 +196,7 @@ impl<'a> Reader<'a> {
                 out.iter_mut().zip(&*sums).for_each(|(out, above)| *out += above << 8);
             }
         }
-        let [e, i] = &scratch.currents[0];
+        let [e, i] = &scratch.currents;
         kernel.difference([&e[..sums.len()], &i[..sums.len()]], sums);
     }
 

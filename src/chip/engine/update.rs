@@ -218,7 +218,7 @@ impl Engine {
         blocks
             .map(|(codes, turned)| {
                 let codes = &codes[samples.start * BLOCK_ROWS..samples.end * BLOCK_ROWS];
-                let live = codes.iter().any(|&code| code != 0);
+                let live = kernel::is_driven(codes);
                 if live {
                     kernel.turn(codes, size / BLOCK_ROWS, turned);
                 }

@@ -15,7 +15,7 @@ use crate::chip::crossbar::layout::{HALF_CELLS, HALF_COLUMNS, Layout, PANEL_COLU
 const SHAPES: [[usize; 3]; 4] = [[64, 64, 32], [64, 128, 32], [128, 256, 32], [128, 256, 8]];
 const BATCH: usize = 8;
 /// Positions whose sums are used before the next are read.
-const POSITIONS: usize = 256;
+const POSITIONS: usize = 128;
 
 const COLUMNS: &[Column] = &[
     shown("channels", "channels", 0),

@@ -123,21 +123,26 @@ fn converted<'a>(
     let most = (tile_blocks * BLOCK_ROWS * 255) as u32 * ((1 << drive_bits) - 1);
     let shift = (32 - most.leading_zeros()).saturating_sub(ADC_BITS);
     let mut scratch = Scratch::new();
+    let all: Vec<usize> = (0..panels).collect();
     Arm::here(move || {
-        for panel in 0..panels {
-            let live = layout.columns.saturating_sub(panel * PANEL_COLUMNS).min(PANEL_COLUMNS);
-            for drives in &slices {
-                let banks = Banks {
-                    cells: arrays.each_ref().map(|array| array.low(panel, 0..layout.blocks())),
-                    drives: *drives,
-                    tile_blocks,
-                    conversion: Conversion { shift, max: (1 << ADC_BITS) - 1 },
-                    live,
-                };
-                for group in groups(BATCH) {
+        // as the engine reads: some samples, the panels of 64 units, or of 256 with many slices, and then the slices
+        let units = if slices.len() > 2 { 256 } else { 64 };
+        for panels in all.chunks(units / PANEL_COLUMNS) {
+            for (group, &panel) in
+                groups(BATCH).flat_map(|g| panels.iter().map(move |p| (g.clone(), p)))
+            {
+                let live = layout.columns.saturating_sub(panel * PANEL_COLUMNS).min(PANEL_COLUMNS);
+                for drives in &slices {
+                    let banks = Banks {
+                        cells: arrays.each_ref().map(|array| array.low(panel, 0..layout.blocks())),
+                        drives: *drives,
+                        tile_blocks,
+                        conversion: Conversion { shift, max: (1 << ADC_BITS) - 1 },
+                        live,
+                    };
                     let mut codes = [0i16; Scratch::SUMS];
                     let codes = &mut codes[..group.len() * PANEL_COLUMNS];
-                    black_box(kernel.read_converted(&banks, group, &mut scratch, codes));
+                    black_box(kernel.read_converted(&banks, group.clone(), &mut scratch, codes));
                     black_box(codes);
                 }
             }

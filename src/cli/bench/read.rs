@@ -111,7 +111,7 @@ pub(super) fn read_panel(
 ) {
     let cells = array.low(panel, 0..drives.blocks());
     for group in groups(drives.samples()) {
-        let out = &mut scratch.currents[0][0][..group.len() * PANEL_COLUMNS];
+        let out = &mut scratch.currents[0][..group.len() * PANEL_COLUMNS];
         kernel.read(cells, drives, group, out);
         black_box(out);
     }

@@ -17,6 +17,7 @@ use std::cell::Cell;
 use std::ops::Range;
 use std::sync::OnceLock;
 
+use self::drawn::Factors;
 use self::fused::TileBank;
 use self::product::{Walk, half_block, levels_by_drives, levels_by_gates, pair};
 use super::avx512::{self, Avx512};
@@ -28,6 +29,7 @@ use crate::chip::crossbar::layout::{BLOCK_CELLS, BLOCK_ROWS, HALF_CELLS, Layout,
 use crate::num::fixed::ErrorBits;
 
 mod conv;
+mod drawn;
 mod fused;
 mod product;
 
@@ -201,7 +203,7 @@ impl Loops for &Tiles {
         let beyond = samples.start + whole..samples.end;
         let mut saturated =
             if rest.is_empty() { [0; 2] } else { apart(self, banks, beyond, scratch, rest) };
-        let sums = &mut scratch.currents[0];
+        let sums = &mut scratch.currents;
         for (group, codes) in these.as_chunks_mut::<{ Scratch::SUMS }>().0.iter_mut().enumerate() {
             let first = (samples.start + group * TOGETHER) * BLOCK_ROWS;
             let mut packed = Packed { codes: [0; Scratch::SUMS], saturated: [[0; 32]; 2] };
@@ -288,17 +290,17 @@ impl Loops for &Tiles {
         (turned, stride): (&[u8], usize),
         gates: &[i8],
         sums: &mut Half<i32>,
-        draws: &Draws,
-        (column, block): (usize, usize),
+        (draws, (column, block)): (&Draws, (usize, usize)),
         words: &mut Half<u8>,
+        soon: &Half<u8>,
     ) {
         if !stride.is_multiple_of(64) {
             self.0.accumulate(turned, stride, gates, sums);
             return self.0.dither(draws, column, block, words);
         }
         let counter = draws.counter(64, column, block);
-        let gates = avx512::as_bytes(gates);
-        fused::half_block_drawn(self, turned, gates, sums, draws, counter, words);
+        let factors = Factors { turned, gates: avx512::as_bytes(gates) };
+        drawn::half_block_drawn(self, factors, sums, (draws, counter), words, soon);
     }
 
     fn accumulate(self, turned: &[u8], stride: usize, gates: &[i8], sums: &mut Half<i32>) {

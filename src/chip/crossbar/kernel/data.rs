@@ -95,12 +95,12 @@ pub struct Banks<'a> {
 /// Samples that are read together, so that their sums stay close to the processor.
 pub const TOGETHER: usize = 32;
 
-/// Currents of two banks of a panel for [`TOGETHER`] samples, of two tiles, where matrix tiles are stored fastest.
+/// Currents of two banks of a panel for [`TOGETHER`] samples, where matrix tiles are stored fastest.
 #[derive(Debug, Clone)]
 #[repr(align(64))]
 pub struct Scratch {
-    /// `[sample][32]` by tile and bank.
-    pub currents: [[[i32; Self::SUMS]; 2]; 2],
+    /// `[sample][32]` by bank.
+    pub currents: [[i32; Self::SUMS]; 2],
 }
 
 impl Scratch {
@@ -110,7 +110,7 @@ impl Scratch {
     /// Zeros.
     #[must_use]
     pub const fn new() -> Self {
-        Self { currents: [[[0; Self::SUMS]; 2]; 2] }
+        Self { currents: [[0; Self::SUMS]; 2] }
     }
 }
 
@@ -123,7 +123,7 @@ impl Default for Scratch {
 /// Codes and saturation counts of a panel for [`TOGETHER`] samples, in the order in which 512-bit vectors are packed.
 #[cfg(target_arch = "x86_64")]
 #[derive(Debug)]
-#[repr(align(64))]
+#[repr(C, align(64))]
 pub(super) struct Packed {
     pub(super) codes: [i16; Scratch::SUMS],
     pub(super) saturated: [[i16; PANEL_COLUMNS]; 2],
@@ -282,4 +282,11 @@ impl std::ops::AddAssign for WriteCounts {
         self.attempted += other.attempted;
         self.effective += other.effective;
     }
+}
+
+/// Whether some drives or gates are not 0, looked at many at a time.
+#[must_use]
+pub fn is_driven<T: Copy + Default + std::ops::BitOr<Output = T> + PartialEq>(codes: &[T]) -> bool {
+    let any = |part: &[T]| part.iter().fold(T::default(), |all, &code| all | code) != T::default();
+    codes.chunks(256).any(any)
 }

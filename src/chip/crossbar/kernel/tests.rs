@@ -190,7 +190,8 @@ fn check_accumulate(stride: usize, seed: u64) {
         let place = Place::global(seed, Site::WriteDither, 3);
         let (mut sums, mut words, mut bytes) = ([9; HALF_CELLS], [3; HALF_CELLS], [4; HALF_CELLS]);
         let draws = Draws::new(place, 70 + seed as usize % 200);
-        kernel.accumulate_drawn((&turned, stride), &gates, &mut sums, &draws, (16, 1), &mut words);
+        let (turned, soon) = ((&turned[..], stride), [0; HALF_CELLS]);
+        kernel.accumulate_drawn(turned, &gates, &mut sums, (&draws, (16, 1)), &mut words, &soon);
         law().dither(&draws, 16, 1, &mut bytes);
         assert!(sums == want && words == bytes, "{name} {stride} drawn");
     }
@@ -420,6 +421,20 @@ fn a_zero_sum_moves_nothing_whatever_the_word() {
                     assert_eq!(kernel.loud(&sums, &write, 8), 0);
                 }
             }
+        }
+    }
+}
+
+#[test]
+fn sums_at_the_edge_of_rounding_to_nothing_are_loud_on_one_side() {
+    for (shift, bits) in (0..=31u32).flat_map(|k| [0, 8, 16].map(|bits| (k, bits))) {
+        let half = 1i64 << shift.saturating_sub(bits) >> 1;
+        let edges = [-half - 1, -half, half - 1, half].map(|edge| edge as i32);
+        let sums = std::array::from_fn(|i| if i % 64 == 17 { edges[i / 64 % 4] } else { 0 });
+        let write = Write { shift, ..PLAIN };
+        let want = law().loud(&sums, &write, bits);
+        for (name, kernel) in others() {
+            assert_eq!(kernel.loud(&sums, &write, bits), want, "{name} {shift}");
         }
     }
 }

@@ -24,12 +24,11 @@ const TILE: usize = 16;
 #[repr(align(64))]
 struct Aside([i32; Scratch::SUMS]);
 
-/// Sixteen pixels that begin at `pixel`, and which of them are positions: `rows` of the first `count`.
-#[derive(Clone)]
+/// Sixteen pixels that begin at `pixel`, and which of them are positions: a bit each.
+#[derive(Debug, Clone, Copy)]
 struct Run {
     pixel: usize,
-    rows: [usize; TILE],
-    count: usize,
+    rows: u16,
 }
 
 impl Run {
@@ -38,20 +37,36 @@ impl Run {
     fn take(steps: &mut Steps, stride: usize, left: usize, last: usize) -> Option<Self> {
         let from = steps.pixel();
         if from <= last && left >= TILE && steps.pass(TILE) {
-            return Some(Self { pixel: from, rows: std::array::from_fn(|row| row), count: TILE });
+            return Some(Self { pixel: from, rows: u16::MAX });
         }
         let back = from.saturating_sub(last).div_ceil(stride) * stride;
-        let mut run = Self { pixel: from.checked_sub(back)?, rows: [0; TILE], count: 0 };
+        let mut run = Self { pixel: from.checked_sub(back)?, rows: 0 };
         let mut pixel = run.pixel;
         for row in 0..TILE {
-            if steps.pixel() == pixel && run.count < left {
-                run.rows[run.count] = row;
-                run.count += 1;
+            if steps.pixel() == pixel && run.count() < left {
+                run.rows |= 1 << row;
                 steps.pass(1);
             }
             pixel += stride;
         }
         Some(run)
+    }
+
+    /// All runs of some positions, from the first on.
+    fn all(steps: &mut Steps, stride: usize, positions: usize, last: usize) -> Option<Vec<Self>> {
+        let mut runs = Vec::with_capacity(positions.div_ceil(TILE) + 1);
+        let mut left = positions;
+        while left > 0 {
+            let run = Self::take(steps, stride, left, last)?;
+            left -= run.count();
+            runs.push(run);
+        }
+        Some(runs)
+    }
+
+    /// Positions it holds.
+    const fn count(self) -> usize {
+        self.rows.count_ones() as usize
     }
 }
 
@@ -64,42 +79,36 @@ pub(super) fn read(
     positions: Range<usize>,
     out: &mut [i32],
 ) -> bool {
-    let stride = image.plan().shape().stride;
-    let walk = Walk::new(offsets, stride);
+    let shape = image.plan().shape();
+    let walk = Walk::new(offsets, shape.stride);
     let Some(last) = image.codes().len().checked_sub(walk.reach).map(|last| last / BLOCK_ROWS)
     else {
         return false;
     };
-    let mut steps = image.plan().shape().steps(positions.start);
+    // all runs first: what is put together behind tiles that are being stored waits for them
+    let steps = &mut shape.steps(positions.start);
+    let Some(runs) = Run::all(steps, shape.stride, positions.len(), last) else { return false };
     let mut aside = Aside([0; Scratch::SUMS]);
-    let (mut left, mut out) = (positions.len(), out);
-    while left > 0 {
-        let Some(one) = Run::take(&mut steps, stride, left, last) else { return false };
-        left -= one.count;
-        let two = match left {
-            0 => None,
-            left => Run::take(&mut steps, stride, left, last),
-        };
-        left -= two.as_ref().map_or(0, |two| two.count);
-        let pixels = |run: &Run| &image.codes()[run.pixel * BLOCK_ROWS..];
-        let (first, second) = (&one, two.as_ref().unwrap_or(&one));
-        let a = [pixels(first), pixels(second)];
-        let (these, rest) =
-            out.split_at_mut((one.count + two.as_ref().map_or(0, |two| two.count)) * PANEL_COLUMNS);
+    let mut out = out;
+    for runs in runs.chunks(2) {
+        let [first, second] = [runs[0], runs[runs.len() - 1]];
+        let a = [first, second].map(|run| &image.codes()[run.pixel * BLOCK_ROWS..]);
+        let count = runs.iter().map(|run| run.count()).sum::<usize>();
+        let (these, rest) = out.split_at_mut(count * PANEL_COLUMNS);
         out = rest;
-        if these.len() == Scratch::SUMS {
-            // 32 positions: every row of both tiles is one
+        if count == 2 * TILE {
+            // every row of both tiles is one
             quad(tiles, &walk, a, cells, these);
             continue;
         }
         quad(tiles, &walk, a, cells, &mut aside.0);
-        let rows = [Some(first), two.as_ref()];
-        let rows = rows.iter().enumerate().flat_map(|(tile, run)| {
-            run.iter()
-                .flat_map(move |run| run.rows[..run.count].iter().map(move |r| tile * TILE + r))
-        });
-        for (row, these) in rows.zip(these.as_chunks_mut::<PANEL_COLUMNS>().0) {
-            these.copy_from_slice(&aside.0[row * PANEL_COLUMNS..][..PANEL_COLUMNS]);
+        let mut these = these.as_chunks_mut::<PANEL_COLUMNS>().0.iter_mut();
+        for (run, sums) in runs.iter().zip(aside.0.as_chunks::<{ TILE * PANEL_COLUMNS }>().0) {
+            for (row, sums) in sums.as_chunks::<PANEL_COLUMNS>().0.iter().enumerate() {
+                if run.rows >> row & 1 == 1 {
+                    *these.next().expect("a place for each position") = *sums;
+                }
+            }
         }
     }
     true

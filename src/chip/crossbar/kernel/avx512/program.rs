@@ -123,7 +123,7 @@ fn usual_cells<const SCALE: u8, const FULL: bool>(
 ) -> WriteCounts {
     let scale = scale::<BYTE>(write, write.shift);
     let Tally { most, least, floor, ceiling, flip, .. } = tally(write, window);
-    let one = _mm512_set1_epi8(1);
+    let less_one = _mm512_set1_epi8(-1);
     let zero = _mm512_setzero_si512();
     let (mut requested, mut attempted, mut effective, mut held) = (zero, zero, zero, zero);
     let (all_sums, all_words) = (sums.as_chunks::<64>().0, words.as_chunks::<64>().0);
@@ -146,7 +146,8 @@ fn usual_cells<const SCALE: u8, const FULL: bool>(
             pulses::take(out, group, pulses);
         }
         let size = _mm512_abs_epi8(pulses);
-        requested = _mm512_add_epi8(requested, _mm512_min_epu8(size, one));
+        let some = _mm512_test_epi8_mask(pulses, pulses);
+        requested = _mm512_mask_sub_epi8(requested, some, requested, less_one);
         attempted = _mm512_add_epi8(attempted, size);
         effective = _mm512_add_epi64(effective, _mm512_sad_epu8(level, before));
         // held | (wanted ^ pulses)
@@ -161,10 +162,18 @@ fn usual_cells<const SCALE: u8, const FULL: bool>(
             bounded += _mm512_cmpneq_epi8_mask(wanted, pulses).count_ones();
         }
     }
-    let [requested, attempted] = [requested, attempted]
-        .map(|bytes| _mm512_reduce_add_epi64(_mm512_sad_epu8(bytes, zero)).cast_unsigned());
-    let effective = _mm512_reduce_add_epi64(effective).cast_unsigned();
-    WriteCounts { requested, bounded: bounded.into(), attempted, effective }
+    // none of the three reaches 2^20: added up as one number
+    let [requested, attempted] = [requested, attempted].map(|bytes| _mm512_sad_epu8(bytes, zero));
+    let upper = _mm512_add_epi64(_mm512_slli_epi64::<20>(effective), attempted);
+    let all = _mm512_add_epi64(_mm512_slli_epi64::<20>(upper), requested);
+    let all = _mm512_reduce_add_epi64(all).cast_unsigned();
+    let part = |at: u32| all >> (20 * at) & 0xf_ffff;
+    WriteCounts {
+        requested: part(0),
+        bounded: bounded.into(),
+        attempted: part(1),
+        effective: part(2),
+    }
 }
 
 /// Increments of 64 cells before the bound, in the order of levels.
@@ -451,10 +460,14 @@ pub(super) fn loud(sums: &Half<i32>, write: &Write, bits: u32) -> u16 {
 
 #[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi,popcnt")]
 fn loud_groups<const SCALE: u8>(sums: &Half<i32>, write: &Write, bits: u32) -> u16 {
-    let by = write.shift.saturating_sub(write.residual_bits).saturating_sub(bits).min(30);
-    let half = _mm512_set1_epi32(1 << by >> 1);
+    let by = write.shift.saturating_sub(write.residual_bits).saturating_sub(bits);
+    if by > 31 {
+        return 0; // every sum rounds to 0
+    }
+    // at 31 a sum that is too large wraps, and has the top bit as one that is too small
+    let half = _mm512_set1_epi32((1u32 << by >> 1).cast_signed());
     // all bits of a loud sum that a quiet one does not have
-    let beyond = _mm512_set1_epi32(-(1 << by));
+    let beyond = _mm512_set1_epi32(u32::MAX.wrapping_shl(by).cast_signed());
     let mantissa = if write.negate { -write.mantissa } else { write.mantissa };
     let mantissa = _mm512_set1_epi32(mantissa);
     let mut loud = 0;

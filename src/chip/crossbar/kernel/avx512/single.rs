@@ -6,6 +6,9 @@
 //! quiet    |x * u| < 2^(s - 1):  q = 0, and no word makes a pulse of it
 //! ```
 //!
+//! From `s = 7` on a pulse is at most one, and the gate times `2^(15 - s)` fits 16 bits: one product gives `q`. With a
+//! window of all levels, where the addition saturates, this is the usual case (`USUAL`).
+//!
 //! A column whose gate times the greatest drive of the block is quiet needs no words, and a group of four rows whose
 //! greatest drive times the greatest gate is quiet is passed over. ChaCha runs for 16 live columns at a time, from
 //! wherever they lie in the strip; a permutation puts their words beside their cells. Lanes of columns that are not live
@@ -35,7 +38,7 @@ struct Words([[i32; ROOM]; 16]);
 struct Gates {
     /// Size of each.
     sizes: __m512i,
-    /// With the sign of the pathway, twice in each lane.
+    /// With the sign of the pathway, twice in each lane; times the factor if `USUAL`.
     twice: __m512i,
     most: u32,
 }
@@ -53,11 +56,11 @@ struct Rounding {
 /// See [`super::super::Kernel::single`].
 #[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi,popcnt")]
 pub(super) fn single(strip: Single<'_>) -> Option<WriteCounts> {
-    let Single { low, blocks, turned, gates, column, draws, write, mut peaks } = strip;
+    let write = strip.write;
     let (Ok(floor), Ok(ceiling)) = (u8::try_from(write.floor), u8::try_from(write.ceiling)) else {
         return None;
     };
-    let halves = gates.len() / 64;
+    let halves = strip.gates.len() / 64;
     if write.mantissa != 1 || !(9..=23).contains(&write.shift) || halves > HALVES {
         return None;
     }
@@ -66,6 +69,20 @@ pub(super) fn single(strip: Single<'_>) -> Option<WriteCounts> {
     if reach > write.increment_max.min(15) {
         return None;
     }
+    Some(match (reach, floor, ceiling) {
+        (..=1, 0, 255) => strip_of::<true>(strip, right, (floor, ceiling)),
+        _ => strip_of::<false>(strip, right, (floor, ceiling)),
+    })
+}
+
+#[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi,popcnt")]
+fn strip_of<const USUAL: bool>(
+    strip: Single<'_>,
+    right: u32,
+    (floor, ceiling): (u8, u8),
+) -> WriteCounts {
+    let Single { low, blocks, turned, gates, column, draws, write, mut peaks } = strip;
+    let halves = gates.len() / 64;
     let zero = _mm512_setzero_si512();
     let least_loud = 1u32 << (right - 1);
     let rounding = Rounding {
@@ -76,7 +93,7 @@ pub(super) fn single(strip: Single<'_>) -> Option<WriteCounts> {
     };
     let mut all = [Gates { sizes: zero, twice: zero, most: 0 }; HALVES];
     for (all, gates) in all.iter_mut().zip(as_bytes(gates).as_chunks::<64>().0) {
-        *all = gates_of(gates, write.negate);
+        *all = gates_of(gates, write.negate, if USUAL { 15 - right } else { 0 });
     }
     let all = &all[..halves];
     let mut words = Words([[0; ROOM]; 16]);
@@ -121,24 +138,29 @@ pub(super) fn single(strip: Single<'_>) -> Option<WriteCounts> {
                 groups &= groups - 1;
                 let row: &[i32; 16] = words.0[group][starts[half]..].first_chunk().expect("room");
                 let word = _mm512_permutexvar_epi32(places, load_sums(row));
-                let pulses =
-                    pulses(drives.even[group], drives.odd[group], gates.twice, word, rounding);
+                let drives = [drives.even[group], drives.odd[group]];
+                let pulses = pulses::<USUAL>(drives, gates.twice, word, rounding);
                 let before = load(&low[group]);
                 if let Some(extremes) = &mut extremes {
                     take(&mut Pulsed::Most(extremes), group, pulses);
                 }
-                let level = _mm512_adds_epi8(_mm512_xor_si512(before, rounding.flip), pulses);
-                let level =
-                    _mm512_max_epi8(_mm512_min_epi8(level, rounding.ceiling), rounding.floor);
+                let mut level = _mm512_adds_epi8(_mm512_xor_si512(before, rounding.flip), pulses);
+                if !USUAL {
+                    level =
+                        _mm512_max_epi8(_mm512_min_epi8(level, rounding.ceiling), rounding.floor);
+                }
                 let level = _mm512_xor_si512(level, rounding.flip);
                 store(&mut low[group], level);
                 let size = _mm512_abs_epi8(pulses);
                 sizes = _mm512_add_epi8(sizes, size);
-                pulsed = _mm512_add_epi8(pulsed, _mm512_min_epu8(size, _mm512_set1_epi8(1)));
+                if !USUAL {
+                    pulsed = _mm512_add_epi8(pulsed, _mm512_min_epu8(size, _mm512_set1_epi8(1)));
+                }
                 effective = _mm512_add_epi64(effective, _mm512_sad_epu8(level, before));
             }
             // 16 groups of pulses up to 15 fit a byte
             attempted = _mm512_add_epi64(attempted, _mm512_sad_epu8(sizes, zero));
+            let pulsed = if USUAL { sizes } else { pulsed };
             requested = _mm512_add_epi64(requested, _mm512_sad_epu8(pulsed, zero));
         }
         if let (Some(rows), Some(extremes)) = (&mut peaks, &mut extremes)
@@ -152,7 +174,7 @@ pub(super) fn single(strip: Single<'_>) -> Option<WriteCounts> {
     }
     let [requested, attempted, effective] = [requested, attempted, effective]
         .map(|lanes| _mm512_reduce_add_epi64(lanes).cast_unsigned());
-    Some(WriteCounts { requested, bounded: 0, attempted, effective })
+    WriteCounts { requested, bounded: 0, attempted, effective }
 }
 
 /// The number of each lane.
@@ -162,13 +184,14 @@ fn lanes() -> __m512i {
     _mm512_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15)
 }
 
-/// Gates of 16 columns: the first byte of four.
+/// Gates of 16 columns: the first byte of four. What products take is times `2^by`.
 #[inline]
 #[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi,popcnt")]
-fn gates_of(gates: &[u8; 64], negate: bool) -> Gates {
+fn gates_of(gates: &[u8; 64], negate: bool, by: u32) -> Gates {
     let u = _mm512_srai_epi32::<24>(_mm512_slli_epi32::<24>(load(gates)));
     let sizes = _mm512_abs_epi32(u);
     let signed = if negate { _mm512_sub_epi32(_mm512_setzero_si512(), u) } else { u };
+    let signed = _mm512_sllv_epi32(signed, _mm512_set1_epi32(by.cast_signed()));
     let lower = _mm512_and_si512(signed, _mm512_set1_epi32(0xffff));
     let twice = _mm512_or_si512(lower, _mm512_slli_epi32::<16>(signed));
     Gates { sizes, twice, most: _mm512_reduce_max_epi32(sizes).cast_unsigned() }
@@ -207,13 +230,22 @@ impl Drives {
     }
 }
 
-/// Pulses of four rows and 16 columns, in the order of levels.
+/// Pulses of four rows (the even and the odd) and 16 columns, in the order of levels.
 #[inline]
 #[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi,popcnt")]
-fn pulses(even: i32, odd: i32, gates: __m512i, word: __m512i, rounding: Rounding) -> __m512i {
-    let [a, b] = [even, odd].map(|drives| {
-        let sums = _mm512_mullo_epi16(_mm512_set1_epi32(drives), gates);
-        _mm512_mulhrs_epi16(sums, rounding.factor)
+fn pulses<const USUAL: bool>(
+    drives: [i32; 2],
+    gates: __m512i,
+    word: __m512i,
+    rounding: Rounding,
+) -> __m512i {
+    let [a, b] = drives.map(|drives| {
+        let drives = _mm512_set1_epi32(drives);
+        if USUAL {
+            _mm512_mulhrs_epi16(drives, gates)
+        } else {
+            _mm512_mulhrs_epi16(_mm512_mullo_epi16(drives, gates), rounding.factor)
+        }
     });
     let a = _mm512_add_epi16(a, _mm512_and_si512(word, _mm512_set1_epi16(0xff)));
     let b = _mm512_add_epi16(b, _mm512_srli_epi16::<8>(word));
