@@ -27,12 +27,12 @@ pub(super) struct TileBank<'a> {
     pub(super) next: [*const u8; 2],
 }
 
-/// Vectors of sums converted by a block.
+/// Vectors of codes that a block converts.
 const VECTORS: usize = 32;
 /// Bytes of the codes of a block: `i` goes up to here.
 const CODES: usize = 64 * VECTORS;
 
-/// Converts `{each}` vectors, two of sums to one of codes. `$combine` adds to or takes from codes.
+/// Converts two vectors of sums to one of codes. `$combine` adds to or takes from codes.
 macro_rules! convert {
     ($combine:literal, $label:literal) => {
         concat!(
@@ -57,7 +57,7 @@ macro_rules! convert {
     };
 }
 
-/// Converts `{each}` vectors.
+/// Does so `{each}` times.
 macro_rules! convert_some {
     ($combine:literal, $label:literal) => {
         concat!(
