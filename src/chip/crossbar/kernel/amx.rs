@@ -28,6 +28,35 @@ use super::{
 use crate::chip::crossbar::layout::{BLOCK_CELLS, BLOCK_ROWS, HALF_CELLS, Layout, PANEL_COLUMNS};
 use crate::num::fixed::ErrorBits;
 
+/// Sums of the first four tile registers start at 0.
+macro_rules! zero_sums {
+    () => {
+        "tilezero tmm0\ntilezero tmm1\ntilezero tmm2\ntilezero tmm3\n"
+    };
+}
+
+/// One step of a half block: 64 rows of A by 16 columns of B, over 64 samples.
+macro_rules! half_step {
+    () => {
+        concat!(
+            "tileloadd tmm7, [{b} + {row}]\n",
+            "tileloadd tmm4, [{a0} + {stride}]\n",
+            "tdpbusd tmm0, tmm4, tmm7\n",
+            "tileloadd tmm5, [{a1} + {stride}]\n",
+            "tdpbusd tmm1, tmm5, tmm7\n",
+            "tileloadd tmm6, [{a2} + {stride}]\n",
+            "tdpbusd tmm2, tmm6, tmm7\n",
+            "tileloadd tmm4, [{a3} + {stride}]\n",
+            "tdpbusd tmm3, tmm4, tmm7\n",
+            "add {a0}, 64\n",
+            "add {a1}, 64\n",
+            "add {a2}, 64\n",
+            "add {a3}, 64\n",
+            "add {b}, 1024\n",
+        )
+    };
+}
+
 mod conv;
 mod drawn;
 mod fused;

@@ -144,10 +144,7 @@ fn quad(_: &Tiles, walk: &Walk<'_>, pixels: [&[u8]; 2], cells: &[u8], c: &mut [i
     // this lies inside the slices by the assertions. All tiles used are named.
     unsafe {
         asm!(
-            "tilezero tmm0",
-            "tilezero tmm1",
-            "tilezero tmm2",
-            "tilezero tmm3",
+            zero_sums!(),
             "2:",
             "mov {a}, [{offset}]",
             "lea {a2}, [{pixels2} + {a}]",

@@ -101,10 +101,7 @@ macro_rules! converting {
             // used are named.
             unsafe {
                 asm!(
-                    "tilezero tmm0",
-                    "tilezero tmm1",
-                    "tilezero tmm2",
-                    "tilezero tmm3",
+                    zero_sums!(),
                     "vpbroadcastd zmm16, dword ptr [{count}]",
                     "vpbroadcastd zmm17, dword ptr [{count} + 4]",
                     "vpbroadcastw zmm18, word ptr [{count} + 8]",

@@ -39,10 +39,7 @@ macro_rules! quad {
             // Pointers move past the end only after the last use. All tiles used are named.
             unsafe {
                 asm!(
-                    "tilezero tmm0",
-                    "tilezero tmm1",
-                    "tilezero tmm2",
-                    "tilezero tmm3",
+                    zero_sums!(),
                     "2:",
                     "tileloadd tmm4, [{a} + {a_row}]",
                     "tileloadd tmm6, [{b} + {b_row}]",
@@ -143,25 +140,9 @@ pub(super) fn half_block(
     // by the assertion and the division; the 64 rows of 64 bytes written are all of `sums`. All tiles used are named.
     unsafe {
         asm!(
-            "tilezero tmm0",
-            "tilezero tmm1",
-            "tilezero tmm2",
-            "tilezero tmm3",
+            zero_sums!(),
             "2:",
-            "tileloadd tmm7, [{b} + {row}]",
-            "tileloadd tmm4, [{a0} + {stride}]",
-            "tdpbusd tmm0, tmm4, tmm7",
-            "tileloadd tmm5, [{a1} + {stride}]",
-            "tdpbusd tmm1, tmm5, tmm7",
-            "tileloadd tmm6, [{a2} + {stride}]",
-            "tdpbusd tmm2, tmm6, tmm7",
-            "tileloadd tmm4, [{a3} + {stride}]",
-            "tdpbusd tmm3, tmm4, tmm7",
-            "add {a0}, 64",
-            "add {a1}, 64",
-            "add {a2}, 64",
-            "add {a3}, 64",
-            "add {b}, 1024",
+            half_step!(),
             "dec {steps}",
             "jnz 2b",
             "tilestored [{c} + {row}], tmm0",
