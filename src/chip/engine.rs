@@ -18,7 +18,7 @@ use std::ops::Range;
 use aligned_vec::{AVec, CACHELINE_ALIGN};
 
 use super::crossbar::Collect;
-use super::crossbar::kernel::{Backend, LookUp};
+use super::crossbar::kernel::{Backend, LookUp, Team};
 use super::crossbar::layout::BLOCK_ROWS;
 use super::hardware::Hardware;
 use super::layer::Layer;
@@ -40,6 +40,7 @@ pub mod tick;
 mod trains;
 mod update;
 
+use each::{MOVE, each};
 use schedule::Schedule;
 
 pub use calibrate::Calibration;
@@ -215,6 +216,8 @@ pub type Currents = [[i64; 2]; 2];
 pub struct Engine {
     hardware: Hardware,
     backend: Backend,
+    /// Threads that share large operations.
+    team: Team,
     seed: u64,
     /// Only potentiating pulses: excitatory arrays take positive gates, inhibitory ones negative gates.
     potentiation_only: bool,
@@ -257,6 +260,7 @@ impl Engine {
         Self {
             hardware,
             backend,
+            team: Team::new(backend, 1),
             seed,
             potentiation_only: false,
             collect: passes::collect(&hardware),
@@ -271,6 +275,16 @@ impl Engine {
             ledgers: [ledger.clone(), ledger.clone(), ledger],
             schedule,
             tape: None,
+        }
+    }
+
+    /// Shares large operations among so many threads from now on; no bit depends on it. An engine starts with one.
+    ///
+    /// # Panics
+    /// When the system gives no threads.
+    pub fn set_threads(&mut self, threads: usize) {
+        if threads != self.team.threads() {
+            self.team = Team::new(self.backend, threads);
         }
     }
 
@@ -453,13 +467,17 @@ impl Engine {
         let samples = self.samples;
         let drives = &mut self.registers[0].drives[Stream::P.index()];
         drives.resize(blocks * samples * BLOCK_ROWS, 0);
-        for (sample, codes) in codes.chunks_exact(inputs).enumerate() {
-            for (block, codes) in codes.chunks(BLOCK_ROWS).enumerate() {
-                let row = &mut drives[(block * samples + sample) * BLOCK_ROWS..][..BLOCK_ROWS];
+        let parts = drives.chunks_exact_mut((samples * BLOCK_ROWS).max(1)).enumerate();
+        let parts = parts.map(|(block, drives)| (block, (block * BLOCK_ROWS, drives))).collect();
+        each(&mut self.team, codes.len() * MOVE, blocks, parts, |_, (first, drives)| {
+            let last = (first + BLOCK_ROWS).min(inputs);
+            for (row, codes) in drives.chunks_exact_mut(BLOCK_ROWS).zip(codes.chunks_exact(inputs)) {
+                // a block may hold the constant row alone
+                let codes = &codes[first.min(last)..last];
                 row[..codes.len()].copy_from_slice(codes);
                 row[codes.len()..].fill(0);
             }
-        }
+        });
         self.load_constant(0);
     }
 

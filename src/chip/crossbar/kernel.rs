@@ -37,6 +37,7 @@ mod neon;
 #[cfg(target_arch = "x86_64")]
 mod peak;
 mod scalar;
+mod team;
 #[cfg(test)]
 mod tests;
 
@@ -54,6 +55,7 @@ pub use self::{
         Banks, Cells, Conversion, Dither, Drives, Extremes, Half, LookUp, Peaks, Pulsed, Scratch,
         Single, TOGETHER, Write, WriteCounts, is_driven,
     },
+    team::Team,
 };
 
 /// What a back end does. What it does not say itself is composed of what it says, or is the law.

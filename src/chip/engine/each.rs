@@ -1,20 +1,26 @@
 //! Work on independent parts, on as many threads as there are. Order of results is the order of parts.
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
-use rayon::prelude::*;
+use crate::chip::crossbar::kernel::{Kernel, Team};
 
 /// Products below which handing work to another thread costs more than it saves.
 const WORTH_SHARING: usize = 1 << 22;
 
-/// Maps every part. `work` is the number of products in all of them.
+/// Products that take as long as it takes to move a byte from one order into another, or to form a gate, roughly.
+pub(super) const MOVE: usize = 64;
+
+/// Maps every part; beside it stands the place it belongs to, of `places`. `work` is the number of products in all of
+/// them, or what takes as long.
 pub(super) fn each<T: Send, R: Send>(
+    team: &mut Team,
     work: usize,
-    parts: Vec<T>,
-    map: impl Fn(T) -> R + Send + Sync,
+    places: usize,
+    parts: Vec<(usize, T)>,
+    map: impl Fn(&Kernel, T) -> R + Sync,
 ) -> Vec<R> {
-    if work < WORTH_SHARING || parts.len() < 2 || rayon::current_num_threads() == 1 {
-        parts.into_iter().map(map).collect()
-    } else {
-        parts.into_par_iter().with_max_len(1).map(map).collect()
+    if work < WORTH_SHARING {
+        return team.alone(parts.into_iter().map(|(_, part)| part).collect(), map);
     }
+    let at_home = parts.into_iter().map(|(place, part)| (team.home(place, places), part)).collect();
+    team.each(at_home, map)
 }

@@ -12,6 +12,7 @@ use std::borrow::Cow;
 use std::ops::Range;
 
 use super::Engine;
+use super::each::{MOVE, each};
 use crate::chip::crossbar::kernel::Kernel;
 use crate::chip::crossbar::layout::{BLOCK_ROWS, HALF_COLUMNS};
 use crate::chip::layer::Taps;
@@ -53,19 +54,28 @@ impl Engine {
         let largest = words.iter().fold(0, |most: u16, word| most.max(word.unsigned_abs()));
         let inside = i64::from(largest) <= rail(bits.get());
         let all = inside && samples == (0..self.samples);
-        let kernel = Kernel::start(self.backend);
-        let mut errors = vec![0; samples.len() * BLOCK_ROWS];
-        for block in 0..blocks {
-            saturated_words += latch(&kernel, taps, bits, block, words, &mut errors);
-            for &target in wiring.targets() {
-                let t = target.index();
-                let size = self.samples * BLOCK_ROWS;
-                let slopes = &registers.derivatives[t][block * size..][..size];
+        // [block] -> (target, derivatives, gates)
+        let size = self.samples * BLOCK_ROWS;
+        let mut parts: Vec<_> = (0..blocks).map(|block| (block, (block, Vec::new()))).collect();
+        for (target, gates) in [Stream::P, Stream::N].into_iter().zip(&mut registers.gates) {
+            let slopes = registers.derivatives[target.index()].chunks_exact(size.max(1));
+            let registers = slopes.zip(gates.chunks_exact_mut((stride * BLOCK_ROWS).max(1)));
+            if wiring.targets().contains(&target) {
+                for ((_, (_, part)), (slopes, gates)) in parts.iter_mut().zip(registers) {
+                    part.push((target, slopes, gates));
+                }
+            }
+        }
+        let work = samples.len() * units * wiring.targets().len() * MOVE;
+        let seen = each(&mut self.team, work, blocks, parts, |kernel, (block, part)| {
+            let mut errors = vec![0; samples.len() * BLOCK_ROWS];
+            let saturated_words = latch(kernel, taps, bits, block, words, &mut errors);
+            let mut saturated_gates = [0; 2];
+            for (target, slopes, gates) in part {
                 let negate = target == Stream::N;
+                let count = &mut saturated_gates[target.index()];
                 if all {
-                    let gates = &mut registers.gates[t][block * stride * BLOCK_ROWS..];
-                    let gates = &mut gates[..stride * BLOCK_ROWS];
-                    saturated_gates[t] += kernel.gate(&errors, slopes, negate, bits, stride, gates);
+                    *count += kernel.gate(&errors, slopes, negate, bits, stride, gates);
                     continue;
                 }
                 let sign = if negate { -1 } else { 1 };
@@ -73,12 +83,16 @@ impl Engine {
                     for (unit, &error) in errors.iter().enumerate() {
                         let slope = slopes[sample * BLOCK_ROWS + unit];
                         let (u, saturated) = periphery::gate(sign * error, slope, bits);
-                        saturated_gates[t] += u64::from(saturated);
-                        let at = packed_at(stride, sample, block * BLOCK_ROWS + unit);
-                        registers.gates[t][at] = u;
+                        *count += u64::from(saturated);
+                        gates[packed_at(stride, sample, unit)] = u;
                     }
                 }
             }
+            (saturated_words, saturated_gates)
+        });
+        for (words, gates) in seen {
+            saturated_words += words;
+            saturated_gates.iter_mut().zip(gates).for_each(|(sum, count)| *sum += count);
         }
         let (width, count) = (taps.width as u64, samples.len() as u64);
         for &target in wiring.targets() {

@@ -98,12 +98,13 @@ impl Engine {
                     }
                 }
             }
-            let (backend, table) = (self.backend, &self.tables[layer]);
+            let table = &self.tables[layer];
             let work = samples * this.layout.cells() * wiring.pathways().len();
-            let seen = each(work, outs, |outs| {
-                let kernel = Kernel::start(backend);
+            let blocks = units.div_ceil(BLOCK_ROWS);
+            let parts = outs.into_iter().map(|outs| (outs[0].block, outs)).collect();
+            let seen = each(&mut self.team, work, blocks, parts, |kernel, outs| {
                 let target = outs[0].target.index();
-                (target, put_out(&kernel, &readers[target], table, samples, outs))
+                (target, put_out(kernel, &readers[target], table, samples, outs))
             });
             drop(readers);
             let mut total = vec![Seen::default(); wiring.targets().len()];

@@ -13,12 +13,12 @@ use std::ops::Range;
 
 use aligned_vec::AVec;
 
-use super::each::each;
+use super::each::{MOVE, each};
 use super::error::{gates_of, stride_of};
 use super::passes::Passes;
 use super::pulses::Pulses;
 use super::{Engine, Write};
-use crate::chip::crossbar::kernel::{self, Kernel, WriteCounts};
+use crate::chip::crossbar::kernel::{self, WriteCounts};
 use crate::chip::crossbar::layout::{BLOCK_ROWS, PANEL_COLUMNS};
 use crate::chip::crossbar::{Crossbar, StripMut, WriteRequest};
 use crate::chip::hardware::{PulseCode, Timing, WriteScheme};
@@ -154,7 +154,7 @@ impl Engine {
             ceiling: hardware.window.ceiling(),
             residual_bits: hardware.residual_bits.get(),
         };
-        let (backend, seed, collect) = (self.backend, self.seed, self.collect);
+        let (seed, collect) = (self.seed, self.collect);
         let this = &mut self.layers[layer];
         let index = this.index;
         let request = |array: usize, count: u64| {
@@ -184,11 +184,12 @@ impl Engine {
         }
         let writes = &this.writes;
         let panel_gates = PANEL_COLUMNS * stride;
-        let written = each(work, strips, |(array, mut strip)| {
+        let panels = this.layout.panels();
+        let parts = strips.into_iter().map(|strip| (strip.1.panels().start, strip)).collect();
+        let written = each(&mut self.team, work, panels, parts, |kernel, (array, mut strip)| {
             let panels = strip.panels();
             let gates = &gates[array][panels.start * panel_gates..panels.end * panel_gates];
-            let kernel = Kernel::start(backend);
-            let written = strip.write(&kernel, &request(array, writes[array]), gates);
+            let written = strip.write(kernel, &request(array, writes[array]), gates);
             (array, panels.start * PANEL_COLUMNS, written)
         });
         drop((gates, turned));
@@ -204,27 +205,27 @@ impl Engine {
 
     /// Turns the drives of some samples as an update takes them. Returns which blocks are driven at all.
     fn turn(
-        &self,
+        &mut self,
         layer: usize,
         source: Stream,
         samples: &Range<usize>,
         turned: &mut AVec<u8>,
     ) -> Vec<bool> {
         let size = BLOCK_ROWS * stride_of(samples.len());
-        let kernel = Kernel::start(self.backend);
-        turned.resize(self.layers[layer].layout.blocks() * size, 0);
-        let drives = self.drives(layer, source).chunks_exact(self.samples * BLOCK_ROWS);
-        let blocks = drives.zip(turned.chunks_exact_mut(size));
-        blocks
-            .map(|(codes, turned)| {
-                let codes = &codes[samples.start * BLOCK_ROWS..samples.end * BLOCK_ROWS];
-                let live = kernel::is_driven(codes);
-                if live {
-                    kernel.turn(codes, size / BLOCK_ROWS, turned);
-                }
-                live
-            })
-            .collect()
+        let blocks = self.layers[layer].layout.blocks();
+        turned.resize(blocks * size, 0);
+        let source = if layer == 0 { Stream::P } else { source };
+        let drives = &self.registers[layer].drives[source.index()];
+        let drives = drives.chunks_exact(self.samples * BLOCK_ROWS);
+        let parts = drives.zip(turned.chunks_exact_mut(size)).enumerate().collect();
+        each(&mut self.team, blocks * size * MOVE, blocks, parts, |kernel, (codes, turned)| {
+            let codes = &codes[samples.start * BLOCK_ROWS..samples.end * BLOCK_ROWS];
+            let live = kernel::is_driven(codes);
+            if live {
+                kernel.turn(codes, size / BLOCK_ROWS, turned);
+            }
+            live
+        })
     }
 }
 

@@ -82,7 +82,7 @@ fn read<'a>(kernel: &'a Kernel, image: Image<'a>, array: &'a Crossbar) -> Arm<'a
     let mut out = aligned_vec::avec![0; POSITIONS * PANEL_COLUMNS];
     let Layout { columns, .. } = array.layout();
     let blocks = 0..image.plan().blocks();
-    Arm::here(move || {
+    Arm::new(move || {
         for panel in 0..columns.div_ceil(PANEL_COLUMNS) {
             let cells = array.low(panel, blocks.clone());
             for start in (0..positions).step_by(POSITIONS) {
@@ -101,7 +101,7 @@ fn sums<'a>(kernel: &'a Kernel, image: Image<'a>, gates: &'a [i8]) -> Arm<'a> {
     let half = HALF_COLUMNS * image.plan().places(BATCH);
     let mut sums: Vec<Half<i64>> =
         vec![[0; HALF_CELLS]; image.plan().blocks() * (gates.len() / half)];
-    Arm::here(move || {
+    Arm::new(move || {
         kernel.turn_conv(image, 0..BATCH, &mut turned);
         let mut sums = sums.iter_mut();
         for block in 0..image.plan().blocks() {

@@ -62,7 +62,7 @@ fn measure_one(plan: &Plan, layout: Layout, table: &mut Table) {
 
     let mut scratch = Scratch::new();
     let arrays = &arrays;
-    let mut arms = vec![Arm::here(move || {
+    let mut arms = vec![Arm::new(move || {
         for panel in 0..panels {
             for (array, drives) in arrays.iter().zip(drives) {
                 read_panel(kernel, array, panel, drives, &mut scratch);
@@ -124,7 +124,7 @@ fn converted<'a>(
     let shift = (32 - most.leading_zeros()).saturating_sub(ADC_BITS);
     let mut scratch = Scratch::new();
     let all: Vec<usize> = (0..panels).collect();
-    Arm::here(move || {
+    Arm::new(move || {
         // as the engine reads: some samples, the panels of 64 units, or of 256 with many slices, and then the slices
         let units = if slices.len() > 2 { 256 } else { 64 };
         for panels in all.chunks(units / PANEL_COLUMNS) {

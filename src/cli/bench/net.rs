@@ -41,6 +41,11 @@ impl<'a> Net<'a> {
         Self { trainer, examples, batch, next: 0 }
     }
 
+    /// Updates share their work among so many threads from now on.
+    pub(super) fn set_threads(&mut self, threads: usize) {
+        self.trainer.driver_mut().engine_mut().set_threads(threads);
+    }
+
     /// Images of an update.
     pub(super) const fn batch(&self) -> usize {
         self.batch

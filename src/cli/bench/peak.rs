@@ -24,7 +24,7 @@ pub(super) fn products(kernel: &Kernel) -> f64 {
 
 /// The peak as an arm of a race.
 pub(super) fn arm(kernel: &Kernel) -> Arm<'_> {
-    Arm::here(|| {
+    Arm::new(|| {
         black_box(kernel.peak(ROUNDS));
     })
 }

@@ -54,14 +54,14 @@ fn measure_one(plan: &Plan, array: &Crossbar, batch: usize, table: &mut Table) {
     let a = Array2::from_shape_fn((batch, rows), |(b, r)| f32::from(codes[(b + r) % codes.len()]));
     let b = Array2::from_shape_fn((rows, columns), |(r, c)| f32::from(array.level(r, c)));
     let mut c = Array2::zeros((batch, columns));
-    let mut arms = vec![Arm::here(move || {
+    let mut arms = vec![Arm::new(move || {
         general_mat_mul(1.0f32, &a, &b, 0.0, &mut c);
         black_box(&c);
     })];
     for (backend, kernel) in &kernels {
         let panels = panels_timed(*backend, layout);
         let mut scratch = Scratch::new();
-        arms.push(Arm::here(move || {
+        arms.push(Arm::new(move || {
             for panel in 0..panels {
                 read_panel(kernel, array, panel, drives, &mut scratch);
             }

@@ -3,7 +3,6 @@
 use std::hint::black_box;
 
 use ndarray::Array2;
-use rayon::ThreadPool;
 
 use super::float::FloatNet;
 use super::net::Net;
@@ -52,7 +51,7 @@ struct Entry<'a> {
     what: &'static str,
     images: &'static str,
     backend: Backend,
-    pool: &'a ThreadPool,
+    threads: usize,
     /// Updates of a run, when it is a whole pass over the examples.
     steps: Option<usize>,
     /// Whether the float network, and the scalar law, do the same.
@@ -81,17 +80,10 @@ pub(super) fn measure(plan: &Plan) -> Vec<Table> {
         }
         Err(error) => (None, Some(format!("MNIST cannot be read: {error}"))),
     };
-    let pool = |threads| {
-        let built = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
-        built.expect("the system gives a bench its threads")
-    };
-    let (one, several) = (pool(1), (plan.threads > 1).then(|| pool(plan.threads)));
-    let pools = (&one, several.as_ref());
-
     let mut table = Table::new("step", "step: one update of a whole network", COLUMNS);
-    small(plan, pools, (&made_up, &few, mnist.as_ref()), &mut table);
-    wide(plan, &one, &made_up, &mut table);
-    online(plan, &one, mnist.as_ref().unwrap_or(&made_up), mnist.is_some(), &mut table);
+    small(plan, (&made_up, &few, mnist.as_ref()), &mut table);
+    wide(plan, &made_up, &mut table);
+    online(plan, mnist.as_ref().unwrap_or(&made_up), mnist.is_some(), &mut table);
     table.notes.extend(why);
     table.notes.extend(
         [
@@ -115,7 +107,6 @@ fn settings(hidden: &str, rate: &str, more: &[&str]) -> Vec<String> {
 
 fn small<'a>(
     plan: &Plan,
-    (one, several): (&'a ThreadPool, Option<&'a ThreadPool>),
     (made_up, few, mnist): (&'a Examples, &'a Examples, Option<&'a Examples>),
     table: &mut Table,
 ) {
@@ -124,7 +115,7 @@ fn small<'a>(
         what,
         images: "made-up",
         backend: plan.best,
-        pool: one,
+        threads: 1,
         steps: None,
         like: [true; 2],
     };
@@ -148,34 +139,36 @@ fn small<'a>(
         let timed = entry("ED, its cycles counted", &[]);
         entries.push(Entry { net, images: "MNIST", like: [false; 2], ..timed });
     }
-    if let Some(pool) = several {
-        entries.push(Entry { pool, ..entry("ED", &[]) });
+    if plan.threads > 1 {
+        let mut several = Entry { threads: plan.threads, ..entry("ED", &[]) };
+        several.net.set_threads(plan.threads);
+        entries.push(several);
     }
     if plan.best != Backend::Scalar {
         let net = Net::new(&ed, Backend::Scalar, made_up);
         entries.push(Entry { net, backend: Backend::Scalar, ..entry("ED", &[]) });
     }
     let sizes = [784, 256, 256, 10];
-    compare("784-256-256-10", entries, Some((&sizes, one)), plan.seconds(12.0), table);
+    compare("784-256-256-10", entries, Some(&sizes), plan.seconds(12.0), table);
 }
 
-fn wide(plan: &Plan, pool: &ThreadPool, images: &Examples, table: &mut Table) {
+fn wide(plan: &Plan, images: &Examples, table: &mut Table) {
     // a rate at which the wide net does not diverge
     let entries = vec![Entry {
         net: Net::new(&settings("[1024,1024]", "4", &[]), plan.best, images),
         what: "ED",
         images: "made-up",
         backend: plan.best,
-        pool,
+        threads: 1,
         steps: None,
         like: [true; 2],
     }];
     let sizes = [784, 1024, 1024, 10];
-    compare("784-1024-1024-10", entries, Some((&sizes, pool)), plan.seconds(6.0), table);
+    compare("784-1024-1024-10", entries, Some(&sizes), plan.seconds(6.0), table);
 }
 
 /// Batches of one image, each read and written on its own.
-fn online(plan: &Plan, pool: &ThreadPool, images: &Examples, real: bool, table: &mut Table) {
+fn online(plan: &Plan, images: &Examples, real: bool, table: &mut Table) {
     let entry = |what, centre: &str| {
         let own = ["learning.batch=1", "learning.mode=online", centre];
         Entry {
@@ -184,7 +177,7 @@ fn online(plan: &Plan, pool: &ThreadPool, images: &Examples, real: bool, table: 
             what,
             images: if real { "MNIST" } else { "made-up" },
             backend: plan.best,
-            pool,
+            threads: 1,
             steps: None,
             like: [false; 2],
         }
@@ -200,7 +193,7 @@ fn online(plan: &Plan, pool: &ThreadPool, images: &Examples, real: bool, table: 
 fn compare(
     name: &str,
     mut entries: Vec<Entry<'_>>,
-    float: Option<(&[usize], &ThreadPool)>,
+    float: Option<&[usize]>,
     seconds: f64,
     table: &mut Table,
 ) {
@@ -209,12 +202,12 @@ fn compare(
         .map(|entry| {
             let net = &mut entry.net;
             match entry.steps {
-                None => Arm::inside(entry.pool, || net.step()),
-                Some(_) => Arm::inside(entry.pool, || net.epoch()),
+                None => Arm::new(|| net.step()),
+                Some(_) => Arm::new(|| net.epoch()),
             }
         })
         .collect();
-    arms.extend(float.map(|(sizes, pool)| float_arm(sizes, pool)));
+    arms.extend(float.map(float_arm));
     let times = race(arms, seconds);
     let (times, float) = times.split_at(entries.len());
     let by_step = |entry: &Entry<'_>, time: Time| {
@@ -248,9 +241,9 @@ fn compare(
 }
 
 fn row(name: &str, entry: &Entry<'_>, time: Time, reference: &Reference) -> Vec<Cell> {
-    let Entry { net, what, images, backend, pool, like, .. } = entry;
+    let Entry { net, what, images, backend, threads, like, .. } = entry;
     let mut cells = vec![name.into(), (*what).into(), (*images).into(), backend.name().into()];
-    cells.extend([pool.current_num_threads(), net.batch()].map(Cell::from));
+    cells.extend([*threads, net.batch()].map(Cell::from));
     cells.extend(speeds(time, net.batch(), net.products()));
     let float = reference.float.filter(|_| like[0]);
     let scalar = reference.scalar.filter(|_| like[1]);
@@ -277,7 +270,7 @@ fn speeds(time: Time, batch: usize, products: f64) -> [Cell; 5] {
 }
 
 /// A step of the float network on made-up images, several batches in turn.
-fn float_arm<'a>(sizes: &[usize], pool: &'a ThreadPool) -> Arm<'a> {
+fn float_arm<'a>(sizes: &[usize]) -> Arm<'a> {
     let images = chance::images(4 * BATCH);
     let batches: Vec<[Array2<f32>; 2]> = (0..4)
         .map(|batch| {
@@ -293,7 +286,7 @@ fn float_arm<'a>(sizes: &[usize], pool: &'a ThreadPool) -> Arm<'a> {
         .collect();
     let mut net = FloatNet::new(sizes, BATCH);
     let mut next = 0;
-    Arm::inside(pool, move || {
+    Arm::new(move || {
         let [inputs, targets] = &batches[next % batches.len()];
         net.step(inputs, targets, FLOAT_RATE);
         black_box(&mut net);

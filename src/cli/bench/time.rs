@@ -47,19 +47,12 @@ fn timed(warm: bool, runs: usize, run: &mut dyn FnMut()) -> f64 {
 }
 
 impl<'a> Arm<'a> {
-    /// An arm on the thread that races.
-    pub(super) fn here(mut run: impl FnMut() + 'a) -> Self {
-        Self::of(move |warm, runs| timed(warm, runs, &mut run))
-    }
-
-    /// An arm inside a pool of threads; entering the pool is not timed.
-    pub(super) fn inside(pool: &'a rayon::ThreadPool, mut run: impl FnMut() + Send + 'a) -> Self {
-        Self::of(move |warm, runs| pool.install(|| timed(warm, runs, &mut run)))
-    }
-
-    fn of(slot: impl FnMut(bool, usize) -> f64 + 'a) -> Self {
+    /// An arm that has run no slot yet.
+    pub(super) fn new(mut run: impl FnMut() + 'a) -> Self {
+        let slot = move |warm, runs| timed(warm, runs, &mut run);
         Self { slot: Box::new(slot), runs: 1, spent: 0.0, seconds: Vec::new() }
     }
+
 
     /// Finds how many runs make a slot.
     fn prepare(&mut self) {
@@ -127,7 +120,7 @@ mod tests {
             cell.set(cell.get() + 1);
             std::hint::black_box((0..loops).fold(1u64, |a, i| std::hint::black_box(a ^ i)));
         };
-        let arms = vec![Arm::here(|| count(&few, 400_000)), Arm::here(|| count(&many, 100))];
+        let arms = vec![Arm::new(|| count(&few, 400_000)), Arm::new(|| count(&many, 100))];
         let times = race(arms, 0.01);
         assert!(few.get() >= SLOTS_MIN && many.get() > few.get());
         assert!(times[0].best > times[1].best);

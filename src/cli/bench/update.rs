@@ -93,7 +93,7 @@ fn accumulated<'a>(
     #[repr(align(64))]
     struct Sums(Half<i32>);
     let mut sums = Sums([0; HALF_CELLS]);
-    Arm::here(move || {
+    Arm::new(move || {
         let strip = PANEL_COLUMNS * BATCH * Crossbar::STRIP_PANELS.min(panels);
         for gates in gates.chunks_exact(strip).take(panels.div_ceil(Crossbar::STRIP_PANELS)) {
             for turned in blocks.iter().flatten() {
@@ -134,7 +134,7 @@ fn written<'a>(
         place: Place::global(4, Site::WriteDither, 0),
         collect: Collect::Nothing,
     };
-    Arm::here(move || {
+    Arm::new(move || {
         request.place.count += 1;
         request.write.negate = !request.write.negate;
         let strip = Crossbar::STRIP_PANELS.min(panels);

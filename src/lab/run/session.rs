@@ -37,7 +37,6 @@ pub struct Machine {
 #[derive(Debug)]
 pub struct Session {
     trainer: Trainer,
-    pool: rayon::ThreadPool,
     train: Examples,
     validation: Examples,
     test: Examples,
@@ -75,15 +74,11 @@ impl Session {
             let hint = "choose the last epoch with learning.select = \"last\"";
             return Err(RunError::Empty { part: "validation", hint });
         }
-        let pool = rayon::ThreadPoolBuilder::new()
-            .num_threads(machine.threads)
-            .build()
-            .expect("threads can be started");
         let seeded = experiment.build(machine.backend, train.len())?;
-        let trainer = Trainer::new(experiment, seeded);
+        let mut trainer = Trainer::new(experiment, seeded);
+        trainer.driver_mut().engine_mut().set_threads(machine.threads);
         let mut session = Self {
             trainer,
-            pool,
             train,
             validation,
             test: split.test,
@@ -106,13 +101,11 @@ impl Session {
         if updates == 0 {
             return Ok(());
         }
-        let Self { trainer, pool, train, .. } = self;
+        let Self { trainer, train, .. } = self;
         let mut done = 0;
-        let _ = pool.install(|| {
-            trainer.learn(train, &mut |_| {
-                done += 1;
-                done < updates
-            })
+        let _ = trainer.learn(train, &mut |_| {
+            done += 1;
+            done < updates
         });
         if done < updates {
             Err(RunError::NoUpdate { update: updates, updates: done })
@@ -123,9 +116,9 @@ impl Session {
 
     /// Reads the first training example, as an inference does.
     pub fn read_one(&mut self) {
-        let Self { trainer, pool, train, .. } = self;
+        let Self { trainer, train, .. } = self;
         let (first, _) = train.clone().split_at(1);
-        let _ = pool.install(|| trainer.evaluate(&first));
+        let _ = trainer.evaluate(&first);
     }
 
     /// Starts recording operations; what was read before the last samples were loaded is forgotten.
@@ -139,8 +132,8 @@ impl Session {
     }
 
     fn calibrate(&mut self) -> Option<Calibration> {
-        let Self { trainer, pool, train, .. } = self;
-        pool.install(|| trainer.calibrate(train))
+        let Self { trainer, train, .. } = self;
+        trainer.calibrate(train)
     }
 
     fn warn_of_low_codes(&mut self, calibration: &Calibration) {
@@ -243,8 +236,8 @@ impl Session {
         if again && self.trainer.epoch() > 0 {
             let _ = self.calibrate();
         }
-        let Self { trainer, pool, train, .. } = self;
-        let correct = pool.install(|| trainer.learn(train, go_on)).ok()?;
+        let Self { trainer, train, .. } = self;
+        let correct = trainer.learn(train, go_on).ok()?;
         let seconds = started.elapsed().as_secs_f64();
         let total = self.train.len() as u64;
         let (validation, currents) = self.validate();
@@ -252,18 +245,18 @@ impl Session {
     }
 
     fn validate(&mut self) -> (Option<Score>, Vec<Currents>) {
-        let Self { trainer, pool, validation, .. } = self;
+        let Self { trainer, validation, .. } = self;
         if validation.is_empty() {
             return (None, vec![[[0; 2]; 2]; trainer.driver().engine().layers().len()]);
         }
-        let Evaluation { correct, currents, .. } = pool.install(|| trainer.evaluate(validation));
+        let Evaluation { correct, currents, .. } = trainer.evaluate(validation);
         (Some(Score { correct, total: validation.len() as u64 }), currents)
     }
 
     /// Reads the test set with the present state.
     pub fn test(&mut self) -> TestRecord {
-        let Self { trainer, pool, test, .. } = self;
-        let found = pool.install(|| trainer.evaluate(test));
+        let Self { trainer, test, .. } = self;
+        let found = trainer.evaluate(test);
         let classes = test.classes();
         let mut confusion = vec![vec![0; classes]; classes];
         let mut wrong = Vec::new();

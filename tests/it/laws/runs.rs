@@ -149,11 +149,9 @@ fn go_on(run: &Run, trainer: &mut Trainer, until: u32) -> Vec<String> {
 }
 
 fn whole(run: &Run, backend: Backend, threads: usize) -> Vec<String> {
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-    pool.install(|| {
-        let mut trainer = fresh(run, backend);
-        go_on(run, &mut trainer, run.experiment.epochs)
-    })
+    let mut trainer = fresh(run, backend);
+    trainer.driver_mut().engine_mut().set_threads(threads);
+    go_on(run, &mut trainer, run.experiment.epochs)
 }
 
 /// Stops after some epochs, learns a little more that is lost, and goes on from the checkpoint.
