@@ -463,6 +463,8 @@ impl Engine {
         let (inputs, blocks) = (layer.spec.inputs, layer.layout.blocks());
         assert!(codes.len().is_multiple_of(inputs), "codes come in whole samples");
         assert!(self.registers.iter().all(|r| r.pending == 0), "sums wait to be programmed");
+        let greatest = codes.iter().fold(0, |most, &code| most.max(code));
+        assert!(greatest <= self.hardware.drive_bits.code_max(), "codes have `drive_bits` bits");
         self.samples = codes.len() / inputs;
         let samples = self.samples;
         let drives = &mut self.registers[0].drives[Stream::P.index()];
@@ -471,7 +473,8 @@ impl Engine {
         let parts = parts.map(|(block, drives)| (block, (block * BLOCK_ROWS, drives))).collect();
         each(&mut self.team, codes.len() * MOVE, blocks, parts, |_, (first, drives)| {
             let last = (first + BLOCK_ROWS).min(inputs);
-            for (row, codes) in drives.chunks_exact_mut(BLOCK_ROWS).zip(codes.chunks_exact(inputs)) {
+            for (row, codes) in drives.chunks_exact_mut(BLOCK_ROWS).zip(codes.chunks_exact(inputs))
+            {
                 // a block may hold the constant row alone
                 let codes = &codes[first.min(last)..last];
                 row[..codes.len()].copy_from_slice(codes);

@@ -42,7 +42,7 @@ mod team;
 mod tests;
 
 #[cfg(target_arch = "x86_64")]
-use self::data::Packed;
+use self::data::{OneProduct, Packed};
 #[cfg(target_arch = "aarch64")]
 pub use self::neon::Neon;
 #[cfg(target_arch = "x86_64")]
@@ -52,8 +52,8 @@ pub use self::{
     chacha::Draws,
     conv::{ConvPlan, ConvScratch, ConvShape, ConvTurned, Image, Pixels},
     data::{
-        Banks, Cells, Conversion, Dither, Drives, Extremes, Half, LookUp, Peaks, Pulsed, Scratch,
-        Single, TOGETHER, Write, WriteCounts, is_driven,
+        Banks, Cells, Conversion, Dither, Drives, Extremes, Greatest, Half, LookUp, Peaks, Pulsed,
+        Scratch, Single, TOGETHER, Write, WriteCounts, is_driven,
     },
     team::Team,
 };

@@ -12,7 +12,7 @@ use std::borrow::Cow;
 use std::ops::Range;
 
 use crate::chip::crossbar::Crossbar;
-use crate::chip::crossbar::kernel::{Banks, Conversion, Drives, Kernel, Scratch};
+use crate::chip::crossbar::kernel::{Banks, Conversion, Drives, Greatest, Kernel, Scratch};
 use crate::chip::crossbar::layout::{BLOCK_ROWS, PANEL_COLUMNS};
 use crate::chip::hardware::{Adc, Hardware, Subtract};
 use crate::chip::layer::{CHUNK_BLOCKS, Layer};
@@ -89,6 +89,7 @@ pub(super) struct Reader<'a> {
     probe: Option<Converter>,
     dac_bits: u32,
     slices: usize,
+    greatest: Greatest,
     narrow: bool,
     pub(super) columns: usize,
 }
@@ -125,6 +126,7 @@ impl<'a> Reader<'a> {
             (Some(_), true) => Tiles::Together,
             (Some(_), false) => Tiles::Apart,
         };
+        let code_max = hardware.drive_bits.code_max();
         let sources = places.map(|at| wiring.pathways()[at].source);
         Self {
             arrays: places.map(|at| &layer.arrays[at]),
@@ -135,9 +137,23 @@ impl<'a> Reader<'a> {
             probe,
             dac_bits: hardware.dac_bits,
             slices: hardware.slices() as usize,
+            greatest: Greatest {
+                // a low byte of more than 8 bits can be anything
+                level: u8::try_from(hardware.window.ceiling()).unwrap_or(u8::MAX),
+                code: if tiles == Tiles::Whole {
+                    code_max
+                } else {
+                    code_max.min(slice_max(hardware))
+                },
+            },
             narrow,
             columns: layer.layout.columns,
         }
+    }
+
+    /// What a read is driven with.
+    fn drives<'b>(&self, read: &'b TileRead<'_>) -> Drives<'b> {
+        Drives::new(&read.codes, self.samples).within(self.greatest)
     }
 
     /// Whether every sum fits 31 bits.
@@ -167,7 +183,7 @@ impl<'a> Reader<'a> {
                 let adc = converters[e.slice];
                 let banks = Banks {
                     cells: self.arrays.map(|array| array.low(panel, e.blocks.clone())),
-                    drives: [e, i].map(|read| Drives::new(&read.codes, self.samples)),
+                    drives: [e, i].map(|read| self.drives(read)),
                     tile_blocks: e.tile_blocks,
                     conversion: Conversion {
                         shift: adc.shift,
@@ -189,7 +205,7 @@ impl<'a> Reader<'a> {
         let ([e], [i]) = (&excites[..], &inhibits[..]) else { unreachable!("read in one piece") };
         for ((array, read), out) in self.arrays.iter().zip([e, i]).zip(&mut scratch.currents) {
             let out = &mut out[..sums.len()];
-            let drives = Drives::new(&read.codes, self.samples);
+            let drives = self.drives(read);
             kernel.read(array.low(panel, read.blocks.clone()), drives, samples.clone(), out);
             if let Some(high) = array.high(panel, read.blocks.clone()) {
                 kernel.read(high, drives, samples.clone(), sums);
@@ -271,7 +287,7 @@ impl<'a> Reader<'a> {
         out: &mut [i64],
     ) {
         let (array, read) = (self.arrays[bank], &self.reads[bank][at]);
-        let drives = Drives::new(&read.codes, self.samples);
+        let drives = self.drives(read);
         let mut sums = [0; Scratch::SUMS];
         let sums = &mut sums[..out.len()];
         kernel.read(array.low(panel, read.blocks.clone()), drives, samples.clone(), sums);
@@ -281,6 +297,11 @@ impl<'a> Reader<'a> {
             out.iter_mut().zip(sums).for_each(|(out, sum)| *out += i64::from(*sum) << 8);
         }
     }
+}
+
+/// Greatest slice of a drive.
+fn slice_max(hardware: &Hardware) -> u8 {
+    u8::MAX >> 8u32.saturating_sub(hardware.dac_bits)
 }
 
 /// Sums stay below this: then rounding constants fit beside them.

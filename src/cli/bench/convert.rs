@@ -9,7 +9,9 @@ use super::table::{Cell, Column, Table, shown};
 use super::time::{Arm, Time, race};
 use super::{Plan, chance, giga, groups, kernels, panels_timed};
 use crate::chip::crossbar::Crossbar;
-use crate::chip::crossbar::kernel::{Backend, Banks, Conversion, Drives, Kernel, Scratch};
+use crate::chip::crossbar::kernel::{
+    Backend, Banks, Conversion, Drives, Greatest, Kernel, Scratch,
+};
 use crate::chip::crossbar::layout::{BLOCK_ROWS, Layout, PANEL_COLUMNS};
 
 const SHAPES: [[usize; 2]; 2] = [[784, 256], [1024, 1024]];
@@ -73,7 +75,10 @@ fn measure_one(plan: &Plan, layout: Layout, table: &mut Table) {
         arms.push(converted(kernel, arrays, vec![drives], tile_blocks, 8, panels));
     }
     for tile_blocks in TILES {
-        let planes = planes.iter().map(|codes| codes.each_ref().map(|c| Drives::new(c, BATCH)));
+        let one_bit = Greatest { level: u8::MAX, code: 1 };
+        let planes = planes
+            .iter()
+            .map(|codes| codes.each_ref().map(|codes| Drives::new(codes, BATCH).within(one_bit)));
         arms.push(converted(kernel, arrays, planes.collect(), tile_blocks, 1, panels));
     }
     let times = race(arms, plan.seconds(4.0));

@@ -53,7 +53,6 @@ impl<'a> Arm<'a> {
         Self { slot: Box::new(slot), runs: 1, spent: 0.0, seconds: Vec::new() }
     }
 
-
     /// Finds how many runs make a slot.
     fn prepare(&mut self) {
         let mut once = (self.slot)(false, 1);

@@ -5,22 +5,26 @@
 //! lane += x0 * y0 + x2 * y2;  lane += x1 * y1 + x3 * y3
 //! ```
 //!
-//! Splitting even from odd bytes is a mask and a shift, so nothing is shuffled. `vpmaddubsw` would need half
-//! the instructions but saturates its 16-bit pairs: 2 * 255 * 127 does not fit.
+//! Splitting even from odd bytes is a mask and a shift, so nothing is shuffled. `vpmaddubsw` needs half the
+//! instructions but saturates its 16-bit pairs, and 2 * 255 * 127 does not fit: it serves where levels or drives have
+//! few bits (`pairs`).
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
 use std::arch::x86_64::*;
 use std::ops::Range;
 
 use super::{
-    Cells, Conversion, Dither, Draws, Drives, Extremes, Half, Loops, Peaks, Write, WriteCounts,
-    lanes, peak,
+    Cells, Conversion, Dither, Draws, Drives, Extremes, Half, LookUp, Loops, Peaks, Single, Write,
+    WriteCounts, lanes, peak,
 };
 use crate::chip::crossbar::layout::{BLOCK_CELLS, BLOCK_ROWS, HALF_CELLS, HALF_COLUMNS, Layout};
 use crate::num::fixed::ErrorBits;
 
 mod dither;
+mod pairs;
 mod program;
+mod single;
+mod units;
 
 /// Proof that the processor has AVX2 and counts bits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -58,6 +62,21 @@ impl Loops for Avx2 {
         compiled!(convert(currents, conversion, live, codes))
     }
 
+    fn look_up(
+        self,
+        accumulators: &[i32],
+        table: &LookUp,
+        live: usize,
+        values: &mut [u8],
+        derivatives: &mut [u8],
+    ) -> u64 {
+        compiled!(units::look_up(accumulators, table, live, values, derivatives))
+    }
+
+    fn turn(self, codes: &[u8], stride: usize, turned: &mut [u8]) {
+        compiled!(units::turn(codes, stride, turned));
+    }
+
     fn gate(
         self,
         errors: &[i16],
@@ -78,6 +97,10 @@ impl Loops for Avx2 {
         compiled!(accumulate(turned, stride, gates, sums));
     }
 
+    fn loud(self, sums: &Half<i32>, write: &Write, bits: u32) -> u16 {
+        compiled!(program::loud(sums, write, bits))
+    }
+
     fn dither(self, draws: &Draws, column: usize, block: usize, words: &mut Half<u8>) {
         compiled!(dither::dither(draws, column, block, words));
     }
@@ -92,8 +115,12 @@ impl Loops for Avx2 {
         compiled!(program::program(cells, sums, write, dither))
     }
 
+    fn single(self, strip: Single<'_>) -> Option<WriteCounts> {
+        compiled!(single::single(strip))
+    }
+
     fn peaks(self, extremes: &Extremes) -> Peaks {
-        compiled!(peaks(extremes))
+        compiled!(units::peaks(extremes))
     }
 
     fn peak(self, rounds: usize) -> u64 {
@@ -109,11 +136,6 @@ fn convert(
     codes: &mut [i16],
 ) -> [u64; 2] {
     lanes::convert(currents, conversion, live, codes)
-}
-
-#[target_feature(enable = "avx2,popcnt")]
-fn peaks(extremes: &Extremes) -> Peaks {
-    lanes::peaks(extremes)
 }
 
 #[target_feature(enable = "avx2,popcnt")]
@@ -147,6 +169,14 @@ fn store(bytes: &mut [u8; 32], v: __m256i) {
 fn load_sums(sums: &[i32; 8]) -> __m256i {
     // SAFETY: the reference covers the 8 sums, 32 bytes, that an unaligned load reads.
     unsafe { _mm256_loadu_si256(sums.as_ptr().cast()) }
+}
+
+/// Sum of the four 64-bit lanes.
+#[target_feature(enable = "avx2,popcnt")]
+fn total(v: __m256i) -> u64 {
+    let v = _mm_add_epi64(_mm256_castsi256_si128(v), _mm256_extracti128_si256::<1>(v));
+    let v = _mm_add_epi64(v, _mm_unpackhi_epi64(v, v));
+    _mm_cvtsi128_si64(v).cast_unsigned()
 }
 
 /// Where the bytes of [`dots`] lie.
@@ -184,6 +214,63 @@ fn split<const SIGNED: bool>(v: __m256i) -> [__m256i; 2] {
     }
 }
 
+/// Words of four bytes that are looked at together.
+const QUADS: usize = 16;
+/// Of which so many, at most, are taken one by one; otherwise all are.
+const FEW: u32 = 12;
+
+/// Which of 16 words are not 0 in all of N streams, a bit each: images have margins, and whole rows that are dark.
+///
+/// # Safety
+/// Each stream, the first at `from` and the next `stride` bytes on, has 64 bytes there.
+#[inline]
+#[target_feature(enable = "avx2,popcnt")]
+unsafe fn lit_quads<const N: usize>(from: *const u8, stride: usize) -> u32 {
+    let mut any = [_mm256_setzero_si256(); 2];
+    for i in 0..N {
+        for (h, any) in any.iter_mut().enumerate() {
+            // SAFETY: the caller says that 64 bytes lie there; unaligned loads read half of them each.
+            let v = unsafe { _mm256_loadu_si256(from.add(i * stride + h * 32).cast()) };
+            *any = _mm256_or_si256(*any, v);
+        }
+    }
+    let zero = _mm256_setzero_si256();
+    let dark = |v| _mm256_movemask_ps(_mm256_castsi256_ps(_mm256_cmpeq_epi32(v, zero)));
+    !(dark(any[0]) | dark(any[1]) << 8).cast_unsigned() & 0xffff
+}
+
+/// Adds the products of one quad: a word of each of N streams, and two vectors.
+///
+/// # Safety
+/// The word `quad` of each stream, the first at `x` and the next `stride` bytes on, and the 64 bytes `quad` at `v` lie
+/// there.
+#[inline]
+#[target_feature(enable = "avx2,popcnt")]
+unsafe fn dot<const KIND: u8, const N: usize>(
+    acc: &mut [[__m256i; 2]; N],
+    x: *const u8,
+    stride: usize,
+    v: *const u8,
+    quad: usize,
+) {
+    let mut w = [[_mm256_setzero_si256(); 2]; 2];
+    for (h, w) in w.iter_mut().enumerate() {
+        // SAFETY: the caller says that 64 bytes lie there; each load reads half of them.
+        let v = unsafe { _mm256_loadu_si256(v.add(quad * 64 + h * 32).cast()) };
+        *w = if KIND == GATES { split::<true>(v) } else { split::<false>(v) };
+    }
+    for (i, acc) in acc.iter_mut().enumerate() {
+        // SAFETY: the caller says that this word lies there; the read asks for no alignment.
+        let word = unsafe { x.add(i * stride + quad * 4).cast::<i32>().read_unaligned() };
+        let x = _mm256_set1_epi32(word);
+        let x = if KIND == TURNED { split::<true>(x) } else { split::<false>(x) };
+        for (acc, w) in acc.iter_mut().zip(w) {
+            *acc = _mm256_add_epi32(*acc, _mm256_madd_epi16(x[0], w[0]));
+            *acc = _mm256_add_epi32(*acc, _mm256_madd_epi16(x[1], w[1]));
+        }
+    }
+}
+
 /// `out[i] = sum over runs and quads of dot4(stream i, vector)`, 16 lanes a vector and up to 4 streams.
 #[inline]
 #[target_feature(enable = "avx2,popcnt")]
@@ -203,27 +290,29 @@ fn dots<const KIND: u8, const N: usize>(
     assert!(out.len() >= (N - 1) * out_stride + 16, "every sum has its place");
     let mut acc = [[_mm256_setzero_si256(); 2]; N];
     for r in 0..runs {
-        for quad in 0..quads {
-            let mut w = [[_mm256_setzero_si256(); 2]; 2];
-            for (h, w) in w.iter_mut().enumerate() {
-                // SAFETY: r < runs, quad < quads and h < 2, so the second assertion above bounds the last of
-                // these 32 bytes.
-                let v = unsafe {
-                    _mm256_loadu_si256(vectors.as_ptr().add(r * run + quad * 64 + h * 32).cast())
-                };
-                *w = if KIND == GATES { split::<true>(v) } else { split::<false>(v) };
-            }
-            for (i, acc) in acc.iter_mut().enumerate() {
-                let at = r * words + i * stride + quad * 4;
-                // SAFETY: r < runs, i < N and quad < quads, so the first assertion above bounds the last of
-                // these 4 bytes; the read asks for no alignment.
-                let word = unsafe { streams.as_ptr().add(at).cast::<i32>().read_unaligned() };
-                let x = _mm256_set1_epi32(word);
-                let x = if KIND == TURNED { split::<true>(x) } else { split::<false>(x) };
-                for (acc, w) in acc.iter_mut().zip(w) {
-                    *acc = _mm256_add_epi32(*acc, _mm256_madd_epi16(x[0], w[0]));
-                    *acc = _mm256_add_epi32(*acc, _mm256_madd_epi16(x[1], w[1]));
+        for first in (0..quads).step_by(QUADS) {
+            let count = (quads - first).min(QUADS);
+            let (x, v) = (r * words + first * 4, r * run + first * 64);
+            // SAFETY: r < runs and first + count <= quads, so the first assertion above bounds 4 * count bytes of each
+            // of the N streams, and the second 64 * count bytes of the vectors.
+            let (x, v) = unsafe { (streams.as_ptr().add(x), vectors.as_ptr().add(v)) };
+            if KIND != TURNED && count == QUADS {
+                // SAFETY: 64 bytes of each stream lie there, as above.
+                let mut lit = unsafe { lit_quads::<N>(x, stride) };
+                if lit.count_ones() <= FEW {
+                    while lit != 0 {
+                        // SAFETY: a quad below 16, whose bytes lie there, as above.
+                        unsafe {
+                            dot::<KIND, N>(&mut acc, x, stride, v, lit.trailing_zeros() as usize)
+                        };
+                        lit &= lit - 1;
+                    }
+                    continue;
                 }
+            }
+            for quad in 0..count {
+                // SAFETY: a quad below `count`, whose bytes lie there, as above.
+                unsafe { dot::<KIND, N>(&mut acc, x, stride, v, quad) };
             }
         }
     }
@@ -273,9 +362,13 @@ fn read(cells: &[u8], drives: Drives<'_>, samples: Range<usize>, out: &mut [i32]
         out: 32,
     };
     let streams = &drives.codes()[samples.start * BLOCK_ROWS..];
+    let together = pairs::together(drives.greatest());
     for half in 0..2 {
-        let out = &mut out[half * HALF_COLUMNS..];
-        dots_batch::<READ>(walk, samples.len(), streams, &cells[half * HALF_CELLS..], out);
+        let (out, vectors) = (&mut out[half * HALF_COLUMNS..], &cells[half * HALF_CELLS..]);
+        match together {
+            Some(together) => pairs::batch(together, walk, samples.len(), streams, vectors, out),
+            None => dots_batch::<READ>(walk, samples.len(), streams, vectors, out),
+        }
     }
 }
 

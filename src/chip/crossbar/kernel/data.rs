@@ -2,7 +2,7 @@
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
 use super::chacha::Draws;
-use crate::chip::crossbar::layout::{BLOCK_ROWS, HALF_CELLS, PANEL_COLUMNS};
+use crate::chip::crossbar::layout::{BLOCK_ROWS, HALF_CELLS, HALF_COLUMNS, PANEL_COLUMNS};
 
 /// Sums, or levels, of a half block. Sums lie row-major, `[64 rows][16 columns]`; levels, residuals
 /// and dither words lie as [`in_half`](crate::chip::crossbar::layout::in_half) says.
@@ -14,6 +14,16 @@ pub type Half<T> = [T; HALF_CELLS];
 pub struct Drives<'a> {
     codes: &'a [u8],
     samples: usize,
+    greatest: Greatest,
+}
+
+/// What a read meets at most: where both are small, sums of pairs fit narrower lanes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Greatest {
+    /// Of the levels of the plane that is read.
+    pub level: u8,
+    /// Of the drive codes.
+    pub code: u8,
 }
 
 impl<'a> Drives<'a> {
@@ -27,7 +37,19 @@ impl<'a> Drives<'a> {
             samples > 0 && codes.len().is_multiple_of(samples * BLOCK_ROWS),
             "drives come in whole blocks"
         );
-        Self { codes, samples }
+        Self { codes, samples, greatest: Greatest { level: u8::MAX, code: u8::MAX } }
+    }
+
+    /// The same, where levels and codes are known to stay within their greatest. A back end may rely on it.
+    #[must_use]
+    pub const fn within(self, greatest: Greatest) -> Self {
+        Self { greatest, ..self }
+    }
+
+    /// What the read meets at most.
+    #[must_use]
+    pub const fn greatest(self) -> Greatest {
+        self.greatest
     }
 
     /// All codes.
@@ -52,7 +74,7 @@ impl<'a> Drives<'a> {
     #[must_use]
     pub fn of_blocks(self, blocks: std::ops::Range<usize>) -> Self {
         let size = self.samples * BLOCK_ROWS;
-        Self { codes: &self.codes[blocks.start * size..blocks.end * size], samples: self.samples }
+        Self { codes: &self.codes[blocks.start * size..blocks.end * size], ..self }
     }
 
     /// The 64 codes of a block and sample.
@@ -204,6 +226,38 @@ pub struct Single<'a> {
     pub write: &'a Write,
     /// Peaks of all rows over the columns of the strip, where they are asked for; 0 before.
     pub peaks: Option<&'a mut [[u8; 2]]>,
+}
+
+/// How a sum of one product becomes pulses that need no bound: `(rsh(sum, right) + word) >> 8`.
+#[cfg(target_arch = "x86_64")]
+#[derive(Debug, Clone, Copy)]
+pub(super) struct OneProduct {
+    /// 1..=15.
+    pub(super) right: u32,
+    /// Floor and ceiling.
+    pub(super) window: (u8, u8),
+    /// At most one pulse, and a window of all levels, where the addition saturates.
+    pub(super) usual: bool,
+}
+
+#[cfg(target_arch = "x86_64")]
+impl Single<'_> {
+    /// Half blocks side by side of the widest strip taken.
+    pub(super) const HALVES: usize = 8;
+
+    /// How its sums become pulses, if they are of the kind that is written at once.
+    pub(super) fn one_product(&self) -> Option<OneProduct> {
+        let write = self.write;
+        let window = (u8::try_from(write.floor).ok()?, u8::try_from(write.ceiling).ok()?);
+        let halves = self.gates.len() / (4 * HALF_COLUMNS);
+        if write.mantissa != 1 || !(9..=23).contains(&write.shift) || halves > Self::HALVES {
+            return None;
+        }
+        let right = write.shift - 8;
+        let reach = (((255 * 127 + (1 << right >> 1)) >> right) + 255) >> 8;
+        let usual = reach <= 1 && window == (0, 255);
+        (reach <= write.increment_max.min(15)).then_some(OneProduct { right, window, usual })
+    }
 }
 
 /// Where bounded pulses go.

@@ -15,7 +15,7 @@
 //! Otherwise `rounded` is at most the sum, and a residual of 16 bits fits above it.
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
-use super::{Cells, Conversion, Dither, Extremes, Half, Peaks, Write, WriteCounts};
+use super::{Cells, Conversion, Dither, Half, Write, WriteCounts};
 use crate::chip::crossbar::layout::{BLOCK_ROWS, HALF_CELLS, HALF_COLUMNS, PANEL_COLUMNS};
 use crate::num::fixed::ErrorBits;
 
@@ -200,23 +200,6 @@ pub(super) fn program(
     let [requested, bounded, attempted, effective] =
         counts.map(|lanes| lanes.iter().map(|&lane| u64::from(lane)).sum());
     WriteCounts { requested, bounded, attempted, effective }
-}
-
-/// [`super::scalar::peaks`], a group of 4 rows and 16 columns at a time.
-#[inline(always)]
-pub(super) fn peaks(extremes: &Extremes) -> Peaks {
-    let mut peaks = [[0; BLOCK_ROWS]; 2];
-    for (peaks, cells) in peaks.iter_mut().zip([&extremes.most, &extremes.least]) {
-        let groups = cells.as_chunks::<64>().0.iter().zip(peaks.as_chunks_mut::<4>().0);
-        for (cells, peaks) in groups {
-            for column in cells.as_chunks::<4>().0 {
-                for (peak, pulses) in peaks.iter_mut().zip(column) {
-                    *peak = (*peak).max(pulses.unsigned_abs());
-                }
-            }
-        }
-    }
-    std::array::from_fn(|row| [peaks[0][row], peaks[1][row]])
 }
 
 /// Four rows of 16 columns out of bytes in the order of levels: a column's four rows are one word.

@@ -131,8 +131,24 @@ impl Loops for Neon {
     }
 
     fn peaks(self, extremes: &Extremes) -> Peaks {
-        lanes::peaks(extremes)
+        peaks(extremes)
     }
+}
+
+/// The law, a group of 4 rows and 16 columns at a time.
+fn peaks(extremes: &Extremes) -> Peaks {
+    let mut peaks = [[0; BLOCK_ROWS]; 2];
+    for (peaks, cells) in peaks.iter_mut().zip([&extremes.most, &extremes.least]) {
+        let groups = cells.as_chunks::<64>().0.iter().zip(peaks.as_chunks_mut::<4>().0);
+        for (cells, peaks) in groups {
+            for column in cells.as_chunks::<4>().0 {
+                for (peak, pulses) in peaks.iter_mut().zip(column) {
+                    *peak = (*peak).max(pulses.unsigned_abs());
+                }
+            }
+        }
+    }
+    std::array::from_fn(|row| [peaks[0][row], peaks[1][row]])
 }
 
 #[inline]

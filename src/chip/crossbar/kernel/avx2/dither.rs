@@ -4,6 +4,8 @@
 //! lane c      block `(column + c) * ceil(rows / 64) + block` of the place
 //! word i      4 bytes: rows 4i .. 4i + 4 of column c
 //! ```
+//!
+//! Three of the four quarter rounds of the first round are made once a write: see [`Draws`].
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
 use std::arch::x86_64::*;
@@ -40,30 +42,43 @@ fn quarter(s: &mut [__m256i; 16], a: usize, b: usize, c: usize, d: usize) {
     s[b] = rotate::<7, 25>(_mm256_xor_si256(s[b], s[c]));
 }
 
+/// The words of 8 columns, from their word 12 of the start.
 #[target_feature(enable = "avx2,popcnt")]
-pub(super) fn dither(draws: &Draws, column: usize, block: usize, out: &mut Half<u8>) {
-    let (start, counter) = (draws.start(), draws.counter(64, column, block));
-    let mut lane = _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7);
-    for group in 0..2 {
-        let mut first = [_mm256_setzero_si256(); 16];
-        for (first, word) in first.iter_mut().zip(start) {
-            *first = _mm256_set1_epi32(*word);
-        }
-        let grown = _mm256_mullo_epi32(lane, _mm256_set1_epi32(counter.step));
-        first[12] = _mm256_add_epi32(_mm256_set1_epi32(counter.first), grown);
-        let mut s = first;
-        for _ in 0..4 {
+pub(super) fn drawn(draws: &Draws, counter: __m256i) -> [__m256i; 16] {
+    let mut s = [_mm256_setzero_si256(); 16];
+    for (s, word) in s.iter_mut().zip(draws.mixed()) {
+        *s = _mm256_set1_epi32(*word);
+    }
+    s[12] = counter;
+    quarter(&mut s, 0, 4, 8, 12);
+    for round in 0..4 {
+        if round > 0 {
             quarter(&mut s, 0, 4, 8, 12);
             quarter(&mut s, 1, 5, 9, 13);
             quarter(&mut s, 2, 6, 10, 14);
             quarter(&mut s, 3, 7, 11, 15);
-            quarter(&mut s, 0, 5, 10, 15);
-            quarter(&mut s, 1, 6, 11, 12);
-            quarter(&mut s, 2, 7, 8, 13);
-            quarter(&mut s, 3, 4, 9, 14);
         }
-        for ((out, s), first) in out.as_chunks_mut::<64>().0.iter_mut().zip(s).zip(first) {
-            store(&mut out.as_chunks_mut().0[group], _mm256_add_epi32(s, first));
+        quarter(&mut s, 0, 5, 10, 15);
+        quarter(&mut s, 1, 6, 11, 12);
+        quarter(&mut s, 2, 7, 8, 13);
+        quarter(&mut s, 3, 4, 9, 14);
+    }
+    for (at, (s, start)) in s.iter_mut().zip(draws.start()).enumerate() {
+        let start = if at == 12 { counter } else { _mm256_set1_epi32(*start) };
+        *s = _mm256_add_epi32(*s, start);
+    }
+    s
+}
+
+#[target_feature(enable = "avx2,popcnt")]
+pub(super) fn dither(draws: &Draws, column: usize, block: usize, out: &mut Half<u8>) {
+    let counter = draws.counter(64, column, block);
+    let mut lane = _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7);
+    for group in 0..2 {
+        let grown = _mm256_mullo_epi32(lane, _mm256_set1_epi32(counter.step));
+        let counter = _mm256_add_epi32(_mm256_set1_epi32(counter.first), grown);
+        for (out, v) in out.as_chunks_mut::<64>().0.iter_mut().zip(drawn(draws, counter)) {
+            store(&mut out.as_chunks_mut().0[group], v);
         }
         lane = _mm256_add_epi32(lane, _mm256_set1_epi32(8));
     }

@@ -26,7 +26,7 @@
 
 use std::arch::x86_64::*;
 
-use super::{load, load_sums, store};
+use super::{load, load_sums, store, total};
 use crate::chip::crossbar::kernel::{Cells, Dither, Half, Pulsed, Write, WriteCounts, lanes};
 
 /// Half-up.
@@ -202,18 +202,36 @@ fn rounded<const DITHER: u8, const RESIDUAL: bool>(
     _mm256_srav_epi32(_mm256_add_epi32(q, word), scale.last)
 }
 
-#[target_feature(enable = "avx2,popcnt")]
-fn total(v: __m256i) -> u64 {
-    let v = _mm_add_epi64(_mm256_castsi256_si128(v), _mm256_extracti128_si256::<1>(v));
-    let v = _mm_add_epi64(v, _mm_unpackhi_epi64(v, v));
-    _mm_cvtsi128_si64(v).cast_unsigned()
-}
-
 /// Zeros among the 32 bytes.
 #[inline]
 #[target_feature(enable = "avx2,popcnt")]
 fn zeros(v: __m256i) -> u32 {
     _mm256_movemask_epi8(_mm256_cmpeq_epi8(v, _mm256_setzero_si256())).count_ones()
+}
+
+/// Groups of four rows with a sum that does not round to 0 whatever its word: see [`super::super::Kernel::loud`].
+#[target_feature(enable = "avx2,popcnt")]
+pub(super) fn loud(sums: &Half<i32>, write: &Write, bits: u32) -> u16 {
+    let by = write.shift.saturating_sub(write.residual_bits).saturating_sub(bits);
+    if by > 31 {
+        return 0; // every sum rounds to 0
+    }
+    // at 31 a sum that is too large wraps, and has the top bit as one that is too small
+    let half = _mm256_set1_epi32((1u32 << by >> 1).cast_signed());
+    // all bits of a loud sum that a quiet one does not have
+    let beyond = _mm256_set1_epi32(u32::MAX.wrapping_shl(by).cast_signed());
+    let mantissa = if write.negate { -write.mantissa } else { write.mantissa };
+    let mantissa = _mm256_set1_epi32(mantissa);
+    let mut loud = 0;
+    for (group, sums) in sums.as_chunks::<64>().0.iter().enumerate() {
+        let mut any = _mm256_setzero_si256();
+        for sums in sums.as_chunks::<8>().0 {
+            let v = _mm256_mullo_epi32(load_sums(sums), mantissa);
+            any = _mm256_or_si256(any, _mm256_add_epi32(v, half));
+        }
+        loud |= u16::from(_mm256_testz_si256(any, beyond) == 0) << group;
+    }
+    loud
 }
 
 #[target_feature(enable = "avx2,popcnt")]

@@ -21,11 +21,11 @@ use super::dither::drawn;
 use super::pulses::{peaks as fold_rows, take};
 use super::units::store_bytes;
 use super::{as_bytes, load, load_sums, store, store_sums};
-use crate::chip::crossbar::kernel::{Extremes, Pulsed, Single, WriteCounts};
+use crate::chip::crossbar::kernel::{Extremes, OneProduct, Pulsed, Single, WriteCounts};
 use crate::chip::crossbar::layout::{BLOCK_CELLS, BLOCK_ROWS, HALF_CELLS, HALF_COLUMNS};
 
 /// Half blocks side by side of the widest strip taken.
-const HALVES: usize = 8;
+const HALVES: usize = Single::HALVES;
 /// Columns of the widest strip, and a vector more.
 const ROOM: usize = HALVES * HALF_COLUMNS + 16;
 
@@ -56,30 +56,18 @@ struct Rounding {
 /// See [`super::super::Kernel::single`].
 #[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi,popcnt")]
 pub(super) fn single(strip: Single<'_>) -> Option<WriteCounts> {
-    let write = strip.write;
-    let (Ok(floor), Ok(ceiling)) = (u8::try_from(write.floor), u8::try_from(write.ceiling)) else {
-        return None;
-    };
-    let halves = strip.gates.len() / 64;
-    if write.mantissa != 1 || !(9..=23).contains(&write.shift) || halves > HALVES {
-        return None;
-    }
-    let right = write.shift - 8;
-    let reach = (((255 * 127 + (1 << right >> 1)) >> right) + 255) >> 8;
-    if reach > write.increment_max.min(15) {
-        return None;
-    }
-    Some(match (reach, floor, ceiling) {
-        (..=1, 0, 255) => strip_of::<true>(strip, right, (floor, ceiling)),
-        _ => strip_of::<false>(strip, right, (floor, ceiling)),
+    let rounding = strip.one_product()?;
+    Some(if rounding.usual {
+        strip_of::<true>(strip, rounding)
+    } else {
+        strip_of::<false>(strip, rounding)
     })
 }
 
 #[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi,popcnt")]
 fn strip_of<const USUAL: bool>(
     strip: Single<'_>,
-    right: u32,
-    (floor, ceiling): (u8, u8),
+    OneProduct { right, window: (floor, ceiling), .. }: OneProduct,
 ) -> WriteCounts {
     let Single { low, blocks, turned, gates, column, draws, write, mut peaks } = strip;
     let halves = gates.len() / 64;
