@@ -7,7 +7,7 @@
  *            the lowest TiB to itself, and what the guest maps is mapped here, in that TiB. So a system call takes
  *            pointers as they are, and what this process may not touch, the guest may not either.
  * Calls      `syscall` leaves the loop of the processor; most calls go to the host with the same arguments (calls.c).
- * Threads    One runs at a time, in turns of a fixed number of instructions (threads.c): a run repeats exactly.
+ * Threads    One runs at a time, in turns of a fixed number of instructions (threads.c).
  * Tiles      This build of Bochs has AVX-512, but neither AMX nor its bits of `cpuid`: amx.c has both.
  *
  * Left out on purpose: signals to the guest (handlers are noted, never called), new processes, the vdso, protection

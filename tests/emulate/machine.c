@@ -40,17 +40,21 @@ void context_changed(void) __asm__("_ZN8BX_CPU_C22handleCpuContextChangeEv");
 void flush_code(void) __asm__("_Z12flushICachesv");
 void *sapphire_rapids(void *cpu) __asm__("_Z28create_sapphire_rapids_cpuidP8BX_CPU_C");
 
-/* --- what this build asks of a newer C library --- */
+/* --- what this build asks of a C library newer than some --- */
 
-unsigned long long __isoc23_strtoull(const char *text, char **end, int base);
-unsigned long long __isoc23_strtoull(const char *text, char **end, int base) { return strtoull(text, end, base); }
+/* By their labels: a newer header would turn these names into the ones defined here. */
+unsigned long long number_of(const char *text, char **end, int base) __asm__("strtoull");
+int scan(const char *text, const char *format, va_list list) __asm__("vsscanf");
 
-int __isoc23_sscanf(const char *text, const char *format, ...);
-int __isoc23_sscanf(const char *text, const char *format, ...)
+unsigned long long wanted_strtoull(const char *text, char **end, int base) __asm__("__isoc23_strtoull");
+unsigned long long wanted_strtoull(const char *text, char **end, int base) { return number_of(text, end, base); }
+
+int wanted_sscanf(const char *text, const char *format, ...) __asm__("__isoc23_sscanf");
+int wanted_sscanf(const char *text, const char *format, ...)
 {
     va_list list;
     va_start(list, format);
-    int count = vsscanf(text, format, list);
+    int count = scan(text, format, list);
     va_end(list);
     return count;
 }
@@ -77,6 +81,10 @@ void features(void *self, u32 leaf, u32 part, u32 *answer)
         *(void **)&theirs = dlsym(RTLD_NEXT, "_ZNK17sapphire_rapids_t14get_cpuid_leafEjjP16cpuid_function_t");
     theirs(self, leaf, part, answer);
     tile_features(leaf, part, answer);
+    if (leaf == 7 && part == 0) { /* `rep movsb` and `rep stosb` are fast on the processor, and slow here */
+        answer[1] &= ~(1u << 9);
+        answer[3] &= ~(1u << 4);
+    }
 }
 
 void *host_address(void *cpu, u64 address, u32 access) __asm__("_ZN8BX_MEM_C14getHostMemAddrEP8BX_CPU_Cmj");

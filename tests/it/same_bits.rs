@@ -13,6 +13,17 @@ fn hash(done: &serde_json::Value) -> String {
 /// Hash of the small run of `program::train`. It moves only when an equation does: say which in the commit.
 const GOLDEN: &str = include_str!("../golden/digits.hash");
 
+/// Large enough that loads, reads, gates, turning and writes are all shared among threads.
+#[test]
+fn threads_that_share_every_operation_do_not_move_a_bit() {
+    let out = tempfile::tempdir().unwrap();
+    let hashes = ["1", "2", "3"].map(|threads| {
+        let large = ["--set", "learning.batch=2048", "--set", "network.hidden=[300]"];
+        hash(&trained(out.path(), &[&large[..], &["--threads", threads]].concat()).1)
+    });
+    assert!(hashes.iter().all(|hash| *hash == hashes[0]), "{hashes:?}");
+}
+
 #[test]
 fn threads_kernels_and_tiles_do_not_move_a_bit() {
     let out = tempfile::tempdir().unwrap();
