@@ -314,8 +314,9 @@ mod tests {
     fn helpers_do_take_parts_and_wake_up_for_them() {
         let mut team = team(2);
         for _ in 0..3 {
-            // long enough for the helper to fall asleep, then for it to come
-            thread::sleep(std::time::Duration::from_millis(20));
+            while !team.shared.asleep[0].load(SeqCst) {
+                thread::yield_now();
+            }
             let here = thread::current().id();
             let both = std::sync::Barrier::new(2);
             let others = team.each(vec![(0, ()), (0, ())], |_, ()| {
