@@ -261,7 +261,9 @@ long call(u64 number, const u64 *a)
         return set_mask(a[0], (void *)a[1], (void *)a[2]);
     case SYS_sigaltstack:
         return set_signal_stack((void *)a[0], (void *)a[1]);
-    case SYS_kill: case SYS_tkill:
+    case SYS_kill:
+        return (int)a[0] == getpid() ? send_signal(a[1]) : host(number, a);
+    case SYS_tkill:
         return send_signal(a[1]);
     case SYS_tgkill:
         return send_signal(a[2]);
@@ -295,11 +297,12 @@ long call(u64 number, const u64 *a)
     case SYS_ioctl: case SYS_pread64: case SYS_pwrite64: case SYS_writev: case SYS_access: case SYS_pipe: case SYS_dup:
     case SYS_dup2: case SYS_fcntl: case SYS_flock: case SYS_fsync: case SYS_fdatasync: case SYS_truncate:
     case SYS_ftruncate: case SYS_getcwd: case SYS_chdir: case SYS_rename: case SYS_mkdir: case SYS_rmdir: case SYS_link:
-    case SYS_unlink: case SYS_symlink: case SYS_chmod: case SYS_fchmod: case SYS_umask: case SYS_statfs:
-    case SYS_fstatfs: case SYS_getdents64: case SYS_openat: case SYS_mkdirat: case SYS_newfstatat: case SYS_unlinkat:
-    case SYS_renameat: case SYS_linkat: case SYS_symlinkat: case SYS_fchmodat: case SYS_faccessat: case SYS_utimensat:
-    case SYS_fallocate: case SYS_eventfd2: case SYS_dup3: case SYS_pipe2: case SYS_renameat2: case SYS_memfd_create:
-    case SYS_copy_file_range: case SYS_statx: case SYS_faccessat2: case SYS_sendfile: case SYS_fadvise64:
+    case SYS_unlink: case SYS_symlink: case SYS_chmod: case SYS_fchmod: case SYS_chown: case SYS_fchown: case SYS_umask:
+    case SYS_statfs: case SYS_fstatfs: case SYS_getdents64: case SYS_openat: case SYS_mkdirat: case SYS_newfstatat:
+    case SYS_unlinkat: case SYS_renameat: case SYS_linkat: case SYS_symlinkat: case SYS_fchmodat: case SYS_faccessat:
+    case SYS_utimensat: case SYS_fallocate: case SYS_eventfd2: case SYS_dup3: case SYS_pipe2: case SYS_renameat2:
+    case SYS_memfd_create: case SYS_copy_file_range: case SYS_statx: case SYS_faccessat2: case SYS_sendfile:
+    case SYS_fadvise64:
     /* what the process is, and the time */
     case SYS_getpid: case SYS_getppid: case SYS_getuid: case SYS_geteuid: case SYS_getgid: case SYS_getegid:
     case SYS_uname: case SYS_getrlimit: case SYS_prlimit64: case SYS_getrusage: case SYS_sysinfo: case SYS_times:

@@ -10,9 +10,9 @@
  * Threads    One runs at a time, in turns of a fixed number of instructions (threads.c).
  * Tiles      This build of Bochs has AVX-512, but neither AMX nor its bits of `cpuid`: amx.c has both.
  *
- * Left out on purpose: signals to the guest (handlers are noted, never called), new processes, the vdso, protection
- * keys, execution of pages that are not executable (it succeeds), tiles of bf16. What is left out ends the program or
- * answers ENOSYS with a line on standard error; nothing is answered with a guess. */
+ * Left out on purpose: signals to the guest (handlers are noted, never called), new processes, sockets, the vdso,
+ * protection keys, pages that must not be executed (they are), tiles of bf16, tiles in `xsave`. A call that is left out
+ * answers ENOSYS with a line on standard error; an instruction that is ends the program with its place. */
 #ifndef EMULATE_H
 #define EMULATE_H
 

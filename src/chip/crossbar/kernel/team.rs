@@ -142,11 +142,11 @@ impl Team {
                 }
             }
         });
-        let result = |(_, slot): (usize, Mutex<(Option<T>, Option<R>)>)| {
+        let results = slots.into_iter().map(|(_, slot)| {
             let (_, result) = slot.into_inner().unwrap_or_else(PoisonError::into_inner);
             result.expect("nobody panicked, so every part was done")
-        };
-        slots.into_iter().map(result).collect()
+        });
+        results.collect()
     }
 
     /// [`Self::each`] on the caller's thread.
