@@ -44,6 +44,9 @@ fi
 step cargo test --release --test it
 cargo test --release --test it
 
+step AVX-512 and AMX on an emulated processor
+tests/emulated.sh "${rtl[@]}"
+
 runs="$(mktemp -d)"
 trap 'rm -rf "$runs"' EXIT
 for example in examples/*.toml; do

@@ -4,10 +4,9 @@
 #   tests/emulate.sh PROGRAM ARGUMENTS...     ends with the program's own status
 #   tests/emulate.sh --count PROGRAM ...      says how many instructions it was
 #   tests/emulate.sh --self-test              instructions with known answers
+#   tests/emulate.sh --fetch                  only gets the emulator
 #
-# The kernels, with few cases of each property (libtest runs on the first thread):
-#   cargo test --lib --no-run
-#   PROPTEST_CASES=4 tests/emulate.sh target/debug/deps/dalean-HASH --test-threads=1 kernel
+# tests/emulated.sh runs the kernels on it.
 #
 # Needs a C compiler and Python's pip: the processor is Bochs, out of a pinned wheel. See tests/emulate/emulate.h.
 set -euo pipefail
@@ -54,6 +53,7 @@ ends_with() {
 }
 
 fetch
+[[ ${1:-} != --fetch ]] || exit 0
 if newer "$build/emulate" "$source" "${BASH_SOURCE[0]}"; then compile; fi
 
 if [[ ${1:-} == --self-test ]]; then

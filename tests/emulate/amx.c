@@ -99,7 +99,7 @@ static bool store_tile(int tile, u64 address, u64 stride)
     return true;
 }
 
-/* C[m][n] += the sum over k and i of A[m][4k + i] B[k][4n + i], in 32 bits that wrap. Outside of its shape a tile is 0. */
+/* C[m][n] += the sum over k and i of A[m][4k + i] B[k][4n + i], in 32 bits that wrap. A tile is 0 outside its shape. */
 static bool multiply(int c, int a, int b, bool a_signed, bool b_signed)
 {
     bool fits = shaped(a) && shaped(b) && shaped(c) && a != b && a != c && b != c
