@@ -105,6 +105,10 @@ impl Loops for Avx2 {
         compiled!(dither::dither(draws, column, block, words));
     }
 
+    fn dither_words(self, draws: &Draws, column: usize, block: usize, words: &mut Half<u16>) {
+        compiled!(dither::dither_words(draws, column, block, words));
+    }
+
     fn program(
         self,
         cells: Cells<'_>,

@@ -11,6 +11,7 @@
 use std::arch::x86_64::*;
 
 use super::store;
+use crate::chip::crossbar::kernel::chacha::Counter;
 use crate::chip::crossbar::kernel::{Draws, Half};
 
 /// Turns the 32-bit lanes left; `LEFT + RIGHT` is 32.
@@ -70,16 +71,55 @@ pub(super) fn drawn(draws: &Draws, counter: __m256i) -> [__m256i; 16] {
     s
 }
 
+/// Word 12 of 8 of the 16 columns: the first 8, or the last.
+#[inline]
+#[target_feature(enable = "avx2,popcnt")]
+fn counters(counter: Counter, eight: usize) -> __m256i {
+    let lane = _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7);
+    let lane = _mm256_add_epi32(lane, _mm256_set1_epi32(if eight == 0 { 0 } else { 8 }));
+    let grown = _mm256_mullo_epi32(lane, _mm256_set1_epi32(counter.step));
+    _mm256_add_epi32(_mm256_set1_epi32(counter.first), grown)
+}
+
 #[target_feature(enable = "avx2,popcnt")]
 pub(super) fn dither(draws: &Draws, column: usize, block: usize, out: &mut Half<u8>) {
     let counter = draws.counter(64, column, block);
-    let mut lane = _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7);
-    for group in 0..2 {
-        let grown = _mm256_mullo_epi32(lane, _mm256_set1_epi32(counter.step));
-        let counter = _mm256_add_epi32(_mm256_set1_epi32(counter.first), grown);
-        for (out, v) in out.as_chunks_mut::<64>().0.iter_mut().zip(drawn(draws, counter)) {
-            store(&mut out.as_chunks_mut().0[group], v);
+    for eight in 0..2 {
+        let words = drawn(draws, counters(counter, eight));
+        for (out, v) in out.as_chunks_mut::<64>().0.iter_mut().zip(words) {
+            store(&mut out.as_chunks_mut().0[eight], v);
         }
-        lane = _mm256_add_epi32(lane, _mm256_set1_epi32(8));
     }
+}
+
+/// A 64-byte block holds the 16-bit words of 32 rows: two a block of levels.
+#[target_feature(enable = "avx2,popcnt")]
+pub(super) fn dither_words(draws: &Draws, column: usize, block: usize, words: &mut Half<u16>) {
+    for half in 0..2 {
+        if (2 * block + half) * 32 >= draws.rows() {
+            return;
+        }
+        let counter = draws.counter(32, column, 2 * block + half);
+        let groups = &mut words.as_chunks_mut::<64>().0[8 * half..][..8];
+        for eight in 0..2 {
+            let drawn = drawn(draws, counters(counter, eight));
+            for (words, v) in groups.iter_mut().zip(drawn.as_chunks::<2>().0) {
+                store_columns(&mut words.as_chunks_mut().0[eight], *v);
+            }
+        }
+    }
+}
+
+/// Stores four rows of 8 columns: of each column the word of rows 0 and 1, then that of rows 2 and 3.
+#[inline]
+#[target_feature(enable = "avx2,popcnt")]
+pub(super) fn store_columns(words: &mut [u16; 32], [a, b]: [__m256i; 2]) {
+    // Columns 0 1 4 5 and 2 3 6 7.
+    let (outer, inner) = (_mm256_unpacklo_epi32(a, b), _mm256_unpackhi_epi32(a, b));
+    let left = _mm256_permute2x128_si256::<0x20>(outer, inner);
+    let right = _mm256_permute2x128_si256::<0x31>(outer, inner);
+    // SAFETY: the reference covers 32 words, 64 bytes; this writes the first 32.
+    unsafe { _mm256_storeu_si256(words.as_mut_ptr().cast(), left) }
+    // SAFETY: the reference covers 32 words, 64 bytes; this writes the last 32.
+    unsafe { _mm256_storeu_si256(words[16..].as_mut_ptr().cast(), right) }
 }

@@ -26,6 +26,7 @@
 
 use std::arch::x86_64::*;
 
+use super::dither::store_columns;
 use super::{load, load_sums, store, total};
 use crate::chip::crossbar::kernel::{Cells, Dither, Half, Pulsed, Write, WriteCounts, lanes};
 
@@ -169,14 +170,7 @@ fn dither_rows<const DITHER: u8>(bytes: &[u8; 32], words: &[u16; 32]) -> [__m256
 fn store_rows(words: &mut [u16; 32], rows: [__m256i; 4]) {
     let a = _mm256_or_si256(rows[0], _mm256_slli_epi32::<16>(rows[1]));
     let b = _mm256_or_si256(rows[2], _mm256_slli_epi32::<16>(rows[3]));
-    // Columns 0 1 4 5 and 2 3 6 7.
-    let (outer, inner) = (_mm256_unpacklo_epi32(a, b), _mm256_unpackhi_epi32(a, b));
-    let left = _mm256_permute2x128_si256::<0x20>(outer, inner);
-    let right = _mm256_permute2x128_si256::<0x31>(outer, inner);
-    // SAFETY: the reference covers 32 words, 64 bytes; this writes the first 32.
-    unsafe { _mm256_storeu_si256(words.as_mut_ptr().cast(), left) }
-    // SAFETY: the reference covers 32 words, 64 bytes; this writes the last 32.
-    unsafe { _mm256_storeu_si256(words[16..].as_mut_ptr().cast(), right) }
+    store_columns(words, [a, b]);
 }
 
 /// The rounded product of 8 cells.
