@@ -17,7 +17,10 @@ skip() {
 tests/emulate.sh --fetch || skip 'the emulator cannot be fetched'
 tests/emulate.sh --self-test
 
-built=$(cargo test "$@" --lib --no-run 2>&1)
+if ! built=$(cargo test "$@" --lib --no-run 2>&1); then
+    echo "$built"
+    exit 1
+fi
 tests=$(sed -n 's/.*Executable unittests src.lib.rs (\(.*\))/\1/p' <<<"$built")
 PROPTEST_CASES="${PROPTEST_CASES:-8}" tests/emulate.sh "$tests" --test-threads=1 \
     kernel::tests kernel::team whole_blocks_of_channels \

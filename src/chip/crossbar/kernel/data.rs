@@ -2,7 +2,7 @@
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
 use super::chacha::Draws;
-use crate::chip::crossbar::layout::{BLOCK_ROWS, HALF_CELLS, HALF_COLUMNS, PANEL_COLUMNS};
+use crate::chip::crossbar::layout::{BLOCK_ROWS, HALF_CELLS, PANEL_COLUMNS};
 
 /// Sums, or levels, of a half block. Sums lie row-major, `[64 rows][16 columns]`; levels, residuals
 /// and dither words lie as [`in_half`](crate::chip::crossbar::layout::in_half) says.
@@ -249,7 +249,7 @@ impl Single<'_> {
     pub(super) fn one_product(&self) -> Option<OneProduct> {
         let write = self.write;
         let window = (u8::try_from(write.floor).ok()?, u8::try_from(write.ceiling).ok()?);
-        let halves = self.gates.len() / (4 * HALF_COLUMNS);
+        let halves = self.gates.len() / (4 * HALF_CELLS / BLOCK_ROWS);
         if write.mantissa != 1 || !(9..=23).contains(&write.shift) || halves > Self::HALVES {
             return None;
         }
