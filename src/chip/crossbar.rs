@@ -69,15 +69,15 @@ impl Crossbar {
     #[must_use]
     pub fn new(layout: Layout, hardware: &Hardware) -> Self {
         let cells = layout.cells_padded();
-        let [low, high] = hardware.window.floor().to_le_bytes();
-        let wide = hardware.level_bits.get() > 8;
+        let [low, high] = hardware.cell.window.floor().to_le_bytes();
+        let wide = hardware.cell.level_bits.get() > 8;
         Self {
             layout,
-            window: hardware.window,
+            window: hardware.cell.window,
             low: avec![low; cells],
             high: wide.then(|| avec![high; cells]),
-            residual: (hardware.residual_bits.get() > 0).then(|| vec![0; cells]),
-            pruned: (hardware.floor_kind == FloorKind::Absorbing).then(|| vec![0; cells / 64]),
+            residual: (hardware.write.residual_bits.get() > 0).then(|| vec![0; cells]),
+            pruned: (hardware.cell.floor_kind == FloorKind::Absorbing).then(|| vec![0; cells / 64]),
         }
     }
 

@@ -255,15 +255,16 @@ impl Engine {
         let ledger =
             if schedule.is_some() { Ledger::with_cycles(count) } else { Ledger::new(count) };
         let last = layers.len() - 1;
-        let codes = |layer: usize| (layer < last).then_some(hardware.drive_bits);
+        let codes = |layer: usize| (layer < last).then_some(hardware.drive.bits);
         let tables = layers.iter().zip(0..).map(|(l, at)| l.look_up(codes(at))).collect();
+        let collect = passes::collect(&hardware);
         Self {
             hardware,
             backend,
             team: Team::new(backend, 1),
             seed,
             potentiation_only: false,
-            collect: passes::collect(&hardware),
+            collect,
             mantissa: 1,
             registers: vec![Registers::default(); layers.len()],
             currents: vec![[[0; 2]; 2]; layers.len()],
@@ -464,7 +465,7 @@ impl Engine {
         assert!(codes.len().is_multiple_of(inputs), "codes come in whole samples");
         assert!(self.registers.iter().all(|r| r.pending == 0), "sums wait to be programmed");
         let greatest = codes.iter().fold(0, |most, &code| most.max(code));
-        assert!(greatest <= self.hardware.drive_bits.code_max(), "codes have `drive_bits` bits");
+        assert!(greatest <= self.hardware.drive.bits.code_max(), "codes have `drive_bits` bits");
         self.samples = codes.len() / inputs;
         let samples = self.samples;
         let drives = &mut self.registers[0].drives[Stream::P.index()];
@@ -489,7 +490,7 @@ impl Engine {
         let Some(this) = self.layers.get(layer).filter(|this| this.spec.constant_row) else {
             return;
         };
-        let (inputs, code) = (this.spec.inputs, self.hardware.drive_bits.code_max());
+        let (inputs, code) = (this.spec.inputs, self.hardware.drive.bits.code_max());
         let (block, row) = (inputs / BLOCK_ROWS, inputs % BLOCK_ROWS);
         let size = self.samples * BLOCK_ROWS;
         for drives in &mut self.registers[layer].drives {

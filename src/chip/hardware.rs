@@ -147,33 +147,56 @@ impl WriteScheme {
     pub const SLOTS_MAX: u32 = 64;
 }
 
-/// A chip. Lengths are in cells, widths in bits.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Hardware {
+/// Cells.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct CellSpec {
     /// Bits of a stored level.
     pub level_bits: LevelBits,
     /// Programming window.
     pub window: Window,
     /// What the floor does.
     pub floor_kind: FloorKind,
-    /// Rows of a physical tile.
-    pub tile_rows: usize,
-    /// Columns of a physical tile.
-    pub tile_columns: usize,
+}
+
+/// Physical arrays.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct TileSpec {
+    /// Rows of a tile.
+    pub rows: usize,
+    /// Columns of a tile.
+    pub columns: usize,
     /// Tiles the chip has; `None` is as many as it takes.
-    pub tiles_max: Option<usize>,
+    pub count_max: Option<usize>,
     /// Whether a tile can be read from its columns.
     pub transposed_read: bool,
+}
+
+impl TileSpec {
+    /// Rows or columns of a tile, at most: products of one tile of full bytes fit 31 bits.
+    pub const SIDE_MAX: usize = 32_768;
+}
+
+/// Row drivers.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct DriveSpec {
     /// Bits of a drive code.
-    pub drive_bits: DriveBits,
+    pub bits: DriveBits,
     /// Bits a row DAC puts on a row at a time.
     pub dac_bits: u32,
-    /// Column converters.
-    pub adc: Adc,
+}
+
+/// Digital logic beside the arrays.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct DigitalSpec {
     /// Bits of the activation table's index.
     pub lut_bits: LutBits,
     /// Bits of an error word.
     pub error_bits: ErrorBits,
+}
+
+/// Programming.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct WriteSpec {
     /// Bound of the pulses a write gives a cell.
     pub increment_max: IncrementMax,
     /// Dither of stochastic rounding.
@@ -184,28 +207,213 @@ pub struct Hardware {
     pub residual_bits: ResidualBits,
     /// How sums become pulses.
     pub scheme: WriteScheme,
+}
+
+/// The parts of a chip. Lengths are in cells, widths in bits. [`Hardware::new`] checks how they fit together.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct HardwareSpec {
+    /// Cells.
+    pub cell: CellSpec,
+    /// Physical arrays.
+    pub tile: TileSpec,
+    /// Row drivers.
+    pub drive: DriveSpec,
+    /// Column converters.
+    pub adc: Adc,
+    /// Digital logic beside the arrays.
+    pub digital: DigitalSpec,
+    /// Programming.
+    pub write: WriteSpec,
     /// Cycles of what a tile does; `None`: no cycles are counted.
     pub timing: Option<Timing>,
 }
 
+/// Parts that make no chip.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("`{key}` {found}; {allowed}")]
+pub struct HardwareError {
+    /// The key of a hardware model.
+    pub key: &'static str,
+    /// What was found.
+    pub found: String,
+    /// What is allowed and what to try.
+    pub allowed: String,
+}
+
+/// A chip whose parts were checked. Its [`HardwareSpec`] can be read, but not changed.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Hardware(HardwareSpec);
+
+impl std::ops::Deref for Hardware {
+    type Target = HardwareSpec;
+
+    fn deref(&self) -> &HardwareSpec {
+        &self.0
+    }
+}
+
+/// A number between two ends, or what is wrong with it.
+fn between(key: &'static str, found: u64, [min, max]: [u64; 2]) -> Result<(), HardwareError> {
+    if (min..=max).contains(&found) {
+        return Ok(());
+    }
+    let allowed = format!("it must lie in {min}..={max}");
+    Err(HardwareError { key, found: format!("is {found}"), allowed })
+}
+
 impl Hardware {
+    /// Checks that parts make a chip.
+    ///
+    /// # Errors
+    /// When a number lies outside what a chip of this kind can have, or parts contradict one another.
+    pub fn new(spec: HardwareSpec) -> Result<Self, HardwareError> {
+        // without `..`: a new part is checked here or does not compile
+        let HardwareSpec { cell, tile, drive, adc, digital, write, timing } = &spec;
+        let CellSpec { level_bits, window, floor_kind: _ } = cell;
+        let TileSpec { rows, columns, count_max, transposed_read: _ } = tile;
+        let DriveSpec { bits: drive_bits, dac_bits } = drive;
+        let DigitalSpec { lut_bits: _, error_bits: _ } = digital;
+        let WriteSpec { increment_max, dither_bits: _, dither_pattern: _, residual_bits, scheme } =
+            write;
+        let side_max = TileSpec::SIDE_MAX as u64;
+        let level_max = u64::from(level_bits.level_max());
+        between("cell.ceiling", window.ceiling().into(), [1, level_max])?;
+        between("tile.rows", *rows as u64, [1, side_max])?;
+        between("tile.columns", *columns as u64, [1, side_max])?;
+        if let Some(count) = count_max {
+            between("tile.count", *count as u64, [1, 1 << 30])?;
+        }
+        between("drive.dac_bits", (*dac_bits).into(), [1, drive_bits.get().into()])?;
+        if let Adc::Finite { range, .. } = adc {
+            match *range {
+                AdcRange::Shift(shift) => between("adc.range", shift.into(), [0, 40])?,
+                AdcRange::Calibrated { headroom, every_epoch: _ } => {
+                    between("adc.headroom", headroom.into(), [0, 16])?;
+                }
+                AdcRange::Full => {}
+            }
+        }
+        if let Some(timing) = timing {
+            timing.check()?;
+        }
+        if let WriteScheme::Trains { slots_log2 } = *scheme {
+            check_trains(slots_log2, *increment_max, *residual_bits, *timing)?;
+        }
+        Ok(Self(spec))
+    }
+
+    /// The ideal chip that tests and examples start from: 8-bit levels over their whole range, drives, words and dither
+    /// of 8 bits, tables of 10, tiles of 256 x 256 that can be read backwards, ideal converters, at most 7 pulses a
+    /// write, no remainders and no time.
+    ///
+    /// ```
+    /// use dalean::chip::hardware::{Hardware, HardwareSpec, TileSpec};
+    ///
+    /// let HardwareSpec { tile, .. } = Hardware::reference().into_spec();
+    /// let spec = HardwareSpec {
+    ///     tile: TileSpec { rows: 40_000, ..tile },
+    ///     ..Hardware::reference().into_spec()
+    /// };
+    /// let error = Hardware::new(spec).unwrap_err();
+    /// assert_eq!(error.to_string(), "`tile.rows` is 40000; it must lie in 1..=32768");
+    /// ```
+    ///
+    /// # Panics
+    /// Never: its numbers are constants.
+    #[must_use]
+    pub fn reference() -> Self {
+        const INSIDE: &str = "a constant inside its range";
+        let level_bits = LevelBits::new(8).expect(INSIDE);
+        let spec = HardwareSpec {
+            cell: CellSpec {
+                level_bits,
+                window: Window::new(0, 255, level_bits).expect(INSIDE),
+                floor_kind: FloorKind::Recoverable,
+            },
+            tile: TileSpec { rows: 256, columns: 256, count_max: None, transposed_read: true },
+            drive: DriveSpec { bits: DriveBits::new(8).expect(INSIDE), dac_bits: 8 },
+            adc: Adc::Ideal,
+            digital: DigitalSpec {
+                lut_bits: LutBits::new(10).expect(INSIDE),
+                error_bits: ErrorBits::new(8).expect(INSIDE),
+            },
+            write: WriteSpec {
+                increment_max: IncrementMax::new(7).expect(INSIDE),
+                dither_bits: DitherBits::Eight,
+                dither_pattern: DitherPattern::PerCell,
+                residual_bits: ResidualBits::new(0).expect(INSIDE),
+                scheme: WriteScheme::Rounded,
+            },
+            timing: None,
+        };
+        Self::new(spec).expect("the reference is a chip")
+    }
+
+    /// The parts, to make another chip of them.
+    #[must_use]
+    pub fn into_spec(self) -> HardwareSpec {
+        self.0
+    }
+
+    /// The same chip with some parts changed.
+    ///
+    /// # Errors
+    /// When the changed parts make no chip.
+    pub fn with(&self, change: impl FnOnce(&mut HardwareSpec)) -> Result<Self, HardwareError> {
+        let mut spec = self.0.clone();
+        change(&mut spec);
+        Self::new(spec)
+    }
+
     /// `NS`: slices a drive code is read in.
     #[must_use]
     pub const fn slices(&self) -> u32 {
-        self.drive_bits.get().div_ceil(self.dac_bits)
+        self.0.drive.bits.get().div_ceil(self.0.drive.dac_bits)
     }
 
     /// The shift at which no current of a tile can saturate a converter of `bits`.
     #[must_use]
     pub fn full_shift(&self, bits: AdcBits, subtract: Subtract, rows: usize) -> u32 {
-        let slice_max = (1i64 << self.dac_bits.min(self.drive_bits.get())) - 1;
-        let worst = rows as i64 * i64::from(self.window.ceiling()) * slice_max;
+        let slice_max = (1i64 << self.drive.dac_bits.min(self.drive.bits.get())) - 1;
+        let worst = rows as i64 * i64::from(self.cell.window.ceiling()) * slice_max;
         let rail = match subtract {
             Subtract::Digital => (1i64 << bits.get()) - 1,
             Subtract::Current => (1i64 << (bits.get() - 1)) - 1,
         };
         (0..).find(|&shift| crate::num::fixed::rsh(worst, shift) <= rail).expect("rsh ends at 0")
     }
+}
+
+/// Coincidences of trains: at most a pulse a slot, all lines at once, nothing left over.
+fn check_trains(
+    slots_log2: u32,
+    increment_max: IncrementMax,
+    residual_bits: ResidualBits,
+    timing: Option<Timing>,
+) -> Result<(), HardwareError> {
+    let wrong = |key, found: String, allowed: String| Err(HardwareError { key, found, allowed });
+    let most = WriteScheme::SLOTS_MAX.min(increment_max.get());
+    if 1u64 << slots_log2.min(63) > most.into() {
+        let allowed = format!(
+            "a power of two in 1..={most}: a cell gets at most one pulse a slot, and write.increment_max is {}",
+            increment_max.get()
+        );
+        return wrong("write.train_slots", format!("is 2^{slots_log2}"), allowed);
+    }
+    if residual_bits.get() != 0 {
+        let allowed = "coincidences of trains have no remainder; set it to 0".to_owned();
+        return wrong("write.residual_bits", "is not 0".to_owned(), allowed);
+    }
+    let plain = |timing: Timing| {
+        !timing.verify && timing.active_max.is_none() && timing.pulse_code == PulseCode::Unary
+    };
+    if timing.is_some_and(|timing| !plain(timing)) {
+        let found = "is \"rank1\" beside verified, limited or amplitude-coded pulses".to_owned();
+        let allowed = "all rows and columns fire at once: leave out timing.verify, timing.write_active_max and \
+                       timing.pulses, or use write.scheme = \"rounded\"";
+        return wrong("write.scheme", found, allowed.to_owned());
+    }
+    Ok(())
 }
 
 #[cfg(test)]
@@ -219,5 +427,32 @@ mod tests {
         for (floor, ceiling) in [(0, 16), (15, 15), (-1, 15), (0, 0), (3, 2)] {
             assert!(Window::new(floor, ceiling, bits).is_err(), "{floor}..={ceiling}");
         }
+    }
+
+    #[test]
+    fn parts_that_make_no_chip_are_refused_with_their_key() {
+        let reference = Hardware::reference();
+        let key = |change: &dyn Fn(&mut HardwareSpec)| reference.with(change).unwrap_err().key;
+        assert_eq!(key(&|h| h.tile.rows = 0), "tile.rows");
+        assert_eq!(key(&|h| h.tile.rows = 32_769), "tile.rows");
+        assert!(reference.with(|h| h.tile.rows = 32_768).is_ok());
+        assert_eq!(key(&|h| h.tile.columns = 65_535), "tile.columns");
+        assert_eq!(key(&|h| h.tile.count_max = Some(0)), "tile.count");
+        assert_eq!(key(&|h| h.drive.dac_bits = 9), "drive.dac_bits");
+        assert_eq!(key(&|h| h.cell.level_bits = LevelBits::new(7).unwrap()), "cell.ceiling");
+        let bits = AdcBits::new(8).unwrap();
+        let adc = |range| Adc::Finite { bits, subtract: Subtract::Digital, range };
+        assert_eq!(key(&|h| h.adc = adc(AdcRange::Shift(41))), "adc.range");
+        let far = AdcRange::Calibrated { headroom: 17, every_epoch: false };
+        assert_eq!(key(&|h| h.adc = adc(far)), "adc.headroom");
+        let trains = |slots_log2| WriteScheme::Trains { slots_log2 };
+        assert_eq!(key(&|h| h.write.scheme = trains(3)), "write.train_slots");
+        assert_eq!(key(&|h| h.write.scheme = trains(200)), "write.train_slots");
+        assert!(reference.with(|h| h.write.scheme = trains(2)).is_ok());
+        let some = ResidualBits::new(1).unwrap();
+        let both = |h: &mut HardwareSpec| {
+            (h.write.scheme, h.write.residual_bits) = (trains(2), some);
+        };
+        assert_eq!(key(&both), "write.residual_bits");
     }
 }

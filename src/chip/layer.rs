@@ -135,7 +135,7 @@ impl Layer {
     pub fn new(index: u16, spec: LayerSpec, taps: Taps, hardware: &Hardware) -> Self {
         let rows = spec.inputs + usize::from(spec.constant_row);
         let layout = Layout { rows, columns: spec.units };
-        let lut = Lut::new(spec.activation, hardware.lut_bits, unit(&spec, hardware));
+        let lut = Lut::new(spec.activation, hardware.digital.lut_bits, unit(&spec, hardware));
         let arrays: Vec<_> =
             spec.wiring.pathways().iter().map(|_| Crossbar::new(layout, hardware)).collect();
         let adc_shifts = match hardware.adc {
@@ -144,7 +144,7 @@ impl Layer {
                 let shift = match range {
                     AdcRange::Shift(shift) => shift,
                     AdcRange::Full | AdcRange::Calibrated { .. } => {
-                        hardware.full_shift(bits, subtract, rows.min(hardware.tile_rows))
+                        hardware.full_shift(bits, subtract, rows.min(hardware.tile.rows))
                     }
                 };
                 vec![vec![shift; hardware.slices() as usize]; spec.wiring.targets().len()]
@@ -167,7 +167,7 @@ impl Layer {
 
     /// Rows of each tile of a column, top to bottom.
     pub fn row_tiles(&self, hardware: &Hardware) -> impl Iterator<Item = Range<usize>> + use<> {
-        let (rows, step) = (self.layout.rows, hardware.tile_rows);
+        let (rows, step) = (self.layout.rows, hardware.tile.rows);
         (0..rows).step_by(step).map(move |start| start..(start + step).min(rows))
     }
 
@@ -180,16 +180,16 @@ impl Layer {
 
 /// What one accumulator unit of a layer stands for.
 #[must_use]
-pub const fn unit(spec: &LayerSpec, hardware: &Hardware) -> Unit {
+pub fn unit(spec: &LayerSpec, hardware: &Hardware) -> Unit {
     Unit {
         weight_max_log2: spec.weight_max_log2,
-        level_bits: hardware.level_bits,
-        drive_bits: hardware.drive_bits,
+        level_bits: hardware.cell.level_bits,
+        drive_bits: hardware.drive.bits,
     }
 }
 
 fn tiles(layout: Layout, hardware: &Hardware) -> [usize; 2] {
-    [layout.rows.div_ceil(hardware.tile_rows), layout.columns.div_ceil(hardware.tile_columns)]
+    [layout.rows.div_ceil(hardware.tile.rows), layout.columns.div_ceil(hardware.tile.columns)]
 }
 
 /// Proves that a network fits: addresses, words and physical tiles. A tile holds the two banks of one target.
@@ -212,11 +212,11 @@ pub fn check(specs: &[LayerSpec], hardware: &Hardware) -> Result<(), PlanError> 
         by_layer.push(down * across * spec.wiring.targets().len());
     }
     let needed = by_layer.iter().sum();
-    match hardware.tiles_max {
+    match hardware.tile.count_max {
         Some(allowed) if needed > allowed => Err(PlanError::Tiles {
             needed,
-            rows: hardware.tile_rows,
-            columns: hardware.tile_columns,
+            rows: hardware.tile.rows,
+            columns: hardware.tile.columns,
             by_layer: by_layer.iter().map(ToString::to_string).collect::<Vec<_>>().join(" + "),
             allowed,
         }),

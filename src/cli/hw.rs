@@ -157,7 +157,7 @@ fn timing_text(timing: &Timing) -> String {
 fn show_peak(args: &PeakArgs) -> Done {
     let config = changed(&args.model, &args.settings)?;
     let hardware = &config.hardware;
-    let tiles = args.tiles.or(hardware.tiles_max.map(|n| n as u64)).unwrap_or(1);
+    let tiles = args.tiles.or(hardware.tile.count_max.map(|n| n as u64)).unwrap_or(1);
     let slices = args.slices.unwrap_or_else(|| u64::from(hardware.slices()));
     for (name, value) in [("--tiles", tiles), ("--slices", slices), ("--cells", args.cells)] {
         if !(1..=1 << 30).contains(&value) {
@@ -210,15 +210,18 @@ fn numbers(hardware: &Hardware) -> Vec<(&'static str, String)> {
             format!("{} bits, {range}, {each}", bits.get())
         }
     };
-    let window = (h.window.floor(), h.window.ceiling());
+    let window = (h.cell.window.floor(), h.cell.window.ceiling());
     vec![
-        ("cell", format!("{} bits, levels {}..={}", h.level_bits.get(), window.0, window.1)),
-        ("tile", format!("{} x {} cells a bank", h.tile_rows, h.tile_columns)),
-        ("drive", format!("{} bits, {} slices of {}", h.drive_bits.get(), h.slices(), h.dac_bits)),
+        ("cell", format!("{} bits, levels {}..={}", h.cell.level_bits.get(), window.0, window.1)),
+        ("tile", format!("{} x {} cells a bank", h.tile.rows, h.tile.columns)),
+        (
+            "drive",
+            format!("{} bits, {} slices of {}", h.drive.bits.get(), h.slices(), h.drive.dac_bits),
+        ),
         ("converter", converter),
-        ("activation table", format!("{} entries", 1u32 << h.lut_bits.get())),
-        ("error word", format!("{} bits", h.error_bits.get())),
-        ("write", format!("at most {} pulses a cell", h.increment_max.get())),
-        ("remainder", format!("{} bits", h.residual_bits.get())),
+        ("activation table", format!("{} entries", 1u32 << h.digital.lut_bits.get())),
+        ("error word", format!("{} bits", h.digital.error_bits.get())),
+        ("write", format!("at most {} pulses a cell", h.write.increment_max.get())),
+        ("remainder", format!("{} bits", h.write.residual_bits.get())),
     ]
 }

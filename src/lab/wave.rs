@@ -72,7 +72,7 @@ pub fn record(
     let samples = samples_of(&tape, before.trainer().driver().engine().layers()[0].spec.inputs);
 
     let engine = before.trainer().driver().engine();
-    let mut network = Network::new(config.hardware, config.seed, engine.layers(), samples);
+    let mut network = Network::new(&config.hardware, config.seed, engine.layers(), samples);
     network.set_learning(engine.mantissa(), engine.potentiation_only());
     let place = look.tile;
     let grid = (place.layer < engine.layers().len()).then(|| network.grid(place.layer));

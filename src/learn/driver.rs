@@ -162,9 +162,9 @@ impl Driver {
         let spec = &self.engine.layers()[layer].spec;
         backward_words(
             self.engine.backward(layer),
-            hardware.level_bits.get(),
+            hardware.cell.level_bits.get(),
             spec.weight_max_log2,
-            hardware.error_bits,
+            hardware.digital.error_bits,
         )
     }
 
@@ -216,40 +216,25 @@ mod tests {
     use super::*;
     use crate::chip::crossbar::kernel::Backend;
     use crate::chip::engine::Phase;
-    use crate::chip::hardware::{
-        Adc, DitherBits, DitherPattern, FloorKind, Hardware, Window, WriteScheme,
-    };
+    use crate::chip::hardware::{DitherBits, Hardware};
     use crate::chip::layer::{Layer, LayerSpec};
     use crate::chip::population::Wiring;
     use crate::learn::error::Centre;
     use crate::learn::route::Route;
-    use crate::num::fixed::{DriveBits, IncrementMax, LevelBits, LutBits, ResidualBits};
+    use crate::num::fixed::IncrementMax;
     use crate::num::tables::Activation;
 
     /// Two layers of a single stream, 2 to 2 to 2, with the given shifts.
     fn driver(rule: Rule, mode: UpdateMode, shifts: &[(u64, u32)]) -> Driver {
-        let level_bits = LevelBits::new(8).unwrap();
         let bits = ErrorBits::new(8).unwrap();
-        let hardware = Hardware {
-            level_bits,
-            window: Window::new(0, 255, level_bits).unwrap(),
-            floor_kind: FloorKind::Recoverable,
-            tile_rows: 64,
-            tile_columns: 64,
-            tiles_max: None,
-            transposed_read: true,
-            drive_bits: DriveBits::new(8).unwrap(),
-            dac_bits: 8,
-            adc: Adc::Ideal,
-            lut_bits: LutBits::new(10).unwrap(),
-            error_bits: bits,
-            increment_max: IncrementMax::new(127).unwrap(),
-            dither_bits: DitherBits::Zero,
-            dither_pattern: DitherPattern::PerCell,
-            residual_bits: ResidualBits::new(0).unwrap(),
-            scheme: WriteScheme::Rounded,
-            timing: None,
-        };
+        let hardware = Hardware::reference()
+            .with(|h| {
+                h.tile.rows = 64;
+                h.tile.columns = 64;
+                h.write.increment_max = IncrementMax::new(127).unwrap();
+                h.write.dither_bits = DitherBits::Zero;
+            })
+            .unwrap();
         let spec = LayerSpec {
             inputs: 2,
             units: 2,
@@ -268,7 +253,8 @@ mod tests {
         let layers = deliveries.iter().zip(0..).map(|(delivery, index)| {
             Layer::new(index, spec.clone(), delivery.taps().clone(), &hardware)
         });
-        let engine = Engine::new(hardware, Backend::Scalar, 1, layers.collect());
+        let layers = layers.collect();
+        let engine = Engine::new(hardware, Backend::Scalar, 1, layers);
         let shifts = vec![shifts.to_vec(); 2];
         let learning = Learning { rule, mode, deliveries, shifts };
         Driver::new(engine, learning, ErrorUnit::new(Centre::None, bits, 2))

@@ -56,7 +56,7 @@ pub type FloorMap = Vec<Vec<Vec<bool>>>;
 /// Where the floor is now.
 #[must_use]
 pub fn floor_map(engine: &Engine) -> FloorMap {
-    let floor = engine.hardware().window.floor();
+    let floor = engine.hardware().cell.window.floor();
     let of = |array: &Crossbar| array.levels().map(|level| level == floor).collect();
     engine.layers().iter().map(|layer| layer.arrays.iter().map(of).collect()).collect()
 }
@@ -82,10 +82,10 @@ pub fn pathways(engine: &Engine, start: &FloorMap) -> Vec<PathwayStatistics> {
 
 fn of(array: &Crossbar, hardware: &Hardware, start: &[bool]) -> PathwayStatistics {
     let layout = array.layout();
-    let bits = hardware.level_bits.get();
+    let bits = hardware.cell.level_bits.get();
     let bin_shift = bits.saturating_sub(BINS.ilog2());
     let bins = BINS.min(1 << bits);
-    let (tile_rows, tile_columns) = (hardware.tile_rows, hardware.tile_columns);
+    let (tile_rows, tile_columns) = (hardware.tile.rows, hardware.tile.columns);
     let across = layout.columns.div_ceil(tile_columns);
     let mut rows = vec![true; layout.rows];
     let mut columns = vec![true; layout.columns];
@@ -105,7 +105,7 @@ fn of(array: &Crossbar, hardware: &Hardware, start: &[bool]) -> PathwayStatistic
         idle: [[0; 2]; 3],
         histogram: vec![0; bins],
     };
-    let floor = hardware.window.floor();
+    let floor = hardware.cell.window.floor();
     let levels: Vec<u16> = array.levels().collect();
     let by_row = levels.chunks_exact(layout.columns).zip(start.chunks_exact(layout.columns));
     for (row, (levels, start)) in by_row.enumerate() {
@@ -149,36 +149,27 @@ mod tests {
     use super::*;
     use crate::chip::crossbar::kernel::Backend;
     use crate::chip::crossbar::layout::Layout;
-    use crate::chip::hardware::{Adc, DitherBits, DitherPattern, FloorKind, Window, WriteScheme};
+    use crate::chip::hardware::{FloorKind, Window};
     use crate::chip::layer::{Layer, LayerSpec, Taps};
     use crate::chip::population::Wiring;
-    use crate::num::fixed::{DriveBits, ErrorBits, IncrementMax, LevelBits, LutBits, ResidualBits};
+    use crate::num::fixed::LevelBits;
     use crate::num::tables::Activation;
     use bitvec::prelude::*;
 
     /// Tiles of 2 x 2, window from `floor` to the greatest level, an absorbing floor.
     fn hardware(level_bits: i64, floor: i64) -> Hardware {
         let level_bits = LevelBits::new(level_bits).unwrap();
-        Hardware {
-            level_bits,
-            window: Window::new(floor, i64::from(level_bits.level_max()), level_bits).unwrap(),
-            floor_kind: FloorKind::Absorbing,
-            tile_rows: 2,
-            tile_columns: 2,
-            tiles_max: None,
-            transposed_read: false,
-            drive_bits: DriveBits::new(8).unwrap(),
-            dac_bits: 8,
-            adc: Adc::Ideal,
-            lut_bits: LutBits::new(10).unwrap(),
-            error_bits: ErrorBits::new(8).unwrap(),
-            increment_max: IncrementMax::new(7).unwrap(),
-            dither_bits: DitherBits::Eight,
-            dither_pattern: DitherPattern::PerCell,
-            residual_bits: ResidualBits::new(0).unwrap(),
-            scheme: WriteScheme::Rounded,
-            timing: None,
-        }
+        Hardware::reference()
+            .with(|h| {
+                h.cell.level_bits = level_bits;
+                h.cell.window =
+                    Window::new(floor, i64::from(level_bits.level_max()), level_bits).unwrap();
+                h.cell.floor_kind = FloorKind::Absorbing;
+                h.tile.rows = 2;
+                h.tile.columns = 2;
+                h.tile.transposed_read = false;
+            })
+            .unwrap()
     }
 
     fn array(hardware: &Hardware, rows: &[&[u16]]) -> Crossbar {
@@ -240,7 +231,8 @@ mod tests {
         let layers = [Wiring::Dual, Wiring::DualReadout].into_iter().zip(0u16..);
         let layers = layers
             .map(|(wiring, index)| Layer::new(index, spec(wiring), Taps::identity(2), &hardware));
-        let mut engine = Engine::new(hardware, Backend::Scalar, 1, layers.collect());
+        let layers = layers.collect();
+        let mut engine = Engine::new(hardware, Backend::Scalar, 1, layers);
         let start = floor_map(&engine);
         assert!(start.iter().flatten().flatten().all(|on| *on));
         for (layer, of_layer) in engine.layers_mut().iter_mut().enumerate() {

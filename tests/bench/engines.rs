@@ -56,27 +56,16 @@ fn timing() -> Timing {
 }
 
 fn hardware() -> Hardware {
-    let level_bits = LevelBits::new(8).unwrap();
-    Hardware {
-        level_bits,
-        window: Window::new(0, 255, level_bits).unwrap(),
-        floor_kind: FloorKind::Recoverable,
-        tile_rows: SIDE,
-        tile_columns: SIDE,
-        tiles_max: None,
-        transposed_read: false,
-        drive_bits: DriveBits::new(8).unwrap(),
-        dac_bits: 2,
-        adc: Adc::Ideal,
-        lut_bits: LutBits::new(6).unwrap(),
-        error_bits: ErrorBits::new(8).unwrap(),
-        increment_max: IncrementMax::new(7).unwrap(),
-        dither_bits: DitherBits::Eight,
-        dither_pattern: DitherPattern::PerCell,
-        residual_bits: ResidualBits::new(0).unwrap(),
-        scheme: WriteScheme::Rounded,
-        timing: Some(timing()),
-    }
+    Hardware::reference()
+        .with(|h| {
+            h.tile.rows = SIDE;
+            h.tile.columns = SIDE;
+            h.tile.transposed_read = false;
+            h.drive.dac_bits = 2;
+            h.digital.lut_bits = LutBits::new(6).unwrap();
+            h.timing = Some(timing());
+        })
+        .unwrap()
 }
 
 fn layer(hardware: &Hardware) -> Layer {
@@ -150,7 +139,7 @@ impl Driver {
             share: 8,
             overlap: t.overlapped,
             slices: hardware.slices(),
-            dac_bits: hardware.dac_bits,
+            dac_bits: hardware.drive.dac_bits,
             tree: 0,
             lanes: 16,
             hops: 2,

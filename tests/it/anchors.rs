@@ -12,7 +12,7 @@ fn chip(model: &str, settings: &[String]) -> Config {
 
 fn peak_of(config: &Config) -> Peak {
     let hardware = &config.hardware;
-    let tiles = hardware.tiles_max.unwrap() as u64;
+    let tiles = hardware.tile.count_max.unwrap() as u64;
     peak(hardware, tiles, u64::from(hardware.slices()), 2).unwrap()
 }
 

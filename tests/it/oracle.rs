@@ -6,7 +6,7 @@
 use dalean::chip::crossbar::kernel::Backend;
 use dalean::chip::engine::Phase;
 use dalean::chip::hardware::{
-    Adc, AdcRange, DitherBits, DitherPattern, FloorKind, Hardware, Subtract, Window, WriteScheme,
+    Adc, AdcRange, DitherBits, DitherPattern, FloorKind, Hardware, Subtract, Window,
 };
 use dalean::chip::layer::LayerSpec;
 use dalean::chip::ledger::{During, Event};
@@ -80,36 +80,35 @@ fn hardware(s: &Value) -> Hardware {
             },
         },
     };
-    Hardware {
-        level_bits,
-        window: Window::new(int(&s["floor"]), int(&s["ceiling"]), level_bits).unwrap(),
-        floor_kind: match text(&s["floor_kind"]) {
-            "recoverable" => FloorKind::Recoverable,
-            _ => FloorKind::Absorbing,
-        },
-        tile_rows: int(&s["tile_rows"]) as usize,
-        tile_columns: 128,
-        tiles_max: None,
-        transposed_read: false,
-        drive_bits: DriveBits::new(int(&s["drive_bits"])).unwrap(),
-        dac_bits: int(&s["dac_bits"]) as u32,
-        adc,
-        lut_bits: LutBits::new(int(&s["lut_bits"])).unwrap(),
-        error_bits: ErrorBits::new(int(&s["error_bits"])).unwrap(),
-        increment_max: IncrementMax::new(int(&s["d_max"])).unwrap(),
-        dither_bits: match int(&s["dither_bits"]) {
-            0 => DitherBits::Zero,
-            8 => DitherBits::Eight,
-            _ => DitherBits::Sixteen,
-        },
-        dither_pattern: match text(&s["dither"]) {
-            "per_cell" => DitherPattern::PerCell,
-            _ => DitherPattern::Separable,
-        },
-        residual_bits: ResidualBits::new(int(&s["residual_bits"])).unwrap(),
-        scheme: WriteScheme::Rounded,
-        timing: None,
-    }
+    Hardware::reference()
+        .with(|h| {
+            h.cell.level_bits = level_bits;
+            h.cell.window = Window::new(int(&s["floor"]), int(&s["ceiling"]), level_bits).unwrap();
+            h.cell.floor_kind = match text(&s["floor_kind"]) {
+                "recoverable" => FloorKind::Recoverable,
+                _ => FloorKind::Absorbing,
+            };
+            h.tile.rows = int(&s["tile_rows"]) as usize;
+            h.tile.columns = 128;
+            h.tile.transposed_read = false;
+            h.drive.bits = DriveBits::new(int(&s["drive_bits"])).unwrap();
+            h.drive.dac_bits = int(&s["dac_bits"]) as u32;
+            h.adc = adc;
+            h.digital.lut_bits = LutBits::new(int(&s["lut_bits"])).unwrap();
+            h.digital.error_bits = ErrorBits::new(int(&s["error_bits"])).unwrap();
+            h.write.increment_max = IncrementMax::new(int(&s["d_max"])).unwrap();
+            h.write.dither_bits = match int(&s["dither_bits"]) {
+                0 => DitherBits::Zero,
+                8 => DitherBits::Eight,
+                _ => DitherBits::Sixteen,
+            };
+            h.write.dither_pattern = match text(&s["dither"]) {
+                "per_cell" => DitherPattern::PerCell,
+                _ => DitherPattern::Separable,
+            };
+            h.write.residual_bits = ResidualBits::new(int(&s["residual_bits"])).unwrap();
+        })
+        .unwrap()
 }
 
 fn experiment(s: &Value) -> Experiment {

@@ -16,7 +16,10 @@ impl Engine {
     pub(super) fn forward_columns(&mut self, layer: usize) {
         let this = &self.layers[layer];
         let (layout, wiring) = (this.layout, this.spec.wiring);
-        assert!(self.hardware.transposed_read, "only tiles with column drivers are read backwards");
+        assert!(
+            self.hardware.tile.transposed_read,
+            "only tiles with column drivers are read backwards"
+        );
         let samples = self.samples;
         let mut backward = std::mem::take(&mut self.registers[layer].backward);
         backward.clear();

@@ -42,7 +42,7 @@ impl Engine {
         // sums are formed when they are programmed: what they are formed of must still be there
         let pending = self.registers[layer].pending;
         assert!(samples.is_empty() || samples.start >= pending, "sums wait to be programmed");
-        let bits = self.hardware.error_bits;
+        let bits = self.hardware.digital.error_bits;
         let registers = &mut self.registers[layer];
         let stride = stride_of(self.samples);
         let blocks = units.div_ceil(BLOCK_ROWS);

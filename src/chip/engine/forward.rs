@@ -148,7 +148,7 @@ impl Engine {
         let (rows, columns) = (this.layout.rows as u64, this.layout.columns as u64);
         let slices = u64::from(self.hardware.slices());
         let samples = self.samples as u64;
-        let dac_bits = u64::from(self.hardware.dac_bits);
+        let dac_bits = u64::from(self.hardware.drive.dac_bits);
         let wiring = this.spec.wiring;
         let at_difference =
             matches!(self.hardware.adc, Adc::Finite { subtract: Subtract::Current, .. });

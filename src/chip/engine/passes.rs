@@ -29,7 +29,7 @@ pub(super) fn collect(hardware: &Hardware) -> Collect {
     match hardware.timing {
         None => Collect::Nothing,
         Some(Timing { active_max: None, .. }) => {
-            Collect::Peaks { tile_columns: hardware.tile_columns }
+            Collect::Peaks { tile_columns: hardware.tile.columns }
         }
         Some(_) => Collect::Pulses,
     }
@@ -45,10 +45,10 @@ impl Passes {
     ) -> Self {
         let mut passes = Self { busy: 0, by_target: [0; 2] };
         match pulses {
-            None => passes.add(timing, Stream::P, layer.layout.rows.min(hardware.tile_rows), 0),
+            None => passes.add(timing, Stream::P, layer.layout.rows.min(hardware.tile.rows), 0),
             Some(Pulses::Peaks(tiles)) => {
                 for tile in tiles {
-                    for rows in tile.peaks.rows.chunks(hardware.tile_rows) {
+                    for rows in tile.peaks.rows.chunks(hardware.tile.rows) {
                         let peaks = rows.as_flattened().iter();
                         let sum: u32 = match timing.pulse_code {
                             PulseCode::Unary => peaks.map(|&peak| u32::from(peak)).sum(),
@@ -61,9 +61,9 @@ impl Passes {
             Some(Pulses::Every(arrays)) => {
                 for &target in layer.spec.wiring.targets() {
                     let banks = layer.spec.wiring.banks(target).map(|at| &arrays[at][..]);
-                    for first in (0..layer.layout.columns).step_by(hardware.tile_columns) {
+                    for first in (0..layer.layout.columns).step_by(hardware.tile.columns) {
                         let rows = limited(hardware, timing, layer, banks, first);
-                        for rows in rows.chunks(hardware.tile_rows) {
+                        for rows in rows.chunks(hardware.tile.rows) {
                             passes.add(timing, target, rows.len(), rows.iter().sum());
                         }
                     }
@@ -89,9 +89,9 @@ fn limited(
     first: usize,
 ) -> Vec<u64> {
     let columns = layer.layout.columns;
-    let end = columns.min(first + hardware.tile_columns);
+    let end = columns.min(first + hardware.tile.columns);
     let together = timing.active_max.expect("only called where there is a limit");
-    let bound = u8::try_from(hardware.increment_max.get()).expect("1..=127");
+    let bound = u8::try_from(hardware.write.increment_max.get()).expect("1..=127");
     let row = |row: usize| {
         let cells =
             banks.into_iter().flat_map(|bank| &bank[row * columns + first..row * columns + end]);

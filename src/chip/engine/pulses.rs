@@ -102,12 +102,10 @@ mod tests {
     use super::*;
     use crate::chip::crossbar::kernel::Backend;
     use crate::chip::engine::{Operation, Side, Write};
-    use crate::chip::hardware::{
-        Adc, DitherBits, DitherPattern, FloorKind, Hardware, Window, WriteScheme,
-    };
+    use crate::chip::hardware::Hardware;
     use crate::chip::layer::{LayerSpec, Taps};
     use crate::chip::population::Wiring;
-    use crate::num::fixed::{DriveBits, ErrorBits, IncrementMax, LevelBits, LutBits, ResidualBits};
+
     use crate::num::tables::Activation;
 
     #[test]
@@ -120,27 +118,13 @@ mod tests {
 
     /// A layer of 70 inputs and 150 units.
     fn engine(backend: Backend, potentiation_only: bool, collect: Collect) -> Engine {
-        let level_bits = LevelBits::new(8).unwrap();
-        let hardware = Hardware {
-            level_bits,
-            window: Window::new(0, 255, level_bits).unwrap(),
-            floor_kind: FloorKind::Recoverable,
-            tile_rows: 64,
-            tile_columns: 40,
-            tiles_max: None,
-            transposed_read: false,
-            drive_bits: DriveBits::new(8).unwrap(),
-            dac_bits: 8,
-            adc: Adc::Ideal,
-            lut_bits: LutBits::new(10).unwrap(),
-            error_bits: ErrorBits::new(8).unwrap(),
-            increment_max: IncrementMax::new(7).unwrap(),
-            dither_bits: DitherBits::Eight,
-            dither_pattern: DitherPattern::PerCell,
-            residual_bits: ResidualBits::new(0).unwrap(),
-            scheme: WriteScheme::Rounded,
-            timing: None,
-        };
+        let hardware = Hardware::reference()
+            .with(|h| {
+                h.tile.rows = 64;
+                h.tile.columns = 40;
+                h.tile.transposed_read = false;
+            })
+            .unwrap();
         let spec = LayerSpec {
             inputs: 70,
             units: 150,

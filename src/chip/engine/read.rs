@@ -126,7 +126,7 @@ impl<'a> Reader<'a> {
             (Some(_), true) => Tiles::Together,
             (Some(_), false) => Tiles::Apart,
         };
-        let code_max = hardware.drive_bits.code_max();
+        let code_max = hardware.drive.bits.code_max();
         let sources = places.map(|at| wiring.pathways()[at].source);
         Self {
             arrays: places.map(|at| &layer.arrays[at]),
@@ -135,11 +135,11 @@ impl<'a> Reader<'a> {
             samples,
             converters,
             probe,
-            dac_bits: hardware.dac_bits,
+            dac_bits: hardware.drive.dac_bits,
             slices: hardware.slices() as usize,
             greatest: Greatest {
                 // a low byte of more than 8 bits can be anything
-                level: u8::try_from(hardware.window.ceiling()).unwrap_or(u8::MAX),
+                level: u8::try_from(hardware.cell.window.ceiling()).unwrap_or(u8::MAX),
                 code: if tiles == Tiles::Whole {
                     code_max
                 } else {
@@ -301,7 +301,7 @@ impl<'a> Reader<'a> {
 
 /// Greatest slice of a drive.
 fn slice_max(hardware: &Hardware) -> u8 {
-    u8::MAX >> 8u32.saturating_sub(hardware.dac_bits)
+    u8::MAX >> 8u32.saturating_sub(hardware.drive.dac_bits)
 }
 
 /// Sums stay below this: then rounding constants fit beside them.
@@ -313,27 +313,27 @@ fn is_narrow(
     hardware: &Hardware,
     converters: Option<&(Vec<Converter>, Subtract)>,
 ) -> bool {
-    let ceiling = u128::from(hardware.window.ceiling());
+    let ceiling = u128::from(hardware.cell.window.ceiling());
     let rows = layer.layout.rows;
     let current = |rows: usize, code: u32| rows as u128 * ceiling * u128::from(code);
     match converters {
         None => {
             layer.layout.blocks() <= CHUNK_BLOCKS
-                && current(rows, hardware.drive_bits.code_max().into()) < NARROW
+                && current(rows, hardware.drive.bits.code_max().into()) < NARROW
         }
         Some((_, Subtract::Current)) => false,
         Some((converters, Subtract::Digital)) => {
-            let tiles = rows.div_ceil(hardware.tile_rows) as u128;
-            let slice_max = (1 << hardware.dac_bits.min(hardware.drive_bits.get())) - 1;
+            let tiles = rows.div_ceil(hardware.tile.rows) as u128;
+            let slice_max = (1 << hardware.drive.dac_bits.min(hardware.drive.bits.get())) - 1;
             let fits = |(slice, adc): (u32, &Converter)| {
                 let codes = tiles * adc.max.unsigned_abs() as u128;
-                let total = codes << (adc.shift.min(64) + slice * hardware.dac_bits);
+                let total = codes << (adc.shift.min(64) + slice * hardware.drive.dac_bits);
                 let inside = adc.shift <= Conversion::SHIFT_MAX && codes < 1 << 15;
                 (inside && total < NARROW / 8).then_some(total)
             };
-            hardware.level_bits.get() <= 8
+            hardware.cell.level_bits.get() <= 8
                 && tiles < 1024
-                && current(hardware.tile_rows.min(rows), slice_max) < NARROW
+                && current(hardware.tile.rows.min(rows), slice_max) < NARROW
                 && (0..).zip(converters).all(|entry| fits(entry).is_some())
         }
     }
@@ -374,9 +374,9 @@ fn tile_reads<'a>(
             })
             .collect();
     }
-    let (dac_bits, slices) = (hardware.dac_bits, hardware.slices());
+    let (dac_bits, slices) = (hardware.drive.dac_bits, hardware.slices());
     let aligned =
-        hardware.tile_rows.is_multiple_of(BLOCK_ROWS) || layer.layout.rows <= hardware.tile_rows;
+        hardware.tile.rows.is_multiple_of(BLOCK_ROWS) || layer.layout.rows <= hardware.tile.rows;
     let mut reads = Vec::new();
     for slice in 0..slices {
         let sliced = |codes: &'a [u8]| -> Cow<'a, [u8]> {
@@ -387,7 +387,7 @@ fn tile_reads<'a>(
             }
         };
         if tiles == Tiles::Together && aligned {
-            let tile_blocks = hardware.tile_rows.div_ceil(BLOCK_ROWS);
+            let tile_blocks = hardware.tile.rows.div_ceil(BLOCK_ROWS);
             let codes = sliced(drives);
             reads.push(TileRead { slice: slice as usize, blocks: 0..blocks, tile_blocks, codes });
             continue;

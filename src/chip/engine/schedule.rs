@@ -154,8 +154,8 @@ impl Schedule {
         let shape = |layer: &Layer| {
             let [down, across] = layer.tiles(hardware).map(|n| n as u64);
             Shape {
-                rows: layer.layout.rows.min(hardware.tile_rows) as u64,
-                columns: layer.layout.columns.min(hardware.tile_columns) as u64,
+                rows: layer.layout.rows.min(hardware.tile.rows) as u64,
+                columns: layer.layout.columns.min(hardware.tile.columns) as u64,
                 levels: [tree_levels(down), tree_levels(across)],
                 words: layer.taps.width as u64,
             }

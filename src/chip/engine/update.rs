@@ -39,7 +39,7 @@ impl Engine {
                 self.time(|schedule, cycles| schedule.add(cycles, layer, &samples));
             }
             Write::Program => {
-                let rounded = self.hardware.scheme == WriteScheme::Rounded;
+                let rounded = self.hardware.write.scheme == WriteScheme::Rounded;
                 assert!(rounded, "trains write one sample at a time");
                 let added = std::mem::take(pending);
                 self.program(layer, 0..added, shift);
@@ -49,7 +49,7 @@ impl Engine {
             }
             Write::Now => {
                 assert!(*pending == 0 && samples.len() == 1, "now takes one sample");
-                if let WriteScheme::Trains { slots_log2 } = self.hardware.scheme {
+                if let WriteScheme::Trains { slots_log2 } = self.hardware.write.scheme {
                     self.row_sums[layer] = None;
                     return self.write_trains(layer, samples.start, shift, slots_log2);
                 }
@@ -108,7 +108,7 @@ impl Engine {
         }
         self.layers[layer].writes.iter_mut().for_each(|writes| *writes += 1);
         self.charge_cells(layer, Event::DeltaComputations, 1);
-        let remainder = 2 * u64::from(self.hardware.residual_bits.get());
+        let remainder = 2 * u64::from(self.hardware.write.residual_bits.get());
         self.charge_cells(layer, Event::SramBits, remainder);
     }
 
@@ -143,16 +143,16 @@ impl Engine {
         };
         let gates: Vec<_> =
             wiring.pathways().iter().map(|pathway| of(pathway.target, pathway.polarity)).collect();
-        let hardware = self.hardware;
+        let (write, window) = (self.hardware.write.clone(), self.hardware.cell.window);
         let base = kernel::Write {
             shift: shift + wiring.shift_extra(),
             mantissa: i32::try_from(self.mantissa).expect("1..=15"),
             negate: false,
-            increment_max: i32::try_from(hardware.increment_max.get()).expect("1..=127"),
+            increment_max: i32::try_from(write.increment_max.get()).expect("1..=127"),
             groups: u16::MAX,
-            floor: hardware.window.floor(),
-            ceiling: hardware.window.ceiling(),
-            residual_bits: hardware.residual_bits.get(),
+            floor: window.floor(),
+            ceiling: window.ceiling(),
+            residual_bits: write.residual_bits.get(),
         };
         let (seed, collect) = (self.seed, self.collect);
         let this = &mut self.layers[layer];
@@ -164,8 +164,8 @@ impl Engine {
                 turned: &turned[source],
                 stride,
                 write: kernel::Write { negate: pathway.polarity == Polarity::Inhibits, ..base },
-                dither_bits: hardware.dither_bits,
-                dither_pattern: hardware.dither_pattern,
+                dither_bits: write.dither_bits,
+                dither_pattern: write.dither_pattern,
                 place: Place {
                     seed,
                     site: Site::WriteDither,

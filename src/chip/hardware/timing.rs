@@ -13,6 +13,8 @@
 //! `beat` cycles where these formulas say one. See docs/TILE.md and docs/MODEL.md, 4.5.
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
+use super::{HardwareError, between};
+
 /// How the pulses of a row are given.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum PulseCode {
@@ -52,7 +54,38 @@ pub struct Timing {
     pub active_max: Option<u64>,
 }
 
+/// Most cycles of one action: 0.1 s at 1 GHz.
+pub const CYCLES_MAX: u64 = 100_000_000;
+
 impl Timing {
+    /// Checks every number against what a chip can have.
+    pub(super) fn check(&self) -> Result<(), HardwareError> {
+        let Self {
+            clock_khz,
+            beat,
+            settle,
+            convert,
+            share,
+            overlapped: _,
+            lanes,
+            hops,
+            pulse,
+            pulse_code: _,
+            verify: _,
+            active_max,
+        } = *self;
+        between("timing.clock_mhz", clock_khz, [1, 1_000_000_000])?;
+        between("timing.beat_cycles", beat, [1, 1_000_000])?;
+        // a phase of pulse width takes its slots beside what is given
+        between("timing.settle_cycles", settle, [1, 2 * CYCLES_MAX])?;
+        between("timing.convert_cycles", convert, [1, CYCLES_MAX])?;
+        between("timing.columns_per_adc", share, [1, 32_768])?;
+        between("timing.lanes", lanes, [1, 32_768])?;
+        between("timing.bus_hops", hops, [0, 1_000_000])?;
+        between("timing.pulse_cycles", pulse, [1, CYCLES_MAX])?;
+        active_max.map_or(Ok(()), |cells| between("timing.write_active_max", cells, [1, 65_536]))
+    }
+
     /// `conv`: cycles until all columns of a bank are converted.
     #[must_use]
     pub const fn conversion(&self) -> u64 {

@@ -19,14 +19,14 @@ pub(super) fn bytes(number: u64, len: usize) -> AVec<u8> {
 /// An array of random levels all over its window.
 pub(super) fn array(number: u64, layout: Layout, hardware: &Hardware) -> Crossbar {
     let mut array = Crossbar::new(layout, hardware);
-    let span = u32::from(hardware.window.ceiling() - hardware.window.floor()) + 1;
+    let span = u32::from(hardware.cell.window.ceiling() - hardware.cell.window.floor()) + 1;
     let bytes = bytes(number, 2 * layout.cells());
     let mut words = bytes.as_chunks::<2>().0.iter().map(|word| u16::from_le_bytes(*word));
     let mut levels = vec![0; layout.columns];
     for row in 0..layout.rows {
         for (level, word) in levels.iter_mut().zip(&mut words) {
             let above = u16::try_from((u32::from(word) * span) >> 16).expect("below the span");
-            *level = hardware.window.floor() + above;
+            *level = hardware.cell.window.floor() + above;
         }
         array.load_row(row, &levels);
     }
@@ -69,7 +69,8 @@ pub(super) fn config(settings: &[String]) -> Config {
     let mut config = config::load(&sources).expect("a bench knows its own settings");
     // cycles are counted where a race asks for them
     if !settings.iter().any(|setting| setting.starts_with("hw.timing.")) {
-        config.hardware.timing = None;
+        config.hardware =
+            config.hardware.with(|chip| chip.timing = None).expect("a chip needs no timing");
     }
     config
 }

@@ -187,7 +187,7 @@ pub(super) fn config(mut file: ExperimentFile) -> Result<Config, ConfigError> {
         return Err(wrong("learning.centre", "is \"batch\"", allowed));
     }
 
-    if mode == UpdateMode::Accumulate && hardware.scheme != WriteScheme::Rounded {
+    if mode == UpdateMode::Accumulate && hardware.write.scheme != WriteScheme::Rounded {
         let allowed = "trains write one sample at a time; with hw.write.scheme = \"rank1\" use mode = \"replay\" or \
                        \"online\"";
         return Err(wrong("learning.mode", "is \"accumulate\"", allowed));
@@ -268,7 +268,7 @@ pub(super) fn config(mut file: ExperimentFile) -> Result<Config, ConfigError> {
         let allowed = "validation examples are learnt from (train_on = \"all\"); use \"last\"";
         return Err(wrong("learning.select", "is \"best_validation\"", allowed));
     }
-    if rule == Rule::Bp && (hardware.adc != Adc::Ideal || !hardware.transposed_read) {
+    if rule == Rule::Bp && (hardware.adc != Adc::Ideal || !hardware.tile.transposed_read) {
         let allowed = "back-propagation reads arrays from their columns: hw.tile.transposed_read = true and \
                        hw.adc = \"ideal\" (finite converters on rows are not simulated)";
         return Err(wrong("learning.rule", "is \"bp\"", allowed));
@@ -412,7 +412,7 @@ impl Config {
         });
         Ok(Experiment {
             seed: self.seed,
-            hardware: self.hardware,
+            hardware: self.hardware.clone(),
             layers: layers.collect(),
             rule: self.rule,
             mode: self.mode,

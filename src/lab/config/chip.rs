@@ -6,16 +6,18 @@ use super::file::{
     AdcFile, AdcTable, CellFile, DriveFile, ErrorFile, HardwareFile, LutFile, RangeFile, TileFile,
     TimingFile, WriteFile,
 };
+use crate::chip::hardware::timing::CYCLES_MAX;
 use crate::chip::hardware::{
-    Adc, AdcRange, DitherBits, DitherPattern, FloorKind, Hardware, PulseCode, Subtract, Timing,
-    Window, WriteScheme,
+    Adc, AdcRange, CellSpec, DigitalSpec, DitherBits, DitherPattern, DriveSpec, FloorKind,
+    Hardware, HardwareError, HardwareSpec, PulseCode, Subtract, TileSpec, Timing, Window,
+    WriteScheme, WriteSpec,
 };
 use crate::num::fixed::{
     AdcBits, DriveBits, ErrorBits, IncrementMax, LevelBits, LutBits, ResidualBits,
 };
 
-/// Most cycles of one action: 0.1 s at 1 GHz.
-const CYCLES_MAX: i64 = 100_000_000;
+/// Most cycles of one action, as keys count them.
+const MOST: i64 = CYCLES_MAX.cast_signed();
 
 /// How a drive code is put on a row.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -42,9 +44,9 @@ pub(super) fn resolve(file: &mut HardwareFile, prefix: &str) -> Result<Hardware,
     let floor_kind = word(&key("cell.floor_kind"), &mut cell.floor_kind, "recoverable", &floors)?;
 
     let tile = file.tile.get_or_insert_with(TileFile::default);
-    let tile_rows = between(&key("tile.rows"), *tile.rows.get_or_insert(256), 1, 32_768)?;
-    let tile_columns = between(&key("tile.columns"), *tile.columns.get_or_insert(256), 1, 32_768)?;
-    let count = tile.count.map(|n| between(&key("tile.count"), n, 1, 1 << 30)).transpose()?;
+    let tile_rows = count(&key("tile.rows"), *tile.rows.get_or_insert(256))?;
+    let tile_columns = count(&key("tile.columns"), *tile.columns.get_or_insert(256))?;
+    let count_max = tile.count.map(|n| count(&key("tile.count"), n)).transpose()?;
     let transposed_read = *tile.transposed_read.get_or_insert(false);
 
     let drive = file.drive.get_or_insert_with(DriveFile::default);
@@ -89,36 +91,22 @@ pub(super) fn resolve(file: &mut HardwareFile, prefix: &str) -> Result<Hardware,
 
     let scheme = scheme(write, &key, increments)?;
     let timing = file.timing.as_mut().map(|table| timing(table, mode, &key)).transpose()?;
-    if let (WriteScheme::Trains { .. }, Some(timing)) = (scheme, timing) {
-        let limited = timing.verify || timing.active_max.is_some();
-        if limited || timing.pulse_code != PulseCode::Unary {
-            let found = "is \"rank1\" beside verified, limited or amplitude-coded pulses";
-            let allowed = "all rows and columns fire at once: leave out timing.verify, timing.write_active_max and \
-                           timing.pulses, or use write.scheme = \"rounded\"";
-            return Err(wrong(&key("write.scheme"), found, allowed));
-        }
-    }
-    let size = |n: i64| usize::try_from(n).expect("checked to be positive");
-    Ok(Hardware {
-        level_bits,
-        window,
-        floor_kind,
-        tile_rows: size(tile_rows),
-        tile_columns: size(tile_columns),
-        tiles_max: count.map(size),
-        transposed_read,
-        drive_bits,
-        dac_bits: u32::try_from(dac_bits).expect("1..=8"),
+    let spec = HardwareSpec {
+        cell: CellSpec { level_bits, window, floor_kind },
+        tile: TileSpec { rows: tile_rows, columns: tile_columns, count_max, transposed_read },
+        drive: DriveSpec { bits: drive_bits, dac_bits: u32::try_from(dac_bits).expect("1..=8") },
         adc,
-        lut_bits,
-        error_bits,
-        increment_max,
-        dither_bits,
-        dither_pattern,
-        residual_bits,
-        scheme,
+        digital: DigitalSpec { lut_bits, error_bits },
+        write: WriteSpec { increment_max, dither_bits, dither_pattern, residual_bits, scheme },
         timing,
-    })
+    };
+    Hardware::new(spec)
+        .map_err(|HardwareError { key: at, found, allowed }| wrong(&key(at), found, allowed))
+}
+
+/// A number of things, which the chip checks further.
+fn count(key: &str, found: i64) -> Result<usize, ConfigError> {
+    usize::try_from(found).map_err(|_| wrong(key, format!("is {found}"), "it must lie above 0"))
 }
 
 fn scheme(
@@ -137,17 +125,9 @@ fn scheme(
         };
     }
     let slots = *write.train_slots.get_or_insert(1 << increments.ilog2().min(5));
-    let most = i64::from(WriteScheme::SLOTS_MAX).min(increments);
-    if slots < 1 || slots > most || slots.count_ones() != 1 {
-        let allowed = format!(
-            "it is a power of two in 1..={most}: a cell gets at most one pulse a slot, and write.increment_max is \
-             {increments}"
-        );
+    if slots < 1 || slots.count_ones() != 1 {
+        let allowed = "it is a power of two, at most write.increment_max";
         return Err(wrong(&key("write.train_slots"), format!("is {slots}"), allowed));
-    }
-    if write.residual_bits != Some(0) {
-        let allowed = "coincidences of trains have no remainder; set it to 0";
-        return Err(wrong(&key("write.residual_bits"), "is not 0", allowed));
     }
     Ok(WriteScheme::Trains { slots_log2: slots.ilog2() })
 }
@@ -223,7 +203,7 @@ fn drive_mode(
     }
     let most = (1i64 << dac_bits) - 1;
     let slots = drive.slots.unwrap_or(most);
-    if !(most..=CYCLES_MAX).contains(&slots) {
+    if !(most..=MOST).contains(&slots) {
         let allowed = format!(
             "the greatest code of a phase of {dac_bits} bits is a pulse of {most} slots; give at least {most}, or more \
              drive.phases"
@@ -231,7 +211,7 @@ fn drive_mode(
         return Err(wrong(&key("drive.slots"), format!("is {slots}"), allowed));
     }
     let slot_cycles = *drive.slot_cycles.get_or_insert(1);
-    let slot_cycles = between(&key("drive.slot_cycles"), slot_cycles, 1, CYCLES_MAX / slots)?;
+    let slot_cycles = between(&key("drive.slot_cycles"), slot_cycles, 1, MOST / slots)?;
     Ok((DriveMode::PulseWidth { phase_cycles: slots * slot_cycles }, dac_bits))
 }
 
@@ -259,18 +239,18 @@ fn timing(
         let value = *value.get_or_insert(least);
         between(&key(name), value, least, most).map(i64::unsigned_abs)
     };
-    let settle = count("settle_cycles", &mut table.settle_cycles, least, CYCLES_MAX)?;
+    let settle = count("settle_cycles", &mut table.settle_cycles, least, MOST)?;
     let pulse_codes = [("unary", PulseCode::Unary), ("amplitude", PulseCode::Amplitude)];
     Ok(Timing {
         clock_khz: (clock_mhz * 1000.0).round() as u64,
         beat: count("beat_cycles", &mut table.beat_cycles, 1, 1_000_000)?,
         settle: settle + slots.unsigned_abs(),
-        convert: count("convert_cycles", &mut table.convert_cycles, 1, CYCLES_MAX)?,
+        convert: count("convert_cycles", &mut table.convert_cycles, 1, MOST)?,
         share: count("columns_per_adc", &mut table.columns_per_adc, 1, 32_768)?,
         overlapped: *table.overlap.get_or_insert(false),
         lanes: count("lanes", &mut table.lanes, 1, 32_768)?,
         hops: count("bus_hops", &mut table.bus_hops, 0, 1_000_000)?,
-        pulse: count("pulse_cycles", &mut table.pulse_cycles, 1, CYCLES_MAX)?,
+        pulse: count("pulse_cycles", &mut table.pulse_cycles, 1, MOST)?,
         pulse_code: word(&key("pulses"), &mut table.pulses, "unary", &pulse_codes)?,
         verify: *table.verify.get_or_insert(false),
         active_max: match table.write_active_max {
@@ -311,7 +291,7 @@ mod tests {
         let text = "drive = { bits = 7, mode = \"pulse_width\", slots = 128, slot_cycles = 3 }\n\
                     timing = { clock_mhz = 1, settle_cycles = 2 }";
         let (hardware, _) = chip(text).unwrap();
-        assert_eq!((hardware.slices(), hardware.dac_bits), (1, 7));
+        assert_eq!((hardware.slices(), hardware.drive.dac_bits), (1, 7));
         assert_eq!(hardware.timing.unwrap().settle, 3 * 128 + 2);
         for (phases, dac_bits, slots) in [(1, 7, 127), (2, 4, 15), (3, 3, 7), (4, 2, 3), (7, 1, 1)]
         {
@@ -319,7 +299,7 @@ mod tests {
                 "drive = {{ bits = 7, mode = \"pulse_width\", phases = {phases} }}\ntiming.clock_mhz = 1"
             );
             let (hardware, _) = chip(&text).unwrap();
-            assert_eq!((hardware.slices(), hardware.dac_bits), (phases, dac_bits));
+            assert_eq!((hardware.slices(), hardware.drive.dac_bits), (phases, dac_bits));
             assert_eq!(hardware.timing.unwrap().settle, slots, "the greatest code fits exactly");
         }
     }

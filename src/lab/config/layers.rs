@@ -155,7 +155,7 @@ mod tests {
         let config = load(&sources).unwrap();
         assert_eq!((config.seed, config.epochs), (3, 7));
         assert_eq!(config.rule, crate::learn::rule::Rule::Dfa);
-        assert_eq!(config.hardware.window.ceiling(), 15);
+        assert_eq!(config.hardware.cell.window.ceiling(), 15);
     }
 
     #[test]

@@ -1,6 +1,9 @@
 //! What one chip would have done otherwise than another: which counts of its ledger are not the other's.
 
-use crate::chip::hardware::{Adc, Hardware, Subtract, Timing};
+use crate::chip::hardware::{
+    Adc, CellSpec, DigitalSpec, DriveSpec, Hardware, HardwareSpec, Subtract, TileSpec, Timing,
+    WriteSpec,
+};
 use crate::chip::ledger::Event;
 
 /// A difference between the chip of a run and another one.
@@ -56,41 +59,62 @@ pub fn changes(run: &Hardware, other: &Hardware) -> Vec<Change> {
             all.push(Change { key, events, time });
         }
     };
-    differ("tile.rows", run.tile_rows != other.tile_rows, DOWN, true);
-    differ("tile.columns", run.tile_columns != other.tile_columns, ACROSS, true);
+    // without `..`: what a chip gets is a difference here or does not compile
+    let HardwareSpec { cell, tile, drive, adc, digital, write, timing } = &**run;
+    let CellSpec { level_bits, window, floor_kind } = cell;
+    let TileSpec { rows, columns, count_max: _, transposed_read: _ } = tile;
+    let DriveSpec { bits: drive_bits, dac_bits: _ } = drive;
+    let DigitalSpec { lut_bits, error_bits } = digital;
+    let WriteSpec { increment_max, dither_bits, dither_pattern, residual_bits, scheme } = write;
+    differ("tile.rows", *rows != other.tile.rows, DOWN, true);
+    differ("tile.columns", *columns != other.tile.columns, ACROSS, true);
     differ("drive.dac_bits", run.slices() != other.slices(), SLICES, true);
-    let at_difference =
-        |h: &Hardware| matches!(h.adc, Adc::Finite { subtract: Subtract::Current, .. });
-    differ("adc.subtract", at_difference(run) != at_difference(other), BANKS, false);
+    let at_difference = |adc: &Adc| matches!(adc, Adc::Finite { subtract: Subtract::Current, .. });
+    differ("adc.subtract", at_difference(adc) != at_difference(&other.adc), BANKS, false);
 
-    differ("cell.level_bits", run.level_bits != other.level_bits, LEARNT, true);
-    differ("cell.floor", run.window.floor() != other.window.floor(), LEARNT, true);
-    differ("cell.ceiling", run.window.ceiling() != other.window.ceiling(), LEARNT, true);
-    differ("cell.floor_kind", run.floor_kind != other.floor_kind, LEARNT, true);
-    differ("drive.bits", run.drive_bits != other.drive_bits, LEARNT, true);
-    differ("adc", run.adc != other.adc, LEARNT, true);
-    differ("lut.bits", run.lut_bits != other.lut_bits, LEARNT, true);
-    differ("error.bits", run.error_bits != other.error_bits, LEARNT, true);
-    differ("write.increment_max", run.increment_max != other.increment_max, LEARNT, true);
-    differ("write.dither_bits", run.dither_bits != other.dither_bits, LEARNT, true);
-    differ("write.dither", run.dither_pattern != other.dither_pattern, LEARNT, true);
-    differ("write.residual_bits", run.residual_bits != other.residual_bits, REMAINDERS, true);
-    differ("write.scheme", run.scheme != other.scheme, SCHEME, true);
+    differ("cell.level_bits", *level_bits != other.cell.level_bits, LEARNT, true);
+    differ("cell.floor", window.floor() != other.cell.window.floor(), LEARNT, true);
+    differ("cell.ceiling", window.ceiling() != other.cell.window.ceiling(), LEARNT, true);
+    differ("cell.floor_kind", *floor_kind != other.cell.floor_kind, LEARNT, true);
+    differ("drive.bits", *drive_bits != other.drive.bits, LEARNT, true);
+    differ("adc", *adc != other.adc, LEARNT, true);
+    differ("lut.bits", *lut_bits != other.digital.lut_bits, LEARNT, true);
+    differ("error.bits", *error_bits != other.digital.error_bits, LEARNT, true);
+    differ("write.increment_max", *increment_max != other.write.increment_max, LEARNT, true);
+    differ("write.dither_bits", *dither_bits != other.write.dither_bits, LEARNT, true);
+    differ("write.dither", *dither_pattern != other.write.dither_pattern, LEARNT, true);
+    let remainders = *residual_bits != other.write.residual_bits;
+    differ("write.residual_bits", remainders, REMAINDERS, true);
+    differ("write.scheme", *scheme != other.write.scheme, SCHEME, true);
 
-    match (run.timing, other.timing) {
+    match (*timing, other.timing) {
         (None, None) => {}
         (Some(a), Some(b)) => {
-            differ("timing.settle_cycles", a.settle != b.settle, &[], true);
-            differ("timing.convert_cycles", a.convert != b.convert, &[], true);
-            differ("timing.columns_per_adc", a.share != b.share, &[], true);
-            differ("timing.overlap", a.overlapped != b.overlapped, &[], true);
-            differ("timing.lanes", a.lanes != b.lanes, &[], true);
-            differ("timing.bus_hops", a.hops != b.hops, &[], true);
-            differ("timing.pulse_cycles", a.pulse != b.pulse, &[], true);
-            differ("timing.beat_cycles", a.beat != b.beat, &[], true);
-            differ("timing.pulses", a.pulse_code != b.pulse_code, PULSES, true);
-            differ("timing.verify", a.verify != b.verify, PULSES, true);
-            differ("timing.write_active_max", a.active_max != b.active_max, PULSES, true);
+            let Timing {
+                clock_khz: _,
+                beat,
+                settle,
+                convert,
+                share,
+                overlapped,
+                lanes,
+                hops,
+                pulse,
+                pulse_code,
+                verify,
+                active_max,
+            } = a;
+            differ("timing.settle_cycles", settle != b.settle, &[], true);
+            differ("timing.convert_cycles", convert != b.convert, &[], true);
+            differ("timing.columns_per_adc", share != b.share, &[], true);
+            differ("timing.overlap", overlapped != b.overlapped, &[], true);
+            differ("timing.lanes", lanes != b.lanes, &[], true);
+            differ("timing.bus_hops", hops != b.hops, &[], true);
+            differ("timing.pulse_cycles", pulse != b.pulse, &[], true);
+            differ("timing.beat_cycles", beat != b.beat, &[], true);
+            differ("timing.pulses", pulse_code != b.pulse_code, PULSES, true);
+            differ("timing.verify", verify != b.verify, PULSES, true);
+            differ("timing.write_active_max", active_max != b.active_max, PULSES, true);
         }
         (a, b) => {
             let verified = |timing: Option<Timing>| timing.is_some_and(|timing| timing.verify);

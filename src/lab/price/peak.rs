@@ -33,7 +33,7 @@ fn seconds(timing: &Timing, cycles: u64) -> f64 {
 #[must_use]
 pub fn figures(hardware: &Hardware, words: u64) -> Vec<Figure> {
     let Some(timing) = hardware.timing else { return vec![] };
-    let (rows, columns) = (hardware.tile_rows as u64, hardware.tile_columns as u64);
+    let (rows, columns) = (hardware.tile.rows as u64, hardware.tile.columns as u64);
     let slices = u64::from(hardware.slices());
     let accept = timing.accept();
     let figure = |name, cycles| Figure { name, cycles, seconds: seconds(&timing, cycles) };
@@ -65,7 +65,7 @@ pub struct Peak {
 #[must_use]
 pub fn peak(hardware: &Hardware, tiles: u64, slices: u64, cells: u64) -> Option<Peak> {
     let timing = hardware.timing?;
-    let (rows, columns) = (hardware.tile_rows as u64, hardware.tile_columns as u64);
+    let (rows, columns) = (hardware.tile.rows as u64, hardware.tile.columns as u64);
     let macs = (2 * tiles * rows * columns) as f64 / cells as f64;
     let rate = |name, cycles| {
         let figure = Figure { name, cycles, seconds: seconds(&timing, cycles) };

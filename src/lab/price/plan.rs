@@ -59,7 +59,7 @@ impl Plan {
     /// Physical tiles on a chip.
     #[must_use]
     pub fn tiles(&self, hardware: &Hardware) -> u64 {
-        let (rows, columns) = (hardware.tile_rows as u64, hardware.tile_columns as u64);
+        let (rows, columns) = (hardware.tile.rows as u64, hardware.tile.columns as u64);
         let of = |l: &PlanLayer| l.targets * l.rows.div_ceil(rows) * l.columns.div_ceil(columns);
         self.layers.iter().map(of).sum()
     }
@@ -73,7 +73,7 @@ impl Plan {
     /// How many parts of a kind idle while the network runs; events do not idle.
     #[must_use]
     pub fn parts(&self, per: Per, hardware: &Hardware) -> u64 {
-        let (rows, columns) = (hardware.tile_rows as u64, hardware.tile_columns as u64);
+        let (rows, columns) = (hardware.tile.rows as u64, hardware.tile.columns as u64);
         let tiles = self.tiles(hardware);
         match per {
             Per::Event(_) => 0,

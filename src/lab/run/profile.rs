@@ -69,7 +69,7 @@ pub fn profile(config: &Config, root: &DataRoot, machine: Machine) -> Result<Pro
             act("inference", 1, Phase::Evaluation, inference),
         ],
         plan,
-        hardware: config.hardware,
+        hardware: config.hardware.clone(),
         constants: config.constants.clone(),
         warnings: session.warnings().to_vec(),
     })

@@ -149,7 +149,7 @@ impl Parts<'_> {
             config: self.text,
             receipt: self.receipt,
             epochs: self.records,
-            level_max: self.config.hardware.level_bits.level_max(),
+            level_max: self.config.hardware.cell.level_bits.level_max(),
             heats: &heats,
             pictures: &pictures,
             class_names: &[],

@@ -175,8 +175,8 @@ pub fn read(
         .filter(|&epoch| epoch <= trainer.experiment().epochs)
         .ok_or_else(|| damaged("epoch", "is beyond the last epoch"))?;
 
-    let window = trainer.experiment().hardware.window;
-    let residual_bits = trainer.experiment().hardware.residual_bits.get();
+    let window = trainer.experiment().hardware.cell.window;
+    let residual_bits = trainer.experiment().hardware.write.residual_bits.get();
     for layer in trainer.driver_mut().engine_mut().layers_mut() {
         let shape = [layer.layout.rows, layer.layout.columns];
         let prefix = format!("layer{}", layer.index);

@@ -172,7 +172,7 @@ fn check(config: &Config, data: &Loaded) -> Result<f64, RunError> {
         layer.wiring.pathways().len() as f64 * layer.inputs as f64 * layer.units as f64
     };
     // levels of more than a byte take about twice the time
-    let planes = if config.hardware.level_bits.get() > 8 { 2.0 } else { 1.0 };
+    let planes = if config.hardware.cell.level_bits.get() > 8 { 2.0 } else { 1.0 };
     let samples = train.len() as f64 * f64::from(config.epochs);
     Ok(experiment.layers.iter().map(cells).sum::<f64>() * planes * samples)
 }

@@ -83,7 +83,7 @@ impl Experiment {
     /// When it does not fit the chip.
     pub fn build(&self, backend: Backend, samples: usize) -> Result<Seeded, PlanError> {
         self.check()?;
-        let bits = self.hardware.error_bits;
+        let bits = self.hardware.digital.error_bits;
         let outputs = self.layers.last().expect("checked: at least one layer").units;
         let last = self.layers.len() - 1;
         let deliveries: Vec<Delivery> = self
@@ -122,7 +122,7 @@ impl Experiment {
         });
         let learning =
             Learning { rule: self.rule, mode: self.mode, deliveries, shifts: shifts.collect() };
-        let mut engine = Engine::new(self.hardware, backend, self.seed, layers);
+        let mut engine = Engine::new(self.hardware.clone(), backend, self.seed, layers);
         engine.set_potentiation_only(self.rule == Rule::Kaneko);
         engine.set_mantissa(self.mantissa.get());
         self.load_initial_levels(&mut engine);
@@ -138,7 +138,7 @@ impl Experiment {
                 let inhibits = pathway.polarity == crate::chip::population::Polarity::Inhibits;
                 let scale = initial_scale(
                     spec.gain_64ths[usize::from(inhibits)],
-                    self.hardware.level_bits.get(),
+                    self.hardware.cell.level_bits.get(),
                     spec.weight_max_log2,
                     spec.inputs,
                 );
@@ -150,7 +150,7 @@ impl Experiment {
                     sub: 0,
                     count: 0,
                 };
-                initial_levels(layout, self.hardware.window, scale, place, |row, levels| {
+                initial_levels(layout, self.hardware.cell.window, scale, place, |row, levels| {
                     engine.execute(&Operation::LoadWeights { layer, array, row, levels });
                 });
             }

@@ -100,7 +100,7 @@ impl Trainer {
     }
 
     fn codes(&self, examples: &Examples, which: impl Iterator<Item = usize>) -> Vec<u8> {
-        let table = examples.codes(self.experiment.hardware.drive_bits);
+        let table = examples.codes(self.experiment.hardware.drive.bits);
         which
             .flat_map(|example| examples.values(example).iter().map(|&v| table[usize::from(v)]))
             .collect()
@@ -120,7 +120,7 @@ impl Trainer {
         let seed = self.experiment.seed;
         let order = draw::shuffled(seed, u64::from(self.epoch), samples);
         let shifts = self.experiment.augment.map(|augment| shifts(augment, seed, self.epoch));
-        let table = train.codes(self.experiment.hardware.drive_bits);
+        let table = train.codes(self.experiment.hardware.drive.bits);
         let same = table.iter().zip(0..=u8::MAX).all(|(&code, value)| code == value);
         let (mut correct, mut done) = (0, 0);
         let mut codes = Vec::new();

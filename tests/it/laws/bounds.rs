@@ -4,9 +4,7 @@ use std::ops::Range;
 
 use dalean::chip::crossbar::kernel::Backend;
 use dalean::chip::engine::{Engine, Operation, Side, Write};
-use dalean::chip::hardware::{
-    Adc, DitherBits, DitherPattern, FloorKind, Hardware, Window, WriteScheme,
-};
+use dalean::chip::hardware::{DitherBits, Hardware, Window};
 use dalean::chip::layer::{CHUNK_BLOCKS, Layer, LayerSpec, SIDE_MAX, Taps};
 use dalean::chip::population::Wiring;
 use dalean::num::fixed::*;
@@ -14,26 +12,15 @@ use dalean::num::tables::Activation;
 
 fn hardware(level_bits: i64, residual_bits: i64) -> Hardware {
     let level_bits = LevelBits::new(level_bits).unwrap();
-    Hardware {
-        level_bits,
-        window: Window::new(0, i64::from(level_bits.level_max()), level_bits).unwrap(),
-        floor_kind: FloorKind::Recoverable,
-        tile_rows: 256,
-        tile_columns: 256,
-        tiles_max: None,
-        transposed_read: true,
-        drive_bits: DriveBits::new(8).unwrap(),
-        dac_bits: 8,
-        adc: Adc::Ideal,
-        lut_bits: LutBits::new(10).unwrap(),
-        error_bits: ErrorBits::new(8).unwrap(),
-        increment_max: IncrementMax::new(127).unwrap(),
-        dither_bits: DitherBits::Zero,
-        dither_pattern: DitherPattern::PerCell,
-        residual_bits: ResidualBits::new(residual_bits).unwrap(),
-        scheme: WriteScheme::Rounded,
-        timing: None,
-    }
+    Hardware::reference()
+        .with(|h| {
+            h.cell.level_bits = level_bits;
+            h.cell.window = Window::new(0, i64::from(level_bits.level_max()), level_bits).unwrap();
+            h.write.increment_max = IncrementMax::new(127).unwrap();
+            h.write.dither_bits = DitherBits::Zero;
+            h.write.residual_bits = ResidualBits::new(residual_bits).unwrap();
+        })
+        .unwrap()
 }
 
 /// One layer whose units have the derivative 255 everywhere.
@@ -48,12 +35,13 @@ fn engine(hardware: Hardware, backend: Backend, inputs: usize, units: usize) -> 
         constant_row: false,
     };
     let taps = Taps { width: 1, per_unit: 1, words: vec![0; units], shift: 0 };
-    Engine::new(hardware, backend, 1, vec![Layer::new(0, spec, taps, &hardware)])
+    let layer = Layer::new(0, spec, taps, &hardware);
+    Engine::new(hardware, backend, 1, vec![layer])
 }
 
 /// Puts every cell of an array at its ceiling.
 fn fill(engine: &mut Engine, array: usize, rows: Range<usize>) {
-    let ceiling = engine.hardware().window.ceiling();
+    let ceiling = engine.hardware().cell.window.ceiling();
     let levels = vec![ceiling; engine.layers()[0].layout.columns];
     for row in rows {
         engine.execute(&Operation::LoadWeights { layer: 0, array, row, levels: &levels });
@@ -77,7 +65,7 @@ fn a_read_reaches_its_bound_and_never_passes_it() {
             let mut engine = engine(hardware(level_bits, 0), backend, rows, 1);
             fill(&mut engine, array, 0..rows);
             forward(&mut engine, &vec![255; 2 * rows]);
-            let ceiling = i64::from(engine.hardware().window.ceiling());
+            let ceiling = i64::from(engine.hardware().cell.window.ceiling());
             let want = sign * rows as i64 * ceiling * 255;
             let got = [0, 1].map(|sample| engine.output_accumulator(sample, 0));
             assert_eq!(got, [want; 2], "{} {rows} {level_bits}", backend.name());
@@ -100,7 +88,7 @@ fn a_transposed_read_reaches_its_bound() {
                 shared: false,
             });
             engine.execute(&Operation::Forward { layer: 0, side: Side::Columns });
-            let want = SIDE_MAX as i64 * i64::from(engine.hardware().window.ceiling()) * 127;
+            let want = SIDE_MAX as i64 * i64::from(engine.hardware().cell.window.ceiling()) * 127;
             assert_eq!(engine.backward(0), [want, -want], "{}", backend.name());
         }
     }

@@ -1,8 +1,8 @@
 //! Any valid chip, any small network on it, any list of choices.
 
 use dalean::chip::hardware::{
-    Adc, AdcRange, DitherBits, DitherPattern, FloorKind, Hardware, PulseCode, Subtract, Timing,
-    Window, WriteScheme,
+    Adc, AdcRange, DitherBits, DitherPattern, FloorKind, Hardware, HardwareSpec, PulseCode,
+    Subtract, Timing, Window, WriteScheme,
 };
 use dalean::chip::layer::{LayerSpec, Taps};
 use dalean::chip::population::Wiring;
@@ -40,6 +40,11 @@ pub(crate) struct Net {
 }
 
 impl Net {
+    /// Changes parts of the chip.
+    pub(crate) fn change(&mut self, change: impl FnOnce(&mut HardwareSpec)) {
+        self.hardware = self.hardware.with(change).unwrap();
+    }
+
     /// Cells, the measure of how long a case takes.
     pub(crate) fn cells(&self) -> usize {
         self.specs.iter().map(|s| s.inputs * s.units * s.wiring.pathways().len()).sum()
@@ -113,26 +118,26 @@ pub(crate) fn hardware(widest: usize) -> impl Strategy<Value = Hardware> {
         )| {
             let level_bits = LevelBits::new(level_bits).unwrap();
             let drive_bits = DriveBits::new(drive_bits).unwrap();
-            Hardware {
-                level_bits,
-                window: window(level_bits, ends),
-                floor_kind: if absorbs { FloorKind::Absorbing } else { FloorKind::Recoverable },
-                tile_rows,
-                tile_columns,
-                tiles_max: None,
-                transposed_read,
-                drive_bits,
-                dac_bits: 1 + dac_bits % drive_bits.get(),
-                adc,
-                lut_bits: LutBits::new(lut_bits).unwrap(),
-                error_bits: ErrorBits::new(error_bits).unwrap(),
-                increment_max: IncrementMax::new(increment_max).unwrap(),
-                dither_bits,
-                dither_pattern,
-                residual_bits: ResidualBits::new(residual_bits).unwrap(),
-                scheme: WriteScheme::Rounded,
-                timing: None,
-            }
+            Hardware::reference()
+                .with(|h| {
+                    h.cell.level_bits = level_bits;
+                    h.cell.window = window(level_bits, ends);
+                    h.cell.floor_kind =
+                        if absorbs { FloorKind::Absorbing } else { FloorKind::Recoverable };
+                    h.tile.rows = tile_rows;
+                    h.tile.columns = tile_columns;
+                    h.tile.transposed_read = transposed_read;
+                    h.drive.bits = drive_bits;
+                    h.drive.dac_bits = 1 + dac_bits % drive_bits.get();
+                    h.adc = adc;
+                    h.digital.lut_bits = LutBits::new(lut_bits).unwrap();
+                    h.digital.error_bits = ErrorBits::new(error_bits).unwrap();
+                    h.write.increment_max = IncrementMax::new(increment_max).unwrap();
+                    h.write.dither_bits = dither_bits;
+                    h.write.dither_pattern = dither_pattern;
+                    h.write.residual_bits = ResidualBits::new(residual_bits).unwrap();
+                })
+                .unwrap()
         },
     )
 }
@@ -235,14 +240,18 @@ pub(crate) fn timed_net() -> impl Strategy<Value = Net> {
     let sides = prop::collection::vec(side(), 2..=4);
     let trains = prop::option::weighted(0.15, 0u32..=5);
     (net(sides), timing(), trains).prop_map(|(mut net, mut timing, trains)| {
-        if let Some(slots_log2) = trains {
-            net.hardware.scheme = WriteScheme::Trains { slots_log2 };
-            net.hardware.residual_bits = ResidualBits::new(0).unwrap();
-            timing.verify = false;
-            timing.active_max = None;
-            timing.pulse_code = PulseCode::Unary;
-        }
-        net.hardware.timing = Some(timing);
+        net.change(|h| {
+            if let Some(slots_log2) = trains {
+                h.write.scheme = WriteScheme::Trains { slots_log2 };
+                h.write.residual_bits = ResidualBits::new(0).unwrap();
+                let most = i64::from(h.write.increment_max.get()).max(1 << slots_log2);
+                h.write.increment_max = IncrementMax::new(most).unwrap();
+                timing.verify = false;
+                timing.active_max = None;
+                timing.pulse_code = PulseCode::Unary;
+            }
+            h.timing = Some(timing);
+        });
         net
     })
 }

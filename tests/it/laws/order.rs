@@ -14,7 +14,7 @@ use super::play::engine;
 fn waiting() -> Engine {
     let mut runner = TestRunner::deterministic();
     let mut net = net(Just(vec![3, 2, 2])).new_tree(&mut runner).unwrap().current();
-    net.hardware.adc = Adc::Ideal;
+    net.change(|h| h.adc = Adc::Ideal);
     let mut engine = engine(&net, Backend::Scalar);
     engine.execute(&Operation::LoadDrives { codes: &[0; 6] });
     for layer in 0..2 {

@@ -80,7 +80,7 @@ impl Script<'_> {
     }
 
     fn levels(&mut self, layer: usize, array: usize, row: usize, style: i64) {
-        let window = self.net.hardware.window;
+        let window = self.net.hardware.cell.window;
         let (floor, ceiling) = (i64::from(window.floor()), i64::from(window.ceiling()));
         let numbers = &mut self.numbers;
         let level = |_| match style {
@@ -97,7 +97,7 @@ impl Script<'_> {
         let most = (300_000 / self.net.cells()).clamp(1, 20);
         self.samples = 1 + self.pick(most);
         let inputs = self.net.specs[0].inputs;
-        let greatest = (1i64 << self.net.hardware.drive_bits.get()) - 1;
+        let greatest = (1i64 << self.net.hardware.drive.bits.get()) - 1;
         let (style, dark) = (self.pick(8), [4, 16, 32, 64][self.pick(4)]);
         let numbers = &mut self.numbers;
         let code = |at: usize| match style {
@@ -151,7 +151,7 @@ impl Script<'_> {
         if from < to && from < self.pending[layer] {
             self.program(layer);
         }
-        let rail = (1i64 << (self.net.hardware.error_bits.get() - 1)) - 1;
+        let rail = (1i64 << (self.net.hardware.digital.error_bits.get() - 1)) - 1;
         let width = self.net.taps[layer].width;
         let style = self.pick(6);
         let numbers = &mut self.numbers;
@@ -178,7 +178,7 @@ impl Script<'_> {
     }
 
     fn program(&mut self, layer: usize) {
-        if self.net.hardware.scheme != WriteScheme::Rounded {
+        if self.net.hardware.write.scheme != WriteScheme::Rounded {
             return self.now(layer);
         }
         let shift = self.shift();
@@ -188,7 +188,7 @@ impl Script<'_> {
 
     /// Adds some of the samples that come next and have gates.
     fn add(&mut self, layer: usize, all: bool) {
-        if self.net.hardware.scheme != WriteScheme::Rounded {
+        if self.net.hardware.write.scheme != WriteScheme::Rounded {
             return self.now(layer);
         }
         let from = self.pending[layer];
@@ -233,7 +233,10 @@ impl Script<'_> {
                 let (array, row, style) = (self.pick(arrays), self.pick(rows), self.pick(6));
                 self.levels(layer, array, row, style as i64);
             }
-            7 | 8 if self.net.hardware.transposed_read && self.net.hardware.adc == Adc::Ideal => {
+            7 | 8
+                if self.net.hardware.tile.transposed_read
+                    && self.net.hardware.adc == Adc::Ideal =>
+            {
                 if self.gates[layer].is_empty() || self.gates[layer].contains(&false) {
                     self.error(layer, true);
                 }
@@ -271,7 +274,7 @@ pub(crate) fn engine(net: &Net, backend: Backend) -> Engine {
     let layers = net.specs.iter().zip(&net.taps).zip(0u16..);
     let layers = layers
         .map(|((spec, taps), index)| Layer::new(index, spec.clone(), taps.clone(), &net.hardware));
-    let mut engine = Engine::new(net.hardware, backend, net.seed, layers.collect());
+    let mut engine = Engine::new(net.hardware.clone(), backend, net.seed, layers.collect());
     engine.set_mantissa(net.mantissa);
     engine.set_potentiation_only(net.potentiation_only);
     engine
@@ -422,7 +425,7 @@ fn compare_outputs(engine: &Engine, shadow: &Shadow) -> Result<(), String> {
 
 fn compare_cells(engine: &Engine, shadow: &Shadow, layer: usize) -> Result<(), String> {
     let (got, want) = (&engine.layers()[layer], &shadow.layers[layer]);
-    let window = shadow.net.hardware.window;
+    let window = shadow.net.hardware.cell.window;
     let flat = |table: &Table| -> Vec<i64> { table.concat() };
     for (at, (array, want)) in got.arrays.iter().zip(&want.arrays).enumerate() {
         let levels: Vec<i64> = array.levels().map(i64::from).collect();

@@ -23,8 +23,7 @@ fn transposed(w: &[Vec<i64>]) -> Vec<Vec<i64>> {
 
 /// One layer with ideal converters, both reads, derivative 255 everywhere.
 fn ideal(mut net: Net) -> Net {
-    net.hardware.adc = Adc::Ideal;
-    net.hardware.transposed_read = true;
+    net.change(|h| (h.adc, h.tile.transposed_read) = (Adc::Ideal, true));
     net.specs[0].activation = Activation::Identity;
     net.specs[0].constant_row = false;
     net
@@ -33,7 +32,7 @@ fn ideal(mut net: Net) -> Net {
 fn equals_its_product(net: &Net, backend: Backend) {
     let mut engine = engine(net, backend);
     let (inputs, units) = (net.specs[0].inputs, net.specs[0].units);
-    let window = net.hardware.window;
+    let window = net.hardware.cell.window;
     let mut numbers = Numbers(net.seed);
     let mut matrix = vec![vec![0; units]; inputs];
     for (array, sign) in [(0, 1), (1, -1)] {
@@ -46,7 +45,7 @@ fn equals_its_product(net: &Net, backend: Backend) {
         }
     }
     let samples = 1 + numbers.within(0, 12) as usize;
-    let greatest = i64::from(net.hardware.drive_bits.code_max());
+    let greatest = i64::from(net.hardware.drive.bits.code_max());
     let x: Vec<i64> = (0..samples * inputs).map(|_| numbers.within(0, greatest)).collect();
     let codes: Vec<u8> = x.iter().map(|&x| x as u8).collect();
     engine.execute(&Operation::LoadDrives { codes: &codes });
@@ -57,7 +56,7 @@ fn equals_its_product(net: &Net, backend: Backend) {
         assert_eq!(got, product(&columns, x), "{}", backend.name());
     }
 
-    let bits = net.hardware.error_bits.get();
+    let bits = net.hardware.digital.error_bits.get();
     let rail = (1i64 << (bits - 1)) - 1;
     let taps = &net.taps[0];
     let word = |_| numbers.within(-rail, rail) as i16;
@@ -82,15 +81,21 @@ fn equals_its_product(net: &Net, backend: Backend) {
 
 /// Converters that lose nothing, for levels and slices small enough; any slices, any tiles that fit.
 fn lossless(mut net: Net, dac_bits: u32, subtract: Subtract) -> Option<Net> {
-    let hw = &mut net.hardware;
-    hw.dac_bits = 1 + dac_bits % hw.drive_bits.get();
-    let slice = (1usize << hw.dac_bits) - 1;
+    let hw = &net.hardware;
+    let dac_bits = 1 + dac_bits % hw.drive.bits.get();
+    let slice = (1usize << dac_bits) - 1;
     let greatest = if subtract == Subtract::Digital { 65_535 } else { 32_767 };
-    let fits = greatest / (slice * usize::from(hw.window.ceiling()));
-    hw.tile_rows = hw.tile_rows.min(fits);
+    let fits = greatest / (slice * usize::from(hw.cell.window.ceiling()));
     let bits = AdcBits::new(16).unwrap();
-    hw.adc = Adc::Finite { bits, subtract, range: AdcRange::Shift(0) };
-    (fits > 0).then_some(net)
+    if fits == 0 {
+        return None;
+    }
+    net.change(|h| {
+        h.drive.dac_bits = dac_bits;
+        h.tile.rows = h.tile.rows.min(fits);
+        h.adc = Adc::Finite { bits, subtract, range: AdcRange::Shift(0) };
+    });
+    Some(net)
 }
 
 proptest! {
@@ -116,7 +121,7 @@ proptest! {
         choices in choices(),
     ) {
         let mut plain = net;
-        plain.hardware.adc = Adc::Ideal;
+        plain.change(|h| h.adc = Adc::Ideal);
         let Some(sliced) = lossless(plain.clone(), dac_bits, subtract) else {
             return Err(TestCaseError::reject("no tile is small enough"));
         };

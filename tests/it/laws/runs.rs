@@ -1,7 +1,7 @@
 //! Law 3: a run has one state, however it is carried out.
 
 use dalean::chip::crossbar::kernel::Backend;
-use dalean::chip::hardware::{Adc, AdcRange};
+use dalean::chip::hardware::{Adc, AdcRange, HardwareSpec};
 use dalean::chip::layer::LayerSpec;
 use dalean::chip::population::Wiring;
 use dalean::lab::store::checkpoint::{self, Identity};
@@ -81,7 +81,10 @@ fn run() -> impl Strategy<Value = Run> {
             centre = Centre::None;
         }
         if rule == Rule::Bp {
-            (hardware.adc, hardware.transposed_read) = (Adc::Ideal, true);
+            let both_sides = |h: &mut HardwareSpec| {
+                (h.adc, h.tile.transposed_read) = (Adc::Ideal, true);
+            };
+            hardware = hardware.with(both_sides).unwrap();
         }
         let count = layers.len();
         let rates = [1.0, 20.0, 300.0, 5000.0];
@@ -180,7 +183,8 @@ proptest! {
         prop_assert_eq!(Some(&interrupted(&run)), want.last(), "stopped after {}", run.stop);
         if run.experiment.hardware.adc == Adc::Ideal {
             let mut cut = run.clone();
-            (cut.experiment.hardware.tile_rows, cut.experiment.hardware.tile_columns) = tiles;
+            let smaller = |h: &mut HardwareSpec| (h.tile.rows, h.tile.columns) = tiles;
+            cut.experiment.hardware = cut.experiment.hardware.with(smaller).unwrap();
             prop_assert_eq!(&whole(&cut, Backend::best(), 1), &want, "cut into {:?}", tiles);
         }
     }

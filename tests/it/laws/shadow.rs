@@ -80,8 +80,8 @@ fn table(rows: usize, columns: usize, value: i64) -> Table {
 
 impl Shadow {
     pub(crate) fn new(net: &Net, fault: Option<Fault>) -> Self {
-        let hw = net.hardware;
-        let floor = i64::from(hw.window.floor());
+        let hw = &net.hardware;
+        let floor = i64::from(hw.cell.window.floor());
         let layers = net.specs.iter().zip(&net.taps).map(|(spec, taps)| {
             let rows = spec.inputs + usize::from(spec.constant_row);
             let array = Array {
@@ -94,23 +94,23 @@ impl Shadow {
             let shifts = match hw.adc {
                 Adc::Ideal => vec![],
                 Adc::Finite { bits, subtract, range } => {
-                    let slice = (1i64 << hw.dac_bits.min(hw.drive_bits.get())) - 1;
-                    let tallest = rows.min(hw.tile_rows) as i64;
-                    let worst = tallest * i64::from(hw.window.ceiling()) * slice;
+                    let slice = (1i64 << hw.drive.dac_bits.min(hw.drive.bits.get())) - 1;
+                    let tallest = rows.min(hw.tile.rows) as i64;
+                    let worst = tallest * i64::from(hw.cell.window.ceiling()) * slice;
                     let sign = u32::from(subtract == Subtract::Current);
                     let rail = (1i64 << (bits.get() - sign)) - 1;
                     let shift = match range {
                         AdcRange::Shift(shift) => shift,
                         _ => (0..60).find(|&s| rsh(worst, s) <= rail).unwrap(),
                     };
-                    let slices = hw.drive_bits.get().div_ceil(hw.dac_bits) as usize;
+                    let slices = hw.drive.bits.get().div_ceil(hw.drive.dac_bits) as usize;
                     vec![vec![shift; slices]; spec.wiring.targets().len()]
                 }
             };
             Side {
                 spec: spec.clone(),
                 taps: taps.clone(),
-                lut: Lut::new(spec.activation, hw.lut_bits, layer::unit(spec, &hw)),
+                lut: Lut::new(spec.activation, hw.digital.lut_bits, layer::unit(spec, hw)),
                 rows,
                 arrays: vec![array; spec.wiring.pathways().len()],
                 adc_shifts: shifts,
@@ -164,7 +164,7 @@ impl Shadow {
     fn with_constant(&self, layer: usize, mut row: Vec<i64>) -> Vec<i64> {
         if self.layers[layer].spec.constant_row {
             let dark = self.is(Fault::ConstantRowDark);
-            row.push(if dark { 0 } else { (1 << self.net.hardware.drive_bits.get()) - 1 });
+            row.push(if dark { 0 } else { (1 << self.net.hardware.drive.bits.get()) - 1 });
         }
         row
     }
@@ -179,7 +179,7 @@ impl Shadow {
 
     /// Rows of each tile of a column, from the top.
     fn row_tiles(&self, layer: usize) -> Vec<Range<usize>> {
-        let (rows, step) = (self.layers[layer].rows, self.net.hardware.tile_rows);
+        let (rows, step) = (self.layers[layer].rows, self.net.hardware.tile.rows);
         (0..rows.div_ceil(step)).map(|t| t * step..rows.min((t + 1) * step)).collect()
     }
 
@@ -205,14 +205,14 @@ impl Shadow {
         let [sample, column] = at;
         let source = this.spec.wiring.pathways()[bank].source;
         let drives = &this.drives[source.index()][sample];
-        let mask = (1i64 << self.net.hardware.dac_bits) - 1;
+        let mask = (1i64 << self.net.hardware.drive.dac_bits) - 1;
         let whole = self.net.hardware.adc == Adc::Ideal;
         let mut rows = rows;
         if self.is(Fault::TileEdgeLost) && rows.end < this.rows {
             rows.end -= 1;
         }
         rows.map(|row| {
-            let slice = (drives[row] >> (s * self.net.hardware.dac_bits)) & mask;
+            let slice = (drives[row] >> (s * self.net.hardware.drive.dac_bits)) & mask;
             this.arrays[bank].level[row][column] * if whole { drives[row] } else { slice }
         })
         .sum()
@@ -221,12 +221,12 @@ impl Shadow {
     /// Reads one target stream. Returns the currents every converter saw, by slice, when `probe` reads with
     /// ideal converters.
     fn read(&mut self, layer: usize, target: Stream, probe: bool) -> Vec<Vec<i64>> {
-        let hw = self.net.hardware;
+        let hw = self.net.hardware.clone();
         let (units, t) = (self.layers[layer].spec.units, target.index());
         let banks = self.layers[layer].spec.wiring.banks(target);
         let tiles = self.row_tiles(layer);
         let slices =
-            if hw.adc == Adc::Ideal { 1 } else { hw.drive_bits.get().div_ceil(hw.dac_bits) };
+            if hw.adc == Adc::Ideal { 1 } else { hw.drive.bits.get().div_ceil(hw.drive.dac_bits) };
         let mut seen = vec![vec![]; slices as usize];
         let (mut accumulators, mut saturated, mut look_ups) = (vec![], [0; 2], 0);
         for sample in 0..self.samples {
@@ -237,7 +237,7 @@ impl Shadow {
                     let at = [sample, column];
                     let [e, i] = banks.map(|bank| self.current(layer, bank, at, tile.clone(), s));
                     let weight =
-                        if self.is(Fault::SliceShiftMissing) { 0 } else { s * hw.dac_bits };
+                        if self.is(Fault::SliceShiftMissing) { 0 } else { s * hw.drive.dac_bits };
                     let d = match hw.adc {
                         Adc::Finite { bits, subtract, .. } if !probe => {
                             let ash = self.layers[layer].adc_shifts[t][s as usize];
@@ -271,7 +271,7 @@ impl Shadow {
             accumulators.push(row);
         }
         let lut = &self.layers[layer].lut;
-        let half = 1i64 << (hw.lut_bits.get() - 1);
+        let half = 1i64 << (hw.digital.lut_bits.get() - 1);
         let look = |acc: i64, saturated: &mut u64| {
             let exact =
                 if self.is(Fault::IndexTruncates) { acc >> lut.shift } else { rsh(acc, lut.shift) };
@@ -307,19 +307,19 @@ impl Shadow {
 
     /// What one read of all loaded samples costs, tile by tile.
     fn count_read(&mut self, layer: usize) {
-        let hw = self.net.hardware;
+        let hw = self.net.hardware.clone();
         let wiring = self.layers[layer].spec.wiring;
         let (rows, columns) = (self.layers[layer].rows, self.layers[layer].spec.units);
-        let slices = u64::from(hw.drive_bits.get().div_ceil(hw.dac_bits));
+        let slices = u64::from(hw.drive.bits.get().div_ceil(hw.drive.dac_bits));
         let current = matches!(hw.adc, Adc::Finite { subtract: Subtract::Current, .. });
         let times = self.samples as u64 * slices;
         for &target in wiring.targets() {
             for (bank, at) in wiring.banks(target).into_iter().enumerate() {
                 let code = self.code(layer, at);
-                for (high, wide) in tile_sizes(rows, columns, hw.tile_rows, hw.tile_columns) {
+                for (high, wide) in tile_sizes(rows, columns, hw.tile.rows, hw.tile.columns) {
                     let converted = if current && bank == 1 { 0 } else { wide };
                     for (event, count) in [
-                        (Event::SramBits, high * u64::from(hw.dac_bits)),
+                        (Event::SramBits, high * u64::from(hw.drive.dac_bits)),
                         (Event::DacSlices, high),
                         (Event::CellReads, high * wide),
                         (Event::Holds, wide),
@@ -340,7 +340,7 @@ impl Shadow {
         if layer + 1 == self.layers.len() {
             return;
         }
-        let bits = self.net.hardware.drive_bits.get();
+        let bits = self.net.hardware.drive.bits.get();
         for stream in 0..2 {
             let code = |&a: &i64| {
                 let round =

@@ -7,11 +7,9 @@ use super::*;
 use crate::chip::crossbar::kernel::{Backend, Write};
 use crate::chip::crossbar::layout::PANEL_COLUMNS;
 use crate::chip::crossbar::{Crossbar, WriteRequest, Written};
-use crate::chip::hardware::{
-    Adc, DitherBits, DitherPattern, FloorKind, Hardware, Window, WriteScheme,
-};
+use crate::chip::hardware::{DitherBits, DitherPattern, FloorKind, Hardware, Window};
 use crate::num::draw::{Place, Site};
-use crate::num::fixed::{DriveBits, ErrorBits, IncrementMax, LevelBits, LutBits, ResidualBits};
+use crate::num::fixed::{IncrementMax, LevelBits, ResidualBits};
 
 /// What is written, and how.
 #[derive(Debug, Clone, Copy)]
@@ -39,26 +37,21 @@ fn bytes(seed: u64, len: usize) -> Vec<u8> {
 
 fn hardware(case: &Case) -> Hardware {
     let level_bits = LevelBits::new(case.level_bits).unwrap();
-    Hardware {
-        level_bits,
-        window: Window::new(1, level_bits.level_max().into(), level_bits).unwrap(),
-        floor_kind: if case.absorbs { FloorKind::Absorbing } else { FloorKind::Recoverable },
-        tile_rows: 64,
-        tile_columns: 64,
-        tiles_max: None,
-        transposed_read: false,
-        drive_bits: DriveBits::new(8).unwrap(),
-        dac_bits: 8,
-        adc: Adc::Ideal,
-        lut_bits: LutBits::new(10).unwrap(),
-        error_bits: ErrorBits::new(8).unwrap(),
-        increment_max: IncrementMax::new(case.increment_max).unwrap(),
-        dither_bits: case.dither.0,
-        dither_pattern: case.dither.1,
-        residual_bits: ResidualBits::new(case.residual_bits).unwrap(),
-        scheme: WriteScheme::Rounded,
-        timing: None,
-    }
+    Hardware::reference()
+        .with(|h| {
+            h.cell.level_bits = level_bits;
+            h.cell.window = Window::new(1, level_bits.level_max().into(), level_bits).unwrap();
+            h.cell.floor_kind =
+                if case.absorbs { FloorKind::Absorbing } else { FloorKind::Recoverable };
+            h.tile.rows = 64;
+            h.tile.columns = 64;
+            h.tile.transposed_read = false;
+            h.write.increment_max = IncrementMax::new(case.increment_max).unwrap();
+            h.write.dither_bits = case.dither.0;
+            h.write.dither_pattern = case.dither.1;
+            h.write.residual_bits = ResidualBits::new(case.residual_bits).unwrap();
+        })
+        .unwrap()
 }
 
 /// Writes a fresh array, strip by strip. Gates and drives are sparse for some seeds, beyond the array always 0.
@@ -88,7 +81,7 @@ fn written(backend: Backend, case: &Case, collect: Collect) -> (Crossbar, Vec<Wr
     let mut array = Crossbar::new(layout, &hardware);
     for row in 0..layout.rows {
         let levels = bytes(case.seed + 2 + row as u64, 2 * layout.columns);
-        let window = hardware.window.floor()..=hardware.window.ceiling();
+        let window = hardware.cell.window.floor()..=hardware.cell.window.ceiling();
         let words = levels.as_chunks::<2>().0.iter().map(|word| u16::from_le_bytes(*word));
         let row_levels: Vec<_> =
             words.map(|word| (word % *window.end()).max(*window.start())).collect();
@@ -103,9 +96,9 @@ fn written(backend: Backend, case: &Case, collect: Collect) -> (Crossbar, Vec<Wr
             negate: case.negate,
             increment_max: i32::try_from(case.increment_max).unwrap(),
             groups: u16::MAX,
-            floor: hardware.window.floor(),
-            ceiling: hardware.window.ceiling(),
-            residual_bits: hardware.residual_bits.get(),
+            floor: hardware.cell.window.floor(),
+            ceiling: hardware.cell.window.ceiling(),
+            residual_bits: hardware.write.residual_bits.get(),
         },
         dither_bits: case.dither.0,
         dither_pattern: case.dither.1,

@@ -53,11 +53,11 @@ impl Network {
     /// # Panics
     /// When the hardware has no timing.
     #[must_use]
-    pub fn new(hardware: Hardware, seed: u64, layers: &[Layer], slots: usize) -> Self {
+    pub fn new(hardware: &Hardware, seed: u64, layers: &[Layer], slots: usize) -> Self {
         let timing = hardware.timing.expect("time is counted on hardware that has it");
         let ledger = Ledger::with_cycles(layers.len());
         let layers =
-            layers.iter().map(|layer| TickLayer::new(&hardware, timing, seed, layer, slots));
+            layers.iter().map(|layer| TickLayer::new(hardware, timing, seed, layer, slots));
         Self {
             timing,
             layers: layers.collect(),

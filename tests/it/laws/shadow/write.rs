@@ -12,7 +12,7 @@ use super::{Fault, Shadow, Table, rsh, sat, sign, table, tile_sizes};
 impl Shadow {
     /// Delivers words; the units of some samples latch their taps and form gates.
     pub(crate) fn error(&mut self, layer: usize, samples: Range<usize>, words: &[i16]) {
-        let bits = self.net.hardware.error_bits.get();
+        let bits = self.net.hardware.digital.error_bits.get();
         let (taps, wiring) = (self.layers[layer].taps.clone(), self.layers[layer].spec.wiring);
         let units = self.layers[layer].spec.units;
         for &target in wiring.targets() {
@@ -85,12 +85,12 @@ impl Shadow {
             }
         }
         self.layers[layer].backward = backward;
-        let hw = self.net.hardware;
-        let slices = u64::from(hw.drive_bits.get().div_ceil(hw.dac_bits));
+        let hw = self.net.hardware.clone();
+        let slices = u64::from(hw.drive.bits.get().div_ceil(hw.drive.dac_bits));
         let times = 2 * slices * self.samples as u64;
         for at in banks {
             let code = self.code(layer, at);
-            for (high, wide) in tile_sizes(rows, columns, hw.tile_rows, hw.tile_columns) {
+            for (high, wide) in tile_sizes(rows, columns, hw.tile.rows, hw.tile.columns) {
                 for (event, count) in [
                     (Event::DacSlices, wide),
                     (Event::CellReads, high * wide),
@@ -132,7 +132,7 @@ impl Shadow {
 
     /// Bits that sums and remainders move in memory, `times` what an array holds.
     pub(crate) fn move_bits(&mut self, layer: usize, sums: u64, remainders: u64) {
-        let bits = u64::from(self.net.hardware.residual_bits.get());
+        let bits = u64::from(self.net.hardware.write.residual_bits.get());
         let this = &self.layers[layer];
         let cells = (this.rows * this.spec.units) as u64;
         let count = cells * (64 * sums + 2 * bits * remainders);
@@ -152,7 +152,7 @@ impl Shadow {
     }
 
     fn program_array(&mut self, layer: usize, at: usize, shift: u32) {
-        let hw = self.net.hardware;
+        let hw = self.net.hardware.clone();
         let wiring = self.layers[layer].spec.wiring;
         let pathway = wiring.pathways()[at];
         let (rows, columns) = (self.layers[layer].rows, self.layers[layer].spec.units);
@@ -160,12 +160,13 @@ impl Shadow {
             std::mem::replace(&mut self.layers[layer].arrays[at].sums, table(rows, columns, 0));
         let pair = wiring == dalean::chip::population::Wiring::Single;
         let shift = shift + u32::from(pair && !self.is(Fault::PairShiftMissing));
-        let fraction = hw.residual_bits.get();
+        let fraction = hw.write.residual_bits.get();
         let k = i64::from(shift) - i64::from(fraction);
         let words = self.dither(layer, at);
-        let (floor, ceiling) = (i64::from(hw.window.floor()), i64::from(hw.window.ceiling()));
+        let (floor, ceiling) =
+            (i64::from(hw.cell.window.floor()), i64::from(hw.cell.window.ceiling()));
         let floor_bound = floor - i64::from(self.is(Fault::FloorOffByOne));
-        let bound = i64::from(hw.increment_max.get());
+        let bound = i64::from(hw.write.increment_max.get());
         let (mut requested, mut bounded, mut attempted, mut effective) = (0, 0, 0, 0);
         for (row, column) in (0..rows).flat_map(|row| (0..columns).map(move |c| (row, c))) {
             let (mantissa, word) = (i64::from(self.net.mantissa), words[row][column]);
@@ -207,7 +208,7 @@ impl Shadow {
             array.level[row][column] = after;
             array.residual[row][column] = kept;
             array.pruned[row][column] |=
-                hw.floor_kind == FloorKind::Absorbing && pulsed && after == floor;
+                hw.cell.floor_kind == FloorKind::Absorbing && pulsed && after == floor;
             requested += u64::from(wanted != 0);
             bounded += u64::from(wanted != pulses);
             attempted += pulses.unsigned_abs();
@@ -227,7 +228,7 @@ impl Shadow {
 
     /// `SR(sum, k)`: `q = rsh(sum, k - D)` or `sum << (D - k)`, then `(q + r) >> D`.
     fn round(&self, sum: i64, k: i64, word: i64) -> i64 {
-        let bits = match self.net.hardware.dither_bits {
+        let bits = match self.net.hardware.write.dither_bits {
             DitherBits::Zero => 0,
             DitherBits::Eight => 8,
             DitherBits::Sixteen => 16,
@@ -238,7 +239,7 @@ impl Shadow {
 
     /// The word of every cell of an array for its next write.
     fn dither(&self, layer: usize, at: usize) -> Table {
-        let hw = self.net.hardware;
+        let hw = self.net.hardware.clone();
         let (rows, columns) = (self.layers[layer].rows, self.layers[layer].spec.units);
         let code = self.code(layer, if self.is(Fault::DitherOfOnePathway) { 0 } else { at });
         let writes = self.layers[layer].arrays[at].writes;
@@ -254,7 +255,7 @@ impl Shadow {
         let next = usize::from(self.is(Fault::DitherOfNeighbour));
         // the words of a column, of an array numbered as if it had `numbered` rows
         let column_words = |place: Place, numbered: usize, column: usize, len: usize| -> Vec<i64> {
-            let words = (0..len + next).step_by(32).flat_map(|row| match hw.dither_bits {
+            let words = (0..len + next).step_by(32).flat_map(|row| match hw.write.dither_bits {
                 DitherBits::Zero => [0; 32],
                 DitherBits::Eight => {
                     let mut words = [0; 64];
@@ -265,7 +266,7 @@ impl Shadow {
             });
             words.skip(next).take(len).collect()
         };
-        match hw.dither_pattern {
+        match hw.write.dither_pattern {
             DitherPattern::PerCell => {
                 let all: Table =
                     (0..columns).map(|c| column_words(place, numbered, c, rows)).collect();

@@ -67,7 +67,7 @@ impl TickLayer {
         slots: usize,
     ) -> Self {
         let grid = layer.tiles(hardware);
-        let tile = [hardware.tile_rows, hardware.tile_columns];
+        let tile = [hardware.tile.rows, hardware.tile.columns];
         let (rows, columns) = (layer.layout.rows, layer.layout.columns);
         let mut this = Self {
             tiles: vec![],
@@ -75,8 +75,8 @@ impl TickLayer {
             columns,
             width: layer.taps.width,
             memory: Memory {
-                dac_bits: hardware.dac_bits.into(),
-                residual_bits: hardware.residual_bits.get().into(),
+                dac_bits: hardware.drive.dac_bits.into(),
+                residual_bits: hardware.write.residual_bits.get().into(),
             },
             outputs: vec![(0, 0); slots * columns],
             backward: vec![],
@@ -87,9 +87,9 @@ impl TickLayer {
             rows,
             grid,
             tile,
-            drive_bits: hardware.drive_bits,
-            dither: (hardware.dither_bits.get(), hardware.dither_pattern),
-            slots_log2: match hardware.scheme {
+            drive_bits: hardware.drive.bits,
+            dither: (hardware.write.dither_bits.get(), hardware.write.dither_pattern),
+            slots_log2: match hardware.write.scheme {
                 WriteScheme::Rounded => 0,
                 WriteScheme::Trains { slots_log2 } => slots_log2,
             },
