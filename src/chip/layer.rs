@@ -16,6 +16,8 @@ use super::population::Wiring;
 use crate::num::fixed::DriveBits;
 use crate::num::tables::{Activation, Lut, Unit};
 
+mod state;
+
 /// What a layer is made of.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LayerSpec {

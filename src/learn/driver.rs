@@ -9,6 +9,7 @@ use super::route::Delivery;
 use super::rule::{Rule, Step, UpdateMode, Words};
 use crate::chip::engine::{Engine, Operation, Side, Write};
 use crate::chip::ledger::{During, Event};
+use crate::chip::state::{Section, State, StateError, Visitor, visit_counts};
 use crate::num::fixed::{ErrorBits, rail};
 
 /// How a network learns.
@@ -57,20 +58,10 @@ impl Driver {
         &self.unit
     }
 
-    /// The error unit, to restore.
-    pub const fn unit_mut(&mut self) -> &mut ErrorUnit {
-        &mut self.unit
-    }
-
     /// Batches learnt from.
     #[must_use]
     pub const fn updates(&self) -> u64 {
         self.updates
-    }
-
-    /// Restores the number of batches learnt from.
-    pub const fn set_updates(&mut self, updates: u64) {
-        self.updates = updates;
     }
 
     /// The shift of a layer for the update in progress.
@@ -174,6 +165,15 @@ impl Driver {
     }
 }
 
+impl State for Driver {
+    fn visit(&mut self, visitor: &mut dyn Visitor) -> Result<(), StateError> {
+        self.engine.visit(visitor)?;
+        self.unit.visit(visitor)?;
+        let updates = std::iter::once(&mut self.updates);
+        visit_counts(visitor, "updates", Section::Progress, updates)
+    }
+}
+
 /// Row sums of a transposed read as error words.
 ///
 /// ```text
@@ -264,7 +264,7 @@ mod tests {
     fn a_shift_holds_from_its_first_update_to_the_next_one() {
         let mut driver = driver(Rule::Dfa, UpdateMode::Accumulate, &[(0, 3), (2, 4), (5, 6)]);
         let shifts = [0, 1, 2, 4, 5, 100].map(|updates| {
-            driver.set_updates(updates);
+            driver.updates = updates;
             driver.shift(1)
         });
         assert_eq!(shifts, [3, 3, 4, 4, 6, 6]);

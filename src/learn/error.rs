@@ -10,6 +10,7 @@
 //! B' is the size of this batch. See docs/MODEL.md, 3.1.
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
+use crate::chip::state::{Piece, Section, State, StateError, Visitor};
 use crate::num::fixed::{ErrorBits, rsh, sat};
 
 /// What is subtracted from the error of a class.
@@ -50,15 +51,6 @@ impl ErrorUnit {
     #[must_use]
     pub fn means(&self) -> &[i64] {
         &self.means
-    }
-
-    /// Restores the running means.
-    ///
-    /// # Panics
-    /// When their number differs.
-    pub fn load_means(&mut self, means: &[i64]) {
-        assert_eq!(means.len(), self.means.len(), "one mean an output, of running centres");
-        self.means.copy_from_slice(means);
     }
 
     /// Words for a batch of errors `[sample][output]`, and how many saturated.
@@ -111,6 +103,21 @@ impl ErrorUnit {
     }
 }
 
+impl State for ErrorUnit {
+    fn visit(&mut self, visitor: &mut dyn Visitor) -> Result<(), StateError> {
+        if self.means.is_empty() {
+            return Ok(());
+        }
+        // a mean of errors of at most 255, 8 fractional bits
+        let within = -(256 << 8)..=256 << 8;
+        let piece = Piece { name: "means", section: Some(Section::Centres), within };
+        if let Some(means) = visitor.numbers(&piece, &self.means)? {
+            self.means = means;
+        }
+        Ok(())
+    }
+}
+
 /// Errors of one sample: `255 onehot - a`, or `255 label - a` of a single output.
 pub fn errors(label: u8, activity: impl ExactSizeIterator<Item = u8>, out: &mut Vec<i32>) {
     let outputs = activity.len();
@@ -143,7 +150,7 @@ mod tests {
         let (words, _) = unit.words(&[128, -128], 2);
         assert_eq!((words, unit.means()), (vec![64, -64], &[128, -128][..]));
         let mut again = unit.clone();
-        again.load_means(&[128 << 8, -(128 << 8)]);
+        again.means = vec![128 << 8, -(128 << 8)];
         assert_eq!(again.words(&[128, -128], 2).0, [0, 0]);
     }
 

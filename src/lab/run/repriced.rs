@@ -34,7 +34,7 @@ pub struct Repriced {
 /// # Errors
 /// When the run is not finished or damaged, or there is no such model.
 pub fn reprice(path: &Path, other: Option<&str>) -> Result<Repriced, RunError> {
-    let config = read_config(path)?;
+    let (config, _) = read_config(path)?;
     let text = folder::read_text(path, names::LEDGER)?;
     let damaged = |name: &str, found| FolderError::Content { path: path.join(name), found };
     let ledger = LedgerRecord::parse(&text).map_err(|found| damaged(names::LEDGER, found))?;

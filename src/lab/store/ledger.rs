@@ -109,11 +109,7 @@ impl LedgerRecord {
         let Some(cycles) = ledger.cycles() else { return };
         let passed = match before.and_then(Ledger::cycles) {
             None => cycles.clone(),
-            Some(before) => {
-                let pairs = cycles.numbers().into_iter().zip(before.numbers());
-                let numbers: Vec<u64> = pairs.map(|(now, then)| now - then).collect();
-                Cycles::from_numbers(cycles.layers(), &numbers).expect("as many as there were")
-            }
+            Some(before) => cycles.since(before),
         };
         self.cycles.get_or_insert_default().insert(phase.name().into(), (&passed).into());
     }

@@ -14,9 +14,9 @@ use super::row::row;
 use super::{Plan, Row, Shard, SweepError, Task};
 use crate::chip::crossbar::kernel::Backend;
 use crate::lab::run::{self, Keeping, Machine, RunError};
+use crate::lab::store::ARITHMETIC;
 use crate::lab::store::folder::{self, FolderError, RunFolder};
 use crate::lab::store::index::Store;
-use crate::lab::store::{ARITHMETIC, hash};
 
 /// Pause before asking again for what another process holds.
 const PAUSE: Duration = Duration::from_millis(200);
@@ -228,7 +228,7 @@ impl<'a> Crew<'a> {
         };
         let data = &self.plan.data[task.data];
         // a finished run that cannot be read, as a power cut may leave it, is done again
-        if is_finished(&path, task, &data.hash)
+        if is_finished(&path, task)
             && let Ok((row, seconds)) = row(&path)
         {
             self.index(task, &row, seconds)?;
@@ -286,11 +286,8 @@ impl Trouble {
 }
 
 /// Whether a folder holds the finished run of this task.
-fn is_finished(path: &Path, task: &Task, data: &str) -> bool {
+fn is_finished(path: &Path, task: &Task) -> bool {
     folder::read_receipt(path).is_ok_and(|receipt| {
-        receipt.status == "finished"
-            && receipt.arithmetic == ARITHMETIC
-            && receipt.data_hash == data
-            && receipt.config_hash == hash::text(&task.config.to_toml())
+        receipt.status == "finished" && receipt.arithmetic == ARITHMETIC && receipt.run == task.key
     })
 }

@@ -8,8 +8,9 @@ use super::{Point, Sweep, SweepError};
 use crate::lab::config::{self, Config, Overlay, Sources};
 use crate::lab::data::{self, DataRoot, Loaded};
 use crate::lab::run::{Machine, RunError, Session};
-use crate::lab::store::address;
 use crate::lab::store::index::{PointRecord, SweepRecord};
+use crate::lab::store::record::DataRecord;
+use crate::lab::store::{address, given};
 
 /// Runs whose speed is measured for an estimate.
 const PROBES: usize = 8;
@@ -109,12 +110,11 @@ pub fn plan(sweep: Sweep, settings: &[String], root: &DataRoot) -> Result<Plan, 
                         sources.len() - 1
                     }
                 };
-                let work = check(&config, &plan.data[at])?;
-                Ok((config, at, work))
+                let (key, work) = check(&config, &plan.data[at])?;
+                Ok((config, at, key, work))
             });
         let key = match resolved {
-            Ok((config, data, work)) => {
-                let key = address::key(&config.to_toml(), &plan.data[data].hash);
+            Ok((config, data, key, work)) => {
                 if known.insert(key.clone(), ()).is_none() {
                     let task =
                         Task { key: key.clone(), config, data, point: plan.points.len(), work };
@@ -162,19 +162,20 @@ fn resolve(
     config::load(&Sources { experiment, overlays: &overlays, seed, ..Sources::default() })
 }
 
-/// Checks that a configuration fits data and chip, and says how much work it is.
-fn check(config: &Config, data: &Loaded) -> Result<f64, RunError> {
+/// Checks that a configuration fits data and chip; the address of its run, and how much work it is.
+fn check(config: &Config, data: &Loaded) -> Result<(String, f64), RunError> {
     let train = &data.split.train;
-    let image = data.image.map(|shape| [shape.height, shape.width, shape.channels]);
-    let experiment = config.experiment(train.features(), train.classes(), image)?;
+    let record = DataRecord::of(data);
+    let experiment = config.experiment(record.features, record.classes, record.image)?;
     experiment.check()?;
+    let key = address::key(given::given(&experiment, config.train_on, config.select), &record.hash);
     let cells = |layer: &crate::chip::layer::LayerSpec| {
         layer.wiring.pathways().len() as f64 * layer.inputs as f64 * layer.units as f64
     };
     // levels of more than a byte take about twice the time
     let planes = if config.hardware.cell.level_bits.get() > 8 { 2.0 } else { 1.0 };
     let samples = train.len() as f64 * f64::from(config.epochs);
-    Ok(experiment.layers.iter().map(cells).sum::<f64>() * planes * samples)
+    Ok((key, experiment.layers.iter().map(cells).sum::<f64>() * planes * samples))
 }
 
 impl Plan {

@@ -146,9 +146,9 @@ pub fn row(path: &Path) -> Result<(Row, f64), SweepError> {
     let row = Row {
         results: results.collect(),
         state_hash: last.state_hash.clone(),
-        data_hash: receipt.data_hash.clone(),
+        data_hash: receipt.data.hash.clone(),
         hardware: priced.made_on.clone(),
         not_simulated: not_simulated.collect(),
     };
-    Ok((row, receipt.train_seconds))
+    Ok((row, folder::read_timing(path).train_seconds()))
 }

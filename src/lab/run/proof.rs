@@ -1,0 +1,182 @@
+//! What a run folder says against what follows from it: the receipt that a session and its records make, and the first
+//! field in which two of them differ.
+
+use std::path::Path;
+
+use serde::Serialize;
+use serde_json::Value;
+
+use super::{RunError, Session};
+use crate::lab::store::folder::{self, FolderError, names};
+use crate::lab::store::record::{BestRecord, EpochRecord, Receipt};
+use crate::lab::store::{ARITHMETIC, hash};
+
+/// The receipt of a run whose states stay: `text` is its `config.toml`, `checkpoint` the hash of the state after the
+/// last record. It is neither finished nor tested.
+pub(super) fn receipt(
+    session: &Session,
+    text: &str,
+    records: &[EpochRecord],
+    checkpoint: String,
+    best: Option<BestRecord>,
+) -> Receipt {
+    Receipt {
+        arithmetic: ARITHMETIC,
+        status: "running".into(),
+        run: session.run().into(),
+        config: hash::bytes(text),
+        data: session.data().clone(),
+        tables: hash::tables(session.trainer().driver()),
+        metrics: hash::bytes(folder::metrics_text(records)),
+        ledger: None,
+        checkpoint,
+        best,
+        states: true,
+        epoch_hashes: records.iter().map(|record| record.state_hash.clone()).collect(),
+        test: None,
+        notes: session.notes().to_vec(),
+    }
+}
+
+/// Whether a run was made of this configuration and these data, with this arithmetic.
+pub(super) fn inputs(receipt: &Receipt, session: &Session, text: &str) -> Result<(), RunError> {
+    if receipt.arithmetic != ARITHMETIC {
+        return Err(RunError::Arithmetic { found: receipt.arithmetic, wanted: ARITHMETIC });
+    }
+    let data = session.data();
+    if receipt.data.hash != data.hash {
+        let (found, wanted) = (data.hash.clone(), receipt.data.hash.clone());
+        return Err(RunError::DataChanged { found, wanted });
+    }
+    for (what, wanted, found) in [
+        ("bytes of config.toml have", &receipt.config, &hash::bytes(text)),
+        ("address of the run is", &receipt.run, &session.run().to_owned()),
+        ("activation tables have", &receipt.tables, &hash::tables(session.trainer().driver())),
+    ] {
+        if wanted != found {
+            let (found, wanted) = (found.clone(), wanted.clone());
+            return Err(RunError::ConfigChanged { what, found, wanted });
+        }
+    }
+    if receipt.data != *data {
+        let found = format!("says that the data has {}, but it has {data}", receipt.data);
+        return Err(FolderError::Content { path: names::RECEIPT.into(), found }.into());
+    }
+    Ok(())
+}
+
+/// The records that a receipt speaks of, as they were when it was written.
+pub(super) fn records(path: &Path, receipt: &Receipt) -> Result<Vec<EpochRecord>, RunError> {
+    let damaged = |found| FolderError::Content { path: path.join(names::METRICS), found };
+    let text = folder::read_text(path, names::METRICS)?;
+    let epochs = receipt.epoch_hashes.len();
+    // a kill may have come between the records of later epochs and their receipt
+    let end = text.match_indices('\n').nth(epochs.wrapping_sub(1)).map(|(at, _)| at + 1);
+    let spoken_of = end.and_then(|end| text.get(..end));
+    let Some(text) = spoken_of.filter(|text| hash::bytes(text) == receipt.metrics) else {
+        let found = format!(
+            "does not hold the {epochs} records with the hash {} that {} speaks of",
+            receipt.metrics,
+            names::RECEIPT
+        );
+        return Err(damaged(found).into());
+    };
+    let records = folder::parse_metrics(text).map_err(damaged)?;
+    for (record, hash) in records.iter().zip(&receipt.epoch_hashes) {
+        if record.state_hash != *hash {
+            let found = format!(
+                "has another state hash for epoch {} than {}",
+                record.epoch,
+                names::RECEIPT
+            );
+            return Err(damaged(found).into());
+        }
+    }
+    Ok(records)
+}
+
+/// Whether a checkpoint is the one that a receipt speaks of: by its state, and where the receipt knows it by its bytes.
+pub(super) fn checkpoint(
+    path: &Path,
+    name: &str,
+    receipt: &Receipt,
+    epoch: u32,
+    (bytes, state): (&[u8], &str),
+) -> Result<(), RunError> {
+    let damaged = |found| FolderError::Content { path: path.join(name), found };
+    let wanted = receipt.epoch_hashes.get(epoch as usize);
+    if wanted.is_none_or(|wanted| wanted != state) {
+        let found = format!("holds a state of epoch {epoch} that {} does not know", names::RECEIPT);
+        return Err(damaged(found).into());
+    }
+    let best = receipt.best.as_ref().filter(|_| name != names::CHECKPOINT);
+    let known = match best {
+        Some(best) => Some(&best.checkpoint),
+        None => (epoch as usize + 1 == receipt.epoch_hashes.len()).then_some(&receipt.checkpoint),
+    };
+    if known.is_some_and(|known| *known != hash::bytes(bytes)) {
+        return Err(damaged(format!("has other bytes than {} says", names::RECEIPT)).into());
+    }
+    Ok(())
+}
+
+/// Whether a receipt says what follows from the folder.
+pub(super) fn same_receipt(
+    path: &Path,
+    kept: &Receipt,
+    expected: &Receipt,
+) -> Result<(), RunError> {
+    match difference(kept, expected) {
+        None => Ok(()),
+        Some(Difference { place, kept, found }) => {
+            let found = format!("says {kept} for `{place}`, but its own files give {found}");
+            Err(FolderError::Content { path: path.join(names::RECEIPT), found }.into())
+        }
+    }
+}
+
+/// Where two records differ first.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct Difference {
+    /// Which field, such as `events.training.requested`.
+    pub(super) place: String,
+    /// What is kept.
+    pub(super) kept: String,
+    /// What was found.
+    pub(super) found: String,
+}
+
+/// The first field in which two records of one kind differ. Fields that the kept one does not have, because the program
+/// that wrote it did not know them, are passed over.
+pub(super) fn difference<T: Serialize>(kept: &T, found: &T) -> Option<Difference> {
+    let value = |record: &T| serde_json::to_value(record).expect("records have a JSON form");
+    differs("", &value(kept), &value(found))
+}
+
+fn differs(place: &str, kept: &Value, found: &Value) -> Option<Difference> {
+    let inside =
+        |name: &str| if place.is_empty() { name.into() } else { format!("{place}.{name}") };
+    let absent = Value::String("nothing".into());
+    match (kept, found) {
+        (Value::Object(kept), Value::Object(found)) => {
+            let names = kept.keys().chain(found.keys().filter(|name| !kept.contains_key(*name)));
+            names
+                .filter_map(|name| {
+                    let of = |map: &serde_json::Map<String, Value>| {
+                        map.get(name).cloned().unwrap_or_else(|| absent.clone())
+                    };
+                    differs(&inside(name), &of(kept), &of(found))
+                })
+                .next()
+        }
+        (Value::Array(kept), Value::Array(found)) if kept.len() == found.len() => {
+            let pairs = kept.iter().zip(found).enumerate();
+            pairs.filter_map(|(at, (a, b))| differs(&inside(&at.to_string()), a, b)).next()
+        }
+        (kept, found) if kept == found => None,
+        (kept, found) => {
+            let (kept, found) = (kept.to_string(), found.to_string());
+            Some(Difference { place: place.into(), kept, found })
+        }
+    }
+}
