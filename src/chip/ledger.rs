@@ -12,20 +12,22 @@ pub use cycles::{Cycles, Part, Stage};
 /// Enums whose variants have a code that files and hashes use, and a name: said once, in one table. Codes are never
 /// reused.
 macro_rules! coded {
-    ($(#[$doc:meta])* $name:ident { $($(#[$of:meta])* $variant:ident = $code:literal, $word:literal;)* }) => {
+    ($(#[$doc:meta])* $name:ident {
+        $($(#[doc = $of:literal])* $(#[cfg($cfg:meta)])? $variant:ident = $code:literal, $word:literal;)*
+    }) => {
         $(#[$doc])*
         #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
         #[repr(usize)]
         pub enum $name {
-            $($(#[$of])* $variant = $code,)*
+            $($(#[doc = $of])* $(#[cfg($cfg)])? $variant = $code,)*
         }
 
         impl $name {
             /// How many there are.
-            pub const COUNT: usize = [$($code,)*].len();
+            pub const COUNT: usize = [$($(#[cfg($cfg)])? $code,)*].len();
 
             /// All of them, in the order of their codes.
-            pub const ALL: [Self; Self::COUNT] = [$(Self::$variant,)*];
+            pub const ALL: [Self; Self::COUNT] = [$($(#[cfg($cfg)])? Self::$variant,)*];
 
             /// Code in hashes and checkpoints.
             #[must_use]
@@ -43,7 +45,7 @@ macro_rules! coded {
             #[must_use]
             pub const fn name(self) -> &'static str {
                 match self {
-                    $(Self::$variant => $word,)*
+                    $($(#[cfg($cfg)])? Self::$variant => $word,)*
                 }
             }
         }
@@ -97,6 +99,9 @@ coded! {
         VerifyReads = 20, "verify_reads";
         /// A bit went into or came out of a digital memory beside the tiles.
         SramBits = 21, "sram_bits";
+        /// What a later program counts and no run of this one ever does.
+        #[cfg(feature = "grown")]
+        Grown = 22, "grown";
     }
 }
 
@@ -229,7 +234,7 @@ mod tests {
         assert!(Event::ALL.iter().enumerate().all(|(i, &e)| e.code() as usize == i));
         assert!(During::ALL.iter().enumerate().all(|(i, &d)| d.code() as usize == i));
         assert_eq!(Event::of_code(21), Some(Event::SramBits));
-        assert_eq!((Event::of_code(22), During::of_code(5)), (None, None));
+        assert_eq!((Event::of_code(99), During::of_code(5)), (None, None));
     }
 
     #[test]

@@ -102,8 +102,8 @@ fn a_damaged_run_is_refused_or_continued_never_trusted() {
         "",
         "{",
         "[]",
-        "{\"version\": 1}",
-        &running.replace("\"arithmetic\": 1", "\"arithmetic\": -1"),
+        "{\"arithmetic\": 2}",
+        &running.replace("\"arithmetic\": 2", "\"arithmetic\": -1"),
     ] {
         put("receipt.json", text.as_bytes());
         refused(&verify(), &["receipt.json"]);
@@ -112,17 +112,23 @@ fn a_damaged_run_is_refused_or_continued_never_trusted() {
     let price = || run(dalean().arg("price").arg(&folder));
     assert_eq!(price().code, Some(0));
     let count = "{\"phase\": \"training\", \"layer\": 0, \"pathway\": \"pp\", \"operation\": \"update\", \"event\": \"holds\", \"count\": -1}";
-    for text in ["", "[]", "{}", &format!("{{\"counts\": [{count}]}}"), &count.replace("-1", "1")] {
+    for text in [
+        "",
+        "[]",
+        "{}",
+        &format!("{{\"counts\": [{count}], \"cycles\": null}}"),
+        &count.replace("-1", "1"),
+    ] {
         put("ledger.json", text.as_bytes());
         refused(&price(), &["ledger.json"]);
     }
     let most = count.replace("-1", &u64::MAX.to_string());
-    put("ledger.json", format!("{{\"counts\": [{most}, {most}]}}").as_bytes());
+    put("ledger.json", format!("{{\"counts\": [{most}, {most}], \"cycles\": null}}").as_bytes());
     assert_eq!(price().code, Some(0), "any counts have a price");
     put("receipt.json", &receipt);
     let text = String::from_utf8(config).unwrap();
     put("config.toml", text.replace("batch = 16", "batch = 8").as_bytes());
-    refused(&verify(), &["config.toml has the hash"]);
+    refused(&verify(), &["bytes of config.toml have"]);
     refused(&run(dalean().arg("verify").arg(out.path().join("nothing"))), &["folder of a run"]);
 }
 

@@ -9,6 +9,8 @@ mod anchors;
 mod bad_input;
 mod bench;
 mod browser;
+mod damage;
+mod golden_run;
 mod hardware;
 mod laws;
 mod oracle;

@@ -128,6 +128,8 @@ fn record(layers: &[(usize, usize, &[&str])], epoch: u32) -> EpochRecord {
         pathways,
         events: [("evaluation".into(), counts(1)), ("training".into(), counts(4))].into(),
         cycles: Some([("training".to_owned(), 9000 * e)].into()),
+        #[cfg(feature = "grown")]
+        grown: 0,
     }
 }
 

@@ -67,21 +67,9 @@ pub(super) fn inputs(receipt: &Receipt, session: &Session, text: &str) -> Result
 
 /// The records that a receipt speaks of, as they were when it was written.
 pub(super) fn records(path: &Path, receipt: &Receipt) -> Result<Vec<EpochRecord>, RunError> {
+    let text = records_text(path, receipt)?;
     let damaged = |found| FolderError::Content { path: path.join(names::METRICS), found };
-    let text = folder::read_text(path, names::METRICS)?;
-    let epochs = receipt.epoch_hashes.len();
-    // a kill may have come between the records of later epochs and their receipt
-    let end = text.match_indices('\n').nth(epochs.wrapping_sub(1)).map(|(at, _)| at + 1);
-    let spoken_of = end.and_then(|end| text.get(..end));
-    let Some(text) = spoken_of.filter(|text| hash::bytes(text) == receipt.metrics) else {
-        let found = format!(
-            "does not hold the {epochs} records with the hash {} that {} speaks of",
-            receipt.metrics,
-            names::RECEIPT
-        );
-        return Err(damaged(found).into());
-    };
-    let records = folder::parse_metrics(text).map_err(damaged)?;
+    let records = folder::parse_metrics(&text).map_err(damaged)?;
     for (record, hash) in records.iter().zip(&receipt.epoch_hashes) {
         if record.state_hash != *hash {
             let found = format!(
@@ -93,6 +81,27 @@ pub(super) fn records(path: &Path, receipt: &Receipt) -> Result<Vec<EpochRecord>
         }
     }
     Ok(records)
+}
+
+/// The text of these records.
+pub(super) fn records_text(path: &Path, receipt: &Receipt) -> Result<String, RunError> {
+    let damaged = |found| FolderError::Content { path: path.join(names::METRICS), found };
+    let text = folder::read_text(path, names::METRICS)?;
+    let epochs = receipt.epoch_hashes.len();
+    // a kill may have come between the records of later epochs and their receipt
+    let end = text.match_indices('\n').nth(epochs.wrapping_sub(1)).map(|(at, _)| at + 1);
+    let spoken_of = end.and_then(|end| text.get(..end));
+    match spoken_of.filter(|text| hash::bytes(text) == receipt.metrics) {
+        Some(text) => Ok(text.to_owned()),
+        None => {
+            let found = format!(
+                "does not hold the {epochs} records with the hash {} that {} speaks of",
+                receipt.metrics,
+                names::RECEIPT
+            );
+            Err(damaged(found).into())
+        }
+    }
 }
 
 /// Whether a checkpoint is the one that a receipt speaks of: by its state, and where the receipt knows it by its bytes.
@@ -126,7 +135,8 @@ pub(super) fn same_receipt(
     kept: &Receipt,
     expected: &Receipt,
 ) -> Result<(), RunError> {
-    match difference(kept, expected) {
+    let kept = serde_json::to_value(kept).expect("receipts have a JSON form");
+    match difference(&kept, expected) {
         None => Ok(()),
         Some(Difference { place, kept, found }) => {
             let found = format!("says {kept} for `{place}`, but its own files give {found}");
@@ -146,26 +156,22 @@ pub(super) struct Difference {
     pub(super) found: String,
 }
 
-/// The first field in which two records of one kind differ. Fields that the kept one does not have, because the program
-/// that wrote it did not know them, are passed over.
-pub(super) fn difference<T: Serialize>(kept: &T, found: &T) -> Option<Difference> {
-    let value = |record: &T| serde_json::to_value(record).expect("records have a JSON form");
-    differs("", &value(kept), &value(found))
+/// The first field of a kept record in which another of its kind differs. What the kept one does not have, because the
+/// program that wrote it did not know it, says nothing: a record that lacks what it must have cannot be read.
+pub(super) fn difference<T: Serialize>(kept: &Value, found: &T) -> Option<Difference> {
+    differs("", kept, &serde_json::to_value(found).expect("records have a JSON form"))
 }
 
 fn differs(place: &str, kept: &Value, found: &Value) -> Option<Difference> {
     let inside =
         |name: &str| if place.is_empty() { name.into() } else { format!("{place}.{name}") };
-    let absent = Value::String("nothing".into());
+    let nothing = Value::String("nothing".into());
     match (kept, found) {
         (Value::Object(kept), Value::Object(found)) => {
-            let names = kept.keys().chain(found.keys().filter(|name| !kept.contains_key(*name)));
-            names
-                .filter_map(|name| {
-                    let of = |map: &serde_json::Map<String, Value>| {
-                        map.get(name).cloned().unwrap_or_else(|| absent.clone())
-                    };
-                    differs(&inside(name), &of(kept), &of(found))
+            let pairs = kept.iter().map(|(name, kept)| (name, kept, found.get(name)));
+            pairs
+                .filter_map(|(name, kept, found)| {
+                    differs(&inside(name), kept, found.unwrap_or(&nothing))
                 })
                 .next()
         }
@@ -178,5 +184,26 @@ fn differs(place: &str, kept: &Value, found: &Value) -> Option<Difference> {
             let (kept, found) = (kept.to_string(), found.to_string());
             Some(Difference { place: place.into(), kept, found })
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::json;
+
+    use super::*;
+
+    #[test]
+    fn a_difference_is_found_at_its_place_and_what_is_unknown_says_nothing() {
+        let kept = json!({"a": 1, "b": {"c": [1, null]}});
+        assert_eq!(difference(&kept, &json!({"a": 1, "b": {"c": [1, null], "new": 3}})), None);
+        let place = |found: &Value| difference(&kept, found).map(|d| (d.place, d.kept, d.found));
+        let wanted = |place: &str, kept: &str, found: &str| {
+            Some((place.to_owned(), kept.to_owned(), found.to_owned()))
+        };
+        assert_eq!(place(&json!({"a": 2, "b": {"c": [1, null]}})), wanted("a", "1", "2"));
+        assert_eq!(place(&json!({"a": 1, "b": {"c": [1, 0]}})), wanted("b.c.1", "null", "0"));
+        assert_eq!(place(&json!({"b": {"c": [1, null]}})), wanted("a", "1", "\"nothing\""));
+        assert_eq!(place(&json!({"a": 1, "b": {"c": [1]}})), wanted("b.c", "[1,null]", "[1]"));
     }
 }

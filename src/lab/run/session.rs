@@ -365,6 +365,8 @@ impl Session {
             pathways,
             events: events.into_iter().collect(),
             cycles: cycles.into_iter().collect(),
+            #[cfg(feature = "grown")]
+            grown: 7,
         }
     }
 }

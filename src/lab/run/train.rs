@@ -186,15 +186,19 @@ pub fn evaluate(
     let receipt = folder::read_receipt(path)?;
     proof::inputs(&receipt, &session, &text)?;
     let records = proof::records(path, &receipt)?;
-    let best = chosen(config.select, &records);
-    let name = best.map(RunFolder::best_name).filter(|name| path.join(name).exists());
-    let name = name.as_deref().unwrap_or(names::CHECKPOINT);
+    let best = chosen(config.select, &records).filter(|_| config.select == Select::BestValidation);
+    if best != receipt.best.as_ref().map(|best| best.epoch) {
+        let found = "names another best state than its records do".into();
+        return Err(FolderError::Content { path: path.join(names::RECEIPT), found }.into());
+    }
+    let name = best.map_or_else(|| names::CHECKPOINT.to_owned(), RunFolder::best_name);
+    let name = &*name;
     let bytes = restore(&mut session, path, name)?;
     let state = session.state_hash();
     let epoch = session.trainer().epoch();
     proof::checkpoint(path, name, &receipt, epoch, (&bytes, &state))?;
     let test = session.test();
-    if receipt.test.as_ref().is_some_and(|kept| kept.epoch == epoch && *kept != test) {
+    if receipt.test.as_ref().is_some_and(|kept| *kept != test) {
         let found = "has another test result than its own state gives".into();
         return Err(FolderError::Content { path: path.join(names::RECEIPT), found }.into());
     }

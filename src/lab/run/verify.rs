@@ -2,6 +2,9 @@
 
 use std::path::Path;
 
+use serde::Serialize;
+use serde_json::Value;
+
 use super::proof::{self, Difference};
 use super::session::chosen;
 use super::train::read_config;
@@ -77,7 +80,7 @@ fn differ(what: impl Into<String>, wanted: &str, found: &str) -> Halt {
     Halt::Different { what: what.into(), wanted: wanted.into(), found: found.into() }
 }
 
-fn same<T: serde::Serialize>(what: &str, kept: &T, found: &T) -> Result<(), Halt> {
+fn same<T: Serialize>(what: &str, kept: &Value, found: &T) -> Result<(), Halt> {
     match proof::difference(kept, found) {
         None => Ok(()),
         Some(Difference { place, kept, found }) => {
@@ -98,6 +101,11 @@ fn compare(
     let mut session = Session::new(&config, data::load(&config.source()?, data_root)?, machine)?;
     proof::inputs(&receipt, &session, &text)?;
     let kept = proof::records(path, &receipt)?;
+    // as they were written: a record of an earlier program has fewer fields
+    let lines = proof::records_text(path, &receipt)?;
+    let lines: Vec<Value> =
+        lines.lines().filter_map(|line| serde_json::from_str(line).ok()).collect();
+    let written: Value = parsed(path, names::RECEIPT)?;
     let files = Files::read(path, &receipt)?;
     let last = epochs.map_or(kept.len(), |epochs| kept.len().min(epochs as usize + 1));
     let whole = last == kept.len();
@@ -110,7 +118,7 @@ fn compare(
     let mut records: Vec<EpochRecord> = Vec::new();
     let mut seen = false;
     let mut best: Option<(BestRecord, Option<TestRecord>)> = None;
-    for kept in &kept[..last] {
+    for (kept, line) in kept[..last].iter().zip(&lines) {
         let epoch = kept.epoch;
         let record = if epoch == 0 {
             session.start()
@@ -129,7 +137,7 @@ fn compare(
             let what = format!("state after epoch {epoch}{place}");
             return Err(differ(what, &kept.state_hash, &record.state_hash));
         }
-        same(&format!("record of epoch {epoch} in {}", names::METRICS), kept, &record)?;
+        same(&format!("record of epoch {epoch} in {}", names::METRICS), line, &record)?;
         records.push(record);
         let kept = files.checkpoint.as_ref().filter(|_| !finished);
         seen |= kept.is_some_and(|kept| *kept == session.checkpoint());
@@ -165,7 +173,7 @@ fn compare(
         if let Some(kept) = &files.ledger {
             same(names::LEDGER, kept, &ledger)?;
         }
-        expected.ledger = Some(hash::bytes(ledger.to_json()));
+        expected.ledger.clone_from(&receipt.ledger);
         expected.status.clone_from(&receipt.status);
         let untested = test.is_none() && !session.test_examples().is_empty();
         if untested {
@@ -173,15 +181,27 @@ fn compare(
         }
         expected.test = test;
     }
+    // compared number by number; their bytes are those that the receipt names
+    expected.metrics.clone_from(&receipt.metrics);
     expected.states = receipt.states;
-    same(names::RECEIPT, &receipt, &expected)?;
+    same(names::RECEIPT, &written, &expected)?;
     Ok(Verdict::Same { epochs: last, state_hash, test: expected.test.is_some(), unchecked })
+}
+
+/// A JSON file as it was written.
+fn parsed(path: &Path, name: &str) -> Result<Value, Halt> {
+    let text = folder::read_text(path, name)?;
+    let damaged = |found: serde_json::Error| FolderError::Content {
+        path: path.join(name),
+        found: found.to_string(),
+    };
+    Ok(serde_json::from_str(&text).map_err(damaged)?)
 }
 
 /// The files of a folder beside its records, each as its receipt says.
 struct Files<'a> {
     path: &'a Path,
-    ledger: Option<LedgerRecord>,
+    ledger: Option<Value>,
     checkpoint: Option<Vec<u8>>,
     best: Option<Vec<u8>>,
 }
@@ -205,9 +225,13 @@ impl<'a> Files<'a> {
                 }
                 let damaged =
                     |found| FolderError::Content { path: path.join(names::LEDGER), found };
-                Some(LedgerRecord::parse(&text).map_err(damaged)?)
+                LedgerRecord::parse(&text).map_err(damaged)?;
+                Some(parsed(path, names::LEDGER)?)
             }
         };
+        if finished && !receipt.states && path.join(names::CHECKPOINT).exists() {
+            return Err(differ("states in the receipt", "false", "they are in the folder"));
+        }
         // a run that is going on has its states, whatever it will keep of them
         let (mut checkpoint, mut best) = (None, None);
         if receipt.states || !finished {

@@ -1,6 +1,7 @@
 //! The state of a run as safetensors, written whole and read with suspicion.
 //!
-//! One tensor a piece of state, by its name (`layer0.pp.levels`, `epoch`, `ledger.training`, ...), and metadata:
+//! One tensor a piece of state, by its name (`layer0.pp.levels`, `epoch`, `ledger.training`, ...), and one entry of
+//! metadata, `dalean`, that holds as JSON:
 //!
 //! ```text
 //! arithmetic   version        run, data   address of the run, hash of its data
@@ -14,7 +15,6 @@ use std::borrow::Cow;
 use std::collections::BTreeMap;
 
 use bitvec::prelude::*;
-use safetensors::tensor::Metadata;
 use safetensors::{Dtype, SafeTensors, View};
 
 use super::{ARITHMETIC, hash};
@@ -133,7 +133,9 @@ impl Visitor for Writer {
     }
 }
 
-/// Names of the metadata, `content` aside.
+/// The entry of the metadata that says what the checkpoint is.
+const ABOUT: &str = "dalean";
+/// Names in it, `content` aside.
 const ENTRIES: [&str; 4] = ["arithmetic", "run", "data", "state_hash"];
 
 /// Hash of everything a checkpoint says.
@@ -166,22 +168,28 @@ pub fn write(state: &mut dyn State, identity: Identity<'_>) -> Vec<u8> {
     let views = tensors.iter().map(|(name, t)| (&**name, t.dtype, &*t.shape, &*t.bytes));
     let content = content(views, &entries);
     let named = ENTRIES.map(str::to_owned).into_iter().zip(entries);
-    // the library takes a hash map and writes its names in order
-    let metadata = named.chain([("content".to_owned(), content)]).collect();
+    let about: BTreeMap<_, _> = named.chain([("content".to_owned(), content)]).collect();
+    let about = serde_json::to_string(&about).expect("words have a JSON form");
+    // the library takes a hash map and writes its entries in any order: so there is one
+    let metadata = [(ABOUT.to_owned(), about)].into();
     safetensors::serialize(&tensors, Some(metadata)).expect("names are unique and sizes small")
 }
 
 /// A checkpoint whose content is what it says.
 struct Checked<'a> {
     file: SafeTensors<'a>,
-    header: Metadata,
+    about: BTreeMap<String, String>,
 }
 
 impl<'a> Checked<'a> {
     fn new(bytes: &'a [u8], identity: Identity<'_>) -> Result<Self, CheckpointError> {
         let (_, header) = SafeTensors::read_metadata(bytes)?;
         let file = SafeTensors::deserialize(bytes)?;
-        let checked = Self { file, header };
+        let about = header.metadata().as_ref().and_then(|entries| entries.get(ABOUT));
+        let about = about.ok_or_else(|| damaged(ABOUT, "is missing from the metadata"))?;
+        let about = serde_json::from_str(about);
+        let about = about.map_err(|error| damaged(ABOUT, &format!("is no JSON: {error}")))?;
+        let checked = Self { file, about };
         checked.same("arithmetic", &ARITHMETIC.to_string())?;
         checked.same("run", identity.run)?;
         checked.same("data", identity.data)?;
@@ -197,7 +205,7 @@ impl<'a> Checked<'a> {
 
     /// An entry of the metadata.
     fn entry(&self, what: &'static str) -> Result<String, CheckpointError> {
-        let found = self.header.metadata().as_ref().and_then(|map| map.get(what)).cloned();
+        let found = self.about.get(what).cloned();
         Ok(found.ok_or_else(|| damaged(what, "is missing from the metadata"))?)
     }
 

@@ -13,8 +13,8 @@ use crate::chip::ledger::{Cycles, During, Event, Ledger, Part, Stage};
 pub struct LedgerRecord {
     /// What happened, in the order of the ledger; counts of 0 are left out.
     pub counts: Vec<CountRecord>,
-    /// How long it took, by phase; absent when the hardware model has no timing.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    /// How long it took, by phase; `null` when the hardware model has no timing.
+    #[serde(deserialize_with = "Option::deserialize")]
     pub cycles: Option<BTreeMap<String, CyclesRecord>>,
 }
 

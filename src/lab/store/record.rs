@@ -1,5 +1,8 @@
 //! What a run writes down: one record an epoch, and a receipt at the end. Plain numbers; `null` where there is
 //! nothing to count. Counts are integers; wall-clock seconds stand in a record of their own.
+//!
+//! A field that is added has `#[serde(default)]`, so that runs of earlier programs are read; every other field has to be
+//! there, also where it is `null`.
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -86,8 +89,10 @@ pub struct EpochRecord {
     /// Updates done.
     pub updates: u64,
     /// Answers given while learning; `null` before the first epoch.
+    #[serde(deserialize_with = "Option::deserialize")]
     pub train: Option<Score>,
     /// Validation score.
+    #[serde(deserialize_with = "Option::deserialize")]
     pub validation: Option<Score>,
     /// BLAKE3 of state and counters.
     pub state_hash: String,
@@ -97,9 +102,13 @@ pub struct EpochRecord {
     pub pathways: Vec<PathwayRecord>,
     /// Ledger totals so far by phase (`training`, `calibration`, `evaluation`) and event.
     pub events: BTreeMap<String, BTreeMap<String, u64>>,
-    /// Cycles so far by phase; absent when the hardware model has no timing.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    /// Cycles so far by phase; `null` when the hardware model has no timing.
+    #[serde(deserialize_with = "Option::deserialize")]
     pub cycles: Option<BTreeMap<String, u64>>,
+    /// What a later program counts.
+    #[cfg(feature = "grown")]
+    #[serde(default)]
+    pub grown: u64,
 }
 
 /// The final reading of the test set, once.
@@ -149,6 +158,7 @@ pub struct DataRecord {
     /// Classes.
     pub classes: usize,
     /// Height, width and channels, where examples are pictures.
+    #[serde(deserialize_with = "Option::deserialize")]
     pub image: Option<[usize; 3]>,
 }
 
@@ -250,16 +260,19 @@ pub struct Receipt {
     /// BLAKE3 of the bytes of `metrics.jsonl` up to the last epoch below.
     pub metrics: String,
     /// BLAKE3 of the bytes of `ledger.json`, when finished.
+    #[serde(deserialize_with = "Option::deserialize")]
     pub ledger: Option<String>,
     /// BLAKE3 of the bytes of the checkpoint after the last epoch below.
     pub checkpoint: String,
     /// The state with the best validation score, where that is chosen.
+    #[serde(deserialize_with = "Option::deserialize")]
     pub best: Option<BestRecord>,
     /// Whether checkpoints stay when the run is finished.
     pub states: bool,
     /// State hash after each epoch, epoch 0 first.
     pub epoch_hashes: Vec<String>,
     /// The final test, when finished.
+    #[serde(deserialize_with = "Option::deserialize")]
     pub test: Option<TestRecord>,
     /// What the run showed.
     pub notes: Vec<Note>,

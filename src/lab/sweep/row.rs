@@ -65,14 +65,14 @@ fn share(score: Option<Score>) -> Option<Number> {
 }
 
 macro_rules! results {
-    ($($name:literal, $label:literal, $unit:ident, $whole:literal, $of:expr;)*) => {
-        [$(ResultColumn { name: $name, label: $label, unit: Unit::$unit, whole: $whole, of: $of },)*]
+    ($($(#[cfg($cfg:meta)])? $name:literal, $label:literal, $unit:ident, $whole:literal, $of:expr;)*) => {
+        &[$($(#[cfg($cfg)])? ResultColumn { name: $name, label: $label, unit: Unit::$unit, whole: $whole, of: $of },)*]
     };
 }
 
 /// All results, in the order of the table.
 #[rustfmt::skip]
-pub const RESULTS: [ResultColumn; 20] = results![
+pub const RESULTS: &[ResultColumn] = results![
     "test_accuracy", "test accuracy", Fraction, false, |f| share(f.receipt.test.as_ref().map(|test| test.score));
     "validation_accuracy", "validation accuracy", Fraction, false, |f| share(f.read.validation);
     "train_accuracy", "accuracy while learning", Fraction, false, |f| share(f.last.train);
@@ -94,6 +94,7 @@ pub const RESULTS: [ResultColumn; 20] = results![
     "joules_high", "energy on the chip, high", Joules, false, |f| f.joules(2);
     "joules_assumed", "share of energy that leans on assumed constants", Fraction, false,
         |f| f.cost.joules.and_then(|_| Number::from_f64(f.cost.assumed_share));
+    #[cfg(feature = "grown")] "grown", "what a later program shows", Count, true, |f| Some(f.last.grown.into());
 ];
 
 /// One finished run. Nothing in it depends on the machine or the time.
@@ -113,6 +114,25 @@ pub struct Row {
 }
 
 impl Row {
+    /// The first thing that one run cannot have in two ways: state, data, or a whole number that both rows have. Prices
+    /// follow from constants, which are not part of a run, and a column that one program does not know says nothing.
+    #[must_use]
+    pub fn disagreement(&self, other: &Self) -> Option<String> {
+        let hashes = [
+            ("state_hash", &self.state_hash, &other.state_hash),
+            ("data_hash", &self.data_hash, &other.data_hash),
+        ];
+        if let Some((name, ..)) = hashes.into_iter().find(|(_, a, b)| a != b) {
+            return Some(name.into());
+        }
+        let whole = RESULTS.iter().filter(|column| column.whole).map(|column| column.name);
+        let differs = |name: &&str| {
+            let both = self.results.get(*name).zip(other.results.get(*name));
+            both.is_some_and(|(mine, theirs)| mine != theirs)
+        };
+        whole.into_iter().find(differs).map(str::to_owned)
+    }
+
     /// As an index keeps it.
     pub(super) fn to_json(&self) -> String {
         serde_json::to_string(self).expect("rows have a JSON form")
