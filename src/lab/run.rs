@@ -12,8 +12,9 @@ mod train;
 mod verify;
 
 pub use profile::{Act, Profile, profile};
+pub use proof::records;
 pub use report::{ReportMade, report};
-pub use repriced::{Repriced, reprice};
+pub use repriced::{Prices, Repriced, reprice, reprice_as};
 pub use session::{Machine, Session};
 pub use train::{Event, Keeping, Outcome, address_of, carry_on, evaluate, resume, train};
 pub use verify::{Verdict, verify};

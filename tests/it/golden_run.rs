@@ -113,6 +113,13 @@ fn a_corrected_source_finds_the_run_again() {
     assert_eq!(before.len(), 2);
     sweep("another paper, table 2", "2.0");
     assert_eq!(addresses(), before, "nothing was done again");
+    let joules = || -> Vec<f64> {
+        let ran = run(dalean().arg("export").arg(&store).args(["--format", "json"]));
+        let rows: serde_json::Value = serde_json::from_str(&ran.stdout).unwrap();
+        rows.as_array().unwrap().iter().map(|row| row["joules"].as_f64().unwrap()).collect()
+    };
+    let cheap = joules();
     sweep("another paper, table 2", "3.0");
     assert_eq!(addresses(), before, "nothing was done again");
+    assert!(joules().iter().zip(cheap).all(|(now, then)| *now > then), "but it is priced anew");
 }

@@ -66,7 +66,10 @@ pub(super) fn inputs(receipt: &Receipt, session: &Session, text: &str) -> Result
 }
 
 /// The records that a receipt speaks of, as they were when it was written.
-pub(super) fn records(path: &Path, receipt: &Receipt) -> Result<Vec<EpochRecord>, RunError> {
+///
+/// # Errors
+/// When they are missing, damaged or not those.
+pub fn records(path: &Path, receipt: &Receipt) -> Result<Vec<EpochRecord>, RunError> {
     let text = records_text(path, receipt)?;
     let damaged = |found| FolderError::Content { path: path.join(names::METRICS), found };
     let records = folder::parse_metrics(&text).map_err(damaged)?;

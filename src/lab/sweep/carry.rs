@@ -10,10 +10,10 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Mutex, MutexGuard};
 use std::time::Duration;
 
-use super::row::row;
+use super::row::{row, row_as};
 use super::{Plan, Row, Shard, SweepError, Task};
 use crate::chip::crossbar::kernel::Backend;
-use crate::lab::run::{self, Keeping, Machine, RunError};
+use crate::lab::run::{self, Keeping, Machine, Prices, RunError};
 use crate::lab::store::ARITHMETIC;
 use crate::lab::store::folder::{self, FolderError, RunFolder};
 use crate::lab::store::index::Store;
@@ -154,9 +154,25 @@ pub fn carry_out(
     if let Some(error) = lock(&crew.broken).take() {
         return Err(error);
     }
+    price_points(plan, &mut lock(&crew.store))?;
     let of = |count: &AtomicUsize| count.load(Ordering::SeqCst);
     let (finished, failed) = (of(&crew.finished), of(&crew.failed));
     Ok(Carried { runs: tasks.len(), finished, failed })
+}
+
+/// Gives points whose run was priced with other constants than theirs rows of their own.
+fn price_points(plan: &Plan, store: &mut Store) -> Result<(), SweepError> {
+    let mut own = Vec::new();
+    for planned in &plan.points {
+        let (Ok(key), Some(prices)) = (&planned.key, &planned.prices) else { continue };
+        let Some(kept) = store.row(key)? else { continue };
+        let kept: Option<Row> = serde_json::from_str(&kept).ok();
+        if kept.is_none_or(|kept| kept.priced_with != prices.fingerprint()) {
+            let (row, _) = row_as(&store.folder(key), Some(Prices::clone(prices)))?;
+            own.push((planned.point.number, row.to_json()));
+        }
+    }
+    Ok(store.price(&plan.sweep.name, &own)?)
 }
 
 /// A run that panicked left nothing half done behind these locks.

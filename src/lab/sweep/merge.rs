@@ -64,7 +64,7 @@ pub fn merge(
         if let Some(here) = into.row(key)? {
             let here: Row = serde_json::from_str(&here)
                 .map_err(|error| RunError::from(damaged(&format!("has a row that {error}"))))?;
-            if here.disagreement(&row).is_some() {
+            if here.disagreement(&row, false).is_some() {
                 return Err(SweepError::Contradiction {
                     key: key.clone(),
                     store: into.path().into(),

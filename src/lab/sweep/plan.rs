@@ -1,13 +1,15 @@
 //! From points to runs: every point resolved and checked before the first one runs.
 #![expect(clippy::disallowed_types, reason = "an estimate of time asks the clock")]
 
+use std::collections::BTreeMap;
 use std::str::FromStr;
+use std::sync::Arc;
 use std::time::Instant;
 
 use super::{Point, Sweep, SweepError};
 use crate::lab::config::{self, Config, Overlay, Sources};
 use crate::lab::data::{self, DataRoot, Loaded};
-use crate::lab::run::{Machine, RunError, Session};
+use crate::lab::run::{Machine, Prices, RunError, Session};
 use crate::lab::store::index::{PointRecord, SweepRecord};
 use crate::lab::store::record::DataRecord;
 use crate::lab::store::{address, given};
@@ -46,12 +48,14 @@ impl Shard {
 }
 
 /// A point and the run it needs.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone)]
 pub struct Planned {
     /// The point.
     pub point: Point,
     /// Key of its run, or why there can be none.
     pub key: Result<String, String>,
+    /// What its run is priced with: constants are no part of a run, so points that share one may differ in them.
+    pub prices: Option<Arc<Prices>>,
 }
 
 /// One run; several points may need it.
@@ -93,7 +97,8 @@ pub fn plan(sweep: Sweep, settings: &[String], root: &DataRoot) -> Result<Plan, 
     let mut plan = Plan { points: vec![], before, tasks: vec![], data: vec![], sweep };
     let mut sources: Vec<String> = Vec::new();
     let mut first_error = None;
-    let mut known = std::collections::BTreeMap::new();
+    let mut known = BTreeMap::new();
+    let mut chips: BTreeMap<String, Arc<Prices>> = BTreeMap::new();
     let settings_tables =
         settings.iter().map(|text| config::setting_table(text)).collect::<Result<Vec<_>, _>>()?;
     for point in points {
@@ -113,8 +118,12 @@ pub fn plan(sweep: Sweep, settings: &[String], root: &DataRoot) -> Result<Plan, 
                 let (key, work) = check(&config, &plan.data[at])?;
                 Ok((config, at, key, work))
             });
+        let mut prices = None;
         let key = match resolved {
             Ok((config, data, key, work)) => {
+                let own = Prices::of(&config);
+                let shared = chips.entry(own.fingerprint()).or_insert_with(|| Arc::new(own));
+                prices = Some(Arc::clone(shared));
                 if known.insert(key.clone(), ()).is_none() {
                     let task =
                         Task { key: key.clone(), config, data, point: plan.points.len(), work };
@@ -129,7 +138,7 @@ pub fn plan(sweep: Sweep, settings: &[String], root: &DataRoot) -> Result<Plan, 
                 Err(text)
             }
         };
-        plan.points.push(Planned { point, key });
+        plan.points.push(Planned { point, key, prices });
     }
     if let (Some(error), true) = (first_error, plan.tasks.is_empty()) {
         return Err(error);

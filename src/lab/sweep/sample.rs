@@ -53,7 +53,7 @@ pub fn sample(
             Verdict::Different { what, wanted: key.clone(), found: address }
         } else if let Some(place) = kept
             .as_ref()
-            .map_or_else(|| Some("which cannot be read".into()), |kept| kept.disagreement(&found))
+            .map_or(Some("which cannot be read"), |kept| kept.disagreement(&found, true))
         {
             let what = format!("the row of run {key} in the index, {place},");
             Verdict::Different { what, wanted: text.clone(), found: found.to_json() }
