@@ -10,6 +10,7 @@ mod bad_input;
 mod bench;
 mod browser;
 mod damage;
+mod examples;
 mod golden_run;
 mod hardware;
 mod laws;
