@@ -96,23 +96,29 @@ impl Chart {
 
     fn axes(&mut self) {
         let (left, right, base) = (self.left, self.width - self.right, self.base());
+        // cells show by themselves where they end
+        let cells = self.y.scale.curve == Curve::Cells;
         for (tick, text) in self.y.ticks.clone() {
             let y = self.y(tick);
-            if self.y.scale.curve != Curve::Cells {
+            if !cells {
                 self.segment("grid", left, y, right, y);
             }
             self.text("tick end", left - 7.0, y + 4.0, &text);
         }
         for (tick, text) in self.x.ticks.clone() {
             let x = self.x(tick);
-            self.segment("axis", x, base, x, base + 4.0);
+            if !cells {
+                self.segment("axis", x, base, x, base + 4.0);
+            }
             if self.turned {
                 self.leaning("tick end", (x + 4.0, base + 13.0), -45, &text);
             } else {
                 self.text("tick middle", x, base + 17.0, &text);
             }
         }
-        self.segment("axis", left, base, right, base);
+        if !cells {
+            self.segment("axis", left, base, right, base);
+        }
         let (x_label, y_label) = (self.x.label.clone(), self.y.label.clone());
         self.text("label middle", (left + right) / 2.0, self.height - 6.0, &x_label);
         self.leaning("label middle", (12.0, (self.top + base) / 2.0), -90, &y_label);

@@ -4,10 +4,10 @@ performance.mark("library read");
 const sweep = JSON.parse(document.getElementById("sweep").textContent);
 const rowCount = sweep.setting.length;
 const gap = "\u202f";
-const digits = new Intl.NumberFormat("en", { maximumSignificantDigits: 6, useGrouping: "min2" });
+const [six, four] = [6, 4].map((digits) => new Intl.NumberFormat("en", { maximumSignificantDigits: digits, useGrouping: "min2" }));
 
 /** Six significant digits at most, in groups of three. */
-const plain = (value) => digits.format(value).replaceAll(",", gap).replace("-", "−");
+const plain = (value, digits = six) => digits.format(value).replaceAll(",", gap).replace("-", "−");
 const short = (text, most) => (text.length > most ? text.slice(0, most - 1) + "…" : text);
 const listed = (list) => (list.length < 2 ? list.join("") : `${list.slice(0, -1).join(", ")} and ${list.at(-1)}`);
 /** Words that Plotly would read as markup. */
@@ -35,7 +35,7 @@ class Column {
   print(value) {
     if (value === null) return "–";
     if (this.unit === "fraction") return `${(100 * value).toFixed(2).replace("-", "−")}${gap}%`;
-    return this.unit === "seconds" || this.unit === "joules" ? `${plain(value * this.by)}${gap}${this.sign}` : plain(value);
+    return this.unit === "seconds" || this.unit === "joules" ? `${plain(value * this.by, four)}${gap}${this.sign}` : plain(value);
   }
   /** What the runs of a setting say: how many, their mean, half its interval. */
   of(setting) {

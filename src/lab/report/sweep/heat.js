@@ -11,6 +11,7 @@ function heat(look, width) {
   const [low, high] = extent(points.map((point) => point.mean * value.by));
   const most = Math.max(Math.abs(low), Math.abs(high));
   const decimals = most >= 100 ? 0 : most >= 10 ? 1 : 2;
+  const words = (point) => (point.mean * value.by).toFixed(decimals).replace("-", "−");
   const grid = (empty, of) => {
     const rows = y.texts.map(() => x.texts.map(() => empty));
     for (const point of points) rows[point.at[1]][point.at[0]] = of(point);
@@ -21,11 +22,17 @@ function heat(look, width) {
   const cellHeight = Math.max(13, Math.min(44, 520 / y.texts.length));
   const data = [{
     type: "heatmap", z: grid(null, (point) => point.mean * value.by), zmin: low, zmax: high > low ? high : low + 1e-9, hoverongaps: false,
-    text: grid("", (point) => (point.mean * value.by).toFixed(decimals).replace("-", "−")), texttemplate: cellWidth > 38 && cellHeight >= 16 ? "%{text}" : "",
+    text: grid("", words),
     customdata: grid("", (point) => hover(point, value, [`${x.label} = ${x.texts[point.at[0]]}`, `${y.label} = ${y.texts[point.at[1]]}`])),
     hovertemplate: "%{customdata}<extra></extra>", colorscale: colourScale, xgap: cellWidth > 8 ? 1.5 : 0, ygap: cellHeight > 8 ? 1.5 : 0,
     colorbar: barLook(look, value.title), meta: { kind: "heat" },
   }];
+  if (cellWidth > 7 * Math.max(...points.map((point) => words(point).length)) + 6 && cellHeight >= 16) {
+    // Dark words on light cells, light on dark.
+    const inks = points.map((point) => ((point.mean * value.by - low) / (high - low) < 0.55 ? "#ffffff" : "#131a22"));
+    data.push({ type: "scatter", mode: "text", x: points.map((point) => point.at[0]), y: points.map((point) => point.at[1]), text: points.map(words),
+      textfont: { size: 12.5, color: inks }, hoverinfo: "skip", showlegend: false, cliponaxis: false, meta: { kind: "words" } });
+  }
   // As many ticks as there is room for; the first is kept. Words read from the top, numbers rise.
   const ticks = (axis, room) => {
     const stride = Math.max(1, Math.ceil(axis.texts.length / Math.max(2, room)));

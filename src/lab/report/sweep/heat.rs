@@ -50,10 +50,12 @@ pub(super) fn draw(settings: &Settings<'_>) -> Option<String> {
         });
         known.collect::<Vec<_>>()
     };
+    // of what rises evenly, every name has room
+    const ALL: f64 = 1e9;
     let room = width - names - 130.0;
-    let x_ticks = on_axis(x, &|at| at, if x.log() { f64::INFINITY } else { room });
+    let x_ticks = on_axis(x, &|at| at, if x.log() { ALL } else { room });
     let x_axis = Axis::cells(across, x_ticks, &x.axis.label);
-    let y_axis = Axis::cells(down, on_axis(y, &lies, f64::INFINITY), &y.axis.label);
+    let y_axis = Axis::cells(down, on_axis(y, &lies, ALL), &y.axis.label);
     let mut chart = Chart::framed([width, height], [12.0, 96.0], x_axis, y_axis);
     let (inner, _) = chart.inside();
     let palette = colour::levels();

@@ -40,7 +40,7 @@ function layoutLook(look, width, height, more) {
   return {
     width, height, paper_bgcolor: look.card, plot_bgcolor: look.card, font, margin: { l: 64, r: 16, t: 14, b: 52 }, hovermode: "closest",
     hoverlabel: { bgcolor: look.ink, bordercolor: look.ink, font: { ...font, color: look.card }, align: "left" }, ...more,
-    legend: { tracegroupgap: 4, bgcolor: "rgba(0,0,0,0)", ...(width < 620 ? { orientation: "h", y: -0.2, yanchor: "top" } : {}), ...more.legend },
+    legend: { tracegroupgap: 4, bgcolor: "rgba(0,0,0,0)", ...(width < 620 ? { orientation: "h", yref: "container", y: 0.01, yanchor: "bottom", x: 0, xanchor: "left" } : {}), ...more.legend },
   };
 }
 

@@ -1,5 +1,6 @@
 //! A column of numbers as figures draw it: in which unit, on which scale, between which ends. The same on page and paper.
 
+use crate::lab::report::number::count;
 use crate::lab::report::scale;
 use crate::lab::table::{Column, Unit};
 
@@ -85,7 +86,8 @@ impl<'a> Measure<'a> {
             scale::Axis::round(low, high, "")
         };
         let inside = axis.ticks.into_iter().filter(|(tick, _)| *tick <= high);
-        inside.map(|(tick, text)| (tick / self.by, text)).collect()
+        let grouped = |tick: f64, text| if tick >= 1e4 { count(tick.round() as u64) } else { text };
+        inside.map(|(tick, text)| (tick / self.by, grouped(tick, text))).collect()
     }
 }
 

@@ -52,7 +52,7 @@ function pareto(look, width) {
   const height = Math.max(Math.round(Math.min(480, Math.max(340, width * 0.45))), grouped ? (kinds.length + 2) * 25 + 100 : 0);
   const layout = layoutLook(look, width, height, {
     margin: { l: 70, r: 16, t: 14, b: 56 }, showlegend: true, legend: grouped ? keyTitle(look, series.label) : { x: 0.99, xanchor: "right", y: 0.02, yanchor: "bottom" },
-    xaxis: axisLook(look, { title: cost.title + (cost.log ? ", log scale" : ""), type: cost.log ? "log" : "linear", ...(cost.log ? { dtick: span[1] / span[0] > 1e3 ? 1 : "D2", exponentformat: "power" } : {}),
+    xaxis: axisLook(look, { title: cost.title + (cost.log ? ", log scale" : ""), type: cost.log ? "log" : "linear", ...(cost.log ? { dtick: span[1] / span[0] > 1e3 ? 1 : "D2", exponentformat: "none" } : {}),
       range: [bend(span[0]) - room, bend(span[1]) + room] }),
     yaxis: axisLook(look, { title: y.title, nticks: 7 }),
   });

@@ -8,6 +8,8 @@
 //! `t(d)` is the 97.5 % point of Student's distribution with `d` degrees of freedom, so `mean - half ..= mean + half`
 //! holds the true mean in 95 % of repetitions, if runs are independent and about normal. One run has no interval.
 
+use std::sync::LazyLock;
+
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
 use crate::lab::report::number::size;
@@ -45,6 +47,12 @@ pub(super) fn summary(values: &[f64]) -> Option<Summary> {
 
 /// The 97.5 % point of Student's distribution, for 1 degree of freedom and more.
 fn student(degrees: usize) -> f64 {
+    /// Those that a sweep asks for once a setting and result.
+    static USUAL: LazyLock<[f64; 64]> = LazyLock::new(|| std::array::from_fn(|at| solve(at + 1)));
+    USUAL.get(degrees - 1).copied().unwrap_or_else(|| solve(degrees))
+}
+
+fn solve(degrees: usize) -> f64 {
     let distribution = StudentsT::new(0.0, 1.0, size(degrees));
     distribution.expect("one number has no interval").inverse_cdf(0.975)
 }

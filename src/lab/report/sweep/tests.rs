@@ -212,6 +212,9 @@ fn figures_for_papers_stand_alone() {
         assert_eq!(picture, png(svg), "the same bytes again");
     }
     assert!(drawn[0].svg.contains("n = 1 to 2 runs"));
+    let bits =
+        |svg: &str| ["1", "2", "4"].iter().all(|bit| svg.contains(&format!(">{bit}</text>")));
+    assert!(bits(&drawn[0].svg) && bits(&drawn[1].svg), "every value has its mark");
     assert!(figures(&Sample::hollow().view()).is_empty());
     assert!(png("no svg").is_empty());
 }
