@@ -8,6 +8,7 @@ mod check;
 mod chip;
 mod data;
 pub mod file;
+mod given;
 mod hardware;
 mod layers;
 mod quantity;

@@ -5,13 +5,13 @@
 //! program later changes no list of a run that does not use it. [`FROZEN`] is never edited, only added to: when what
 //! users get by saying nothing changes, the key is written into the resolved configuration instead.
 
+use super::{Config, ConfigError, Select, TrainOn};
 use crate::chip::hardware::{
     Adc, AdcRange, CellSpec, DigitalSpec, DitherBits, DitherPattern, DriveSpec, FloorKind,
     HardwareSpec, PulseCode, Subtract, TileSpec, Timing, WriteScheme, WriteSpec,
 };
 use crate::chip::layer::LayerSpec;
 use crate::chip::population::Wiring;
-use crate::lab::config::{Select, TrainOn};
 use crate::learn::error::Centre;
 use crate::learn::route::Route;
 use crate::learn::rule::{Rule, UpdateMode};
@@ -73,9 +73,24 @@ const FROZEN: &[(&str, &str)] = &[
 /// Key and word.
 type Given = (String, String);
 
+impl Config {
+    /// What the core is given for data of this shape, but the data: key and word, without frozen defaults.
+    ///
+    /// # Errors
+    /// When the configuration does not fit such data.
+    pub fn given(
+        &self,
+        features: usize,
+        classes: usize,
+        image: Option<[usize; 3]>,
+    ) -> Result<Vec<(String, String)>, ConfigError> {
+        let experiment = self.experiment(features, classes, image)?;
+        Ok(classify(&experiment, self.train_on, self.select))
+    }
+}
+
 /// Everything a classification run was given, the data aside.
-#[must_use]
-pub fn given(experiment: &Experiment, train_on: TrainOn, select: Select) -> Vec<Given> {
+fn classify(experiment: &Experiment, train_on: TrainOn, select: Select) -> Vec<Given> {
     // without `..`, here and below: what a run is given is listed or does not compile
     let Experiment {
         seed,
