@@ -4,16 +4,18 @@
 //! lut_a[i] = floor(255 f + 1/2), lut_d[i] = floor(255 f' / peak + 1/2), both at z = i * 2^lsh units, clamped to 0..=255
 //! unit     = weight_max / ( 2^level_bits * (2^drive_bits - 1) )                        of z
 //! lsh      = least shift >= 0 with 2^(lut_bits - 1 + lsh) units >= 4 alpha (sigmoid), 4 (ReLU, identity)
+//! exact    : units are rational, so tables of ReLU and identity, and their lsh, are computed in integers:
+//!            lut_a[i] = floor( (2 * 255 * i * 2^p + D) / (2 D) ),  p = lsh + log2(weight_max) - level_bits,  D = 2^drive_bits - 1
 //! k        = integer nearest to -log2( rate / (B m) * 2^error_bits
-//!            / ( (2^drive_bits - 1) (2^(error_bits-1) - 1) 255 * 2 alpha ) * 2^level_bits / weight_max )
+//!            / ( (2^drive_bits - 1) (2^(error_bits-1) - 1) 255 * 2 alpha ) * 2^level_bits / weight_max ),  0..=30
 //! ```
 //!
-//! Only `+ - * /` and the functions of the `libm` crate (pure Rust, pinned) are used, so the integers are the
+//! Elsewhere only `+ - * /` and the functions of the `libm` crate (pure Rust, pinned) are used, so the integers are the
 //! same on every machine. See docs/MODEL.md, 2 and 3.
 #![expect(clippy::float_arithmetic, reason = "floats become integers here and nowhere else")]
 #![deny(clippy::disallowed_types, clippy::disallowed_methods)]
 
-use super::fixed::{Batch, DriveBits, ErrorBits, LevelBits, LutBits, RateMantissa};
+use super::fixed::{Batch, DriveBits, ErrorBits, LevelBits, LutBits, RateMantissa, log2_ceil};
 
 /// A finite number above 0, given by the user: a width, a rate, a factor.
 #[derive(Debug, Clone, Copy, PartialEq, PartialOrd)]
@@ -54,31 +56,11 @@ pub enum Activation {
 }
 
 impl Activation {
-    /// `z` at which the table ends.
-    fn range(self) -> f64 {
-        match self {
-            Self::Sigmoid(alpha) => 4.0 * alpha.0,
-            Self::Relu | Self::Identity => 4.0,
-        }
-    }
-
     /// `1 / peak` of the derivative.
     fn steepness(self) -> f64 {
         match self {
             Self::Sigmoid(alpha) => 2.0 * alpha.0,
             Self::Relu | Self::Identity => 1.0,
-        }
-    }
-
-    /// Value, and derivative as a fraction of its peak.
-    fn at(self, z: f64) -> (f64, f64) {
-        match self {
-            Self::Sigmoid(alpha) => {
-                let y = 1.0 / (1.0 + libm::exp(-2.0 * z / alpha.0));
-                (y, 4.0 * y * (1.0 - y))
-            }
-            Self::Relu => (z, if z > 0.0 { 1.0 } else { 0.0 }),
-            Self::Identity => (z, 1.0),
         }
     }
 }
@@ -117,20 +99,50 @@ impl Lut {
     /// Builds the table of `2^bits` entries.
     #[must_use]
     pub fn new(activation: Activation, bits: LutBits, unit: Unit) -> Self {
-        let half = i32::try_from(1u32 << (bits.get() - 1)).expect("at most 2^13");
+        match activation {
+            Activation::Sigmoid(alpha) => Self::sigmoid(alpha, bits, unit),
+            Activation::Relu => Self::linear(bits, unit, |i| i > 0),
+            Activation::Identity => Self::linear(bits, unit, |_| true),
+        }
+    }
+
+    fn sigmoid(alpha: Positive, bits: LutBits, unit: Unit) -> Self {
+        let half = 1i32 << (bits.get() - 1);
         let span = f64::from(half) * unit.of_z();
         let mut shift = 0;
-        while span * libm::exp2(f64::from(shift)) < activation.range() {
+        while span * libm::exp2(f64::from(shift)) < 4.0 * alpha.0 {
             shift += 1;
         }
         let step = unit.of_z() * libm::exp2(f64::from(shift));
         let (activity, derivative) = (-half..half)
             .map(|i| {
-                let (value, slope) = activation.at(f64::from(i) * step);
-                (code(value), code(slope))
+                let z = f64::from(i) * step;
+                let y = 1.0 / (1.0 + libm::exp(-2.0 * z / alpha.0));
+                (code(y), code(4.0 * y * (1.0 - y)))
             })
             .unzip();
         Self { activity, derivative, shift }
+    }
+
+    /// `z` in 0..=1, in integers; the derivative is 1 where `slope` says so of an index, else 0.
+    fn linear(bits: LutBits, unit: Unit, slope: impl Fn(i64) -> bool) -> Self {
+        let half = 1i64 << (bits.get() - 1);
+        let codes = i64::from(unit.drive_bits.code_max());
+        let log2 = i64::from(unit.weight_max_log2) - i64::from(unit.level_bits.get());
+        // 2^(bits - 1 + lsh + log2) >= 4 (2^drive_bits - 1)
+        let least = i64::from(log2_ceil(4 * codes.unsigned_abs()));
+        let shift = (least - i64::from(bits.get() - 1) - log2).max(0);
+        // z = i 2^p / codes, so 255 z + 1/2 = (2 255 i 2^p + codes) / (2 codes)
+        let p = shift + log2;
+        let (factor, divisor) =
+            if p >= 0 { (255i64 << p, codes) } else { (255, codes << p.unsigned_abs()) };
+        let activity = (-half..half).map(|i| {
+            let rounded = (2 * factor * i + divisor).div_euclid(2 * divisor);
+            u8::try_from(rounded.clamp(0, 255)).expect("clamped to a byte")
+        });
+        let derivative = (-half..half).map(|i| if slope(i) { 255 } else { 0 });
+        let shift = u32::try_from(shift).expect("at most a few dozen");
+        Self { activity: activity.collect(), derivative: derivative.collect(), shift }
     }
 }
 
@@ -320,6 +332,43 @@ mod tests {
         // 13.2404 - log2( (1 + cos(pi t / 1000)) / 2 ) passes 13.5, 14.5 and 15.5 there
         assert_eq!(table[..4], [(0, 13), (267, 14), (553, 15), (698, 16)]);
         assert!(table.is_sorted() && table.last().unwrap().1 <= SHIFT_MAX);
+    }
+
+    #[test]
+    fn exact_halves_of_a_linear_table_go_up() {
+        // floats once put them just below: entry 5 at z = 5/6, where 255 z is 212 1/2; entry 33 at 16 1/2
+        for (bits, drive_bits, entry, code) in [(6, 2, 5, 213), (12, 8, 33, 17)] {
+            for activation in [Activation::Relu, Activation::Identity] {
+                let lut_bits = LutBits::new(bits).unwrap();
+                let lut = Lut::new(activation, lut_bits, unit(0, 8, drive_bits));
+                assert_eq!((lut.shift, lut.activity[(1 << (bits - 1)) + entry]), (7, code));
+            }
+        }
+    }
+
+    #[test]
+    fn a_linear_table_is_the_rational_function_rounded_and_just_reaches_its_end() {
+        for (weight_max_log2, level_bits, drive_bits, bits) in
+            [(8, 1, 1, 2), (-8, 12, 8, 14), (4, 4, 3, 9), (8, 1, 8, 14), (0, 5, 5, 5)]
+        {
+            let lut_bits = LutBits::new(bits).unwrap();
+            let lut =
+                Lut::new(Activation::Relu, lut_bits, unit(weight_max_log2, level_bits, drive_bits));
+            let scaled = |v: i128| v << 40;
+            // one accumulator unit is `top / (bottom 2^40)` of z
+            let top = scaled(1) >> level_bits << (weight_max_log2 + 8) >> 8;
+            let bottom = (1i128 << drive_bits) - 1;
+            let half = 1i128 << (bits - 1);
+            let reaches = |shift: u32| (half << shift) * top >= 4 * scaled(bottom);
+            assert!(reaches(lut.shift) && (lut.shift == 0 || !reaches(lut.shift - 1)));
+            for (i, &code) in (-half..half).zip(&lut.activity) {
+                // code <= 255 z + 1/2 < code + 1, unless an end is nearer
+                let twice = 2 * 255 * (i << lut.shift) * top + scaled(bottom);
+                let code = i128::from(code);
+                assert!(code == 0 || 2 * code * scaled(bottom) <= twice, "{i}");
+                assert!(code == 255 || twice < 2 * (code + 1) * scaled(bottom), "{i}");
+            }
+        }
     }
 
     #[test]

@@ -15,7 +15,7 @@ use dalean::learn::error::Centre;
 use dalean::learn::route::Route;
 use dalean::learn::rule::{Rule, UpdateMode};
 use dalean::num::fixed::*;
-use dalean::num::tables::{Activation, Decay, Positive};
+use dalean::num::tables::{Activation, Decay, Lut, Positive, Unit};
 use dalean::task::classify::{Examples, Experiment, Trainer};
 use serde_json::Value;
 use sha2::{Digest, Sha256};
@@ -92,7 +92,8 @@ fn hardware(s: &Value) -> Hardware {
             h.tile.columns = 128;
             h.tile.transposed_read = false;
             h.drive.bits = DriveBits::new(int(&s["drive_bits"])).unwrap();
-            h.drive.dac_bits = int(&s["dac_bits"]) as u32;
+            // what the oracle leaves at 8 bits of a narrower code is one slice
+            h.drive.dac_bits = (int(&s["dac_bits"]) as u32).min(h.drive.bits.get());
             h.adc = adc;
             h.digital.lut_bits = LutBits::new(int(&s["lut_bits"])).unwrap();
             h.digital.error_bits = ErrorBits::new(int(&s["error_bits"])).unwrap();
@@ -122,10 +123,7 @@ fn experiment(s: &Value) -> Experiment {
                 inputs: pair[0] as usize,
                 units: pair[1] as usize,
                 wiring: if last { Wiring::DualReadout } else { Wiring::Dual },
-                activation: match text(&s["act"][l]) {
-                    "relu" => Activation::Relu,
-                    _ => Activation::Sigmoid(positive(&s["alpha"][l])),
-                },
+                activation: activation(&s["act"][l], &s["alpha"][l]),
                 weight_max_log2: int(&s["weight_max"][l]).ilog2() as i32,
                 gain_64ths: if last { [64, 64] } else { [96, 32] },
                 constant_row: false,
@@ -157,6 +155,14 @@ fn experiment(s: &Value) -> Experiment {
         decay: Decay::Constant,
         epochs: int(&s["epochs"]) as u32,
         augment: None,
+    }
+}
+
+fn activation(name: &Value, alpha: &Value) -> Activation {
+    match text(name) {
+        "relu" => Activation::Relu,
+        "identity" => Activation::Identity,
+        _ => Activation::Sigmoid(positive(alpha)),
     }
 }
 
@@ -262,6 +268,26 @@ fn run(case: &Value, backend: Backend) {
     let predictions: Vec<i64> =
         trainer.evaluate(&data).predictions.iter().map(|&p| i64::from(p)).collect();
     assert_eq!(predictions, ints(&case["prediction"]["classes"]), "{name}: predictions");
+}
+
+#[test]
+fn tables_equal_the_oracle() {
+    let golden = golden();
+    let tables = golden["micro"]["luts"].as_array().unwrap();
+    assert!(tables.len() >= 18);
+    for want in tables {
+        let unit = Unit {
+            weight_max_log2: int(&want["weight_max_log2"]) as i32,
+            level_bits: LevelBits::new(int(&want["level_bits"])).unwrap(),
+            drive_bits: DriveBits::new(int(&want["drive_bits"])).unwrap(),
+        };
+        let bits = LutBits::new(int(&want["lut_bits"])).unwrap();
+        let lut = Lut::new(activation(&want["activation"], &want["alpha"]), bits, unit);
+        assert_eq!(i64::from(lut.shift), int(&want["lsh"]), "{want}");
+        for (table, name) in [(&lut.activity, "lut_a_sha256"), (&lut.derivative, "lut_d_sha256")] {
+            assert_eq!(hex(&Sha256::digest(table)), text(&want[name]), "{name} of {want}");
+        }
+    }
 }
 
 #[test]
