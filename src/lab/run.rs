@@ -17,11 +17,11 @@ pub use session::{Machine, Session};
 pub use train::{Event, Keeping, Outcome, carry_on, evaluate, resume, train};
 pub use verify::{Verdict, verify};
 
-use crate::chip::layer::PlanError;
 use crate::lab::config::ConfigError;
 use crate::lab::data::DataError;
 use crate::lab::store::checkpoint::CheckpointError;
 use crate::lab::store::folder::FolderError;
+use crate::learn::network::NetworkError;
 
 /// Why a run could not be carried out.
 #[derive(Debug, thiserror::Error)]
@@ -32,9 +32,9 @@ pub enum RunError {
     /// The data.
     #[error(transparent)]
     Data(#[from] DataError),
-    /// The network does not fit the chip.
+    /// The network does not fit together, or not on the chip.
     #[error(transparent)]
-    Plan(#[from] PlanError),
+    Network(#[from] NetworkError),
     /// The folder.
     #[error(transparent)]
     Folder(#[from] FolderError),

@@ -15,7 +15,9 @@
 #![expect(clippy::float_arithmetic, reason = "floats become integers here and nowhere else")]
 #![deny(clippy::disallowed_types, clippy::disallowed_methods)]
 
-use super::fixed::{Batch, DriveBits, ErrorBits, LevelBits, LutBits, RateMantissa, log2_ceil};
+use super::fixed::{
+    Batch, DriveBits, ErrorBits, LevelBits, LutBits, OutOfRange, RateMantissa, log2_ceil,
+};
 
 /// A finite number above 0, given by the user: a width, a rate, a factor.
 #[derive(Debug, Clone, Copy, PartialEq, PartialOrd)]
@@ -196,11 +198,43 @@ impl Rate {
         -libm::log2(self.rate.0 / samples * scale * levels)
     }
 
+    /// `k` before any decay: the integer nearest to the exact shift.
+    ///
+    /// # Errors
+    /// When it lies outside `0..=SHIFT_MAX`: no shift stands for such a rate.
+    pub fn shift(self) -> Result<u32, OutOfRange> {
+        let nearest = libm::floor(self.shift_exact() + 0.5);
+        #[expect(clippy::cast_possible_truncation, reason = "a logarithm: some hundreds at most")]
+        let found = nearest as i64;
+        let k = u32::try_from(found).ok().filter(|&k| k <= SHIFT_MAX);
+        k.ok_or(OutOfRange { name: "k", found, min: 0, max: SHIFT_MAX.into() })
+    }
+
+    /// The rate that `k` and the mantissa really give: within a factor of `sqrt(2)` of the one asked for.
+    ///
+    /// # Errors
+    /// As of [`Rate::shift`].
+    pub fn effective(self) -> Result<Positive, OutOfRange> {
+        let k = self.shift()?;
+        let rail = f64::from((1u32 << (self.error_bits.get() - 1)) - 1);
+        let codes = f64::from(self.unit.drive_bits.code_max());
+        let samples = f64::from(self.batch.get()) * f64::from(self.mantissa.get());
+        let log2 = self.unit.weight_max_log2;
+        let bits = self.unit.level_bits.get() + self.error_bits.get() + k;
+        let scale = libm::exp2(f64::from(log2) - f64::from(bits));
+        // whole numbers but for alpha: scaled by a power of two last
+        Ok(Positive(samples * codes * rail * 255.0 * self.activation.steepness() * scale))
+    }
+
     /// The shifts over `updates` updates: `(first update, k)`, in order; k changes at each entry.
     ///
-    /// The decay is applied before rounding: `k(t) = nearest(k - log2(decay(t)))`, at most 30.
-    #[must_use]
-    pub fn shifts(self, decay: Decay, updates: u64) -> Vec<(u64, u32)> {
+    /// The decay is applied before rounding, `k(t) = nearest(k* - log2(decay(t)))`, and the table ends at
+    /// `SHIFT_MAX`: a rate that has fallen further stays there.
+    ///
+    /// # Errors
+    /// When the shift before any decay lies outside `0..=SHIFT_MAX`.
+    pub fn shifts(self, decay: Decay, updates: u64) -> Result<Vec<(u64, u32)>, OutOfRange> {
+        self.shift()?;
         let exact = self.shift_exact();
         let mut table: Vec<(u64, u32)> = Vec::new();
         for update in 0..updates.max(1) {
@@ -214,7 +248,7 @@ impl Rate {
             };
             let nearest = libm::floor(exact - libm::log2(factor) + 0.5);
             #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0..=30")]
-            let k = nearest.clamp(0.0, f64::from(SHIFT_MAX)) as u32;
+            let k = nearest.min(f64::from(SHIFT_MAX)) as u32;
             if table.last().is_none_or(|&(_, last)| last != k) {
                 table.push((update, k));
             }
@@ -222,7 +256,7 @@ impl Rate {
                 break;
             }
         }
-        table
+        Ok(table)
     }
 }
 
@@ -290,9 +324,9 @@ mod tests {
     fn a_mantissa_and_a_batch_divide_the_rate() {
         // 13.24 of the known recipe, + log2(3), + log2(4)
         let three = Rate { mantissa: RateMantissa::new(3).unwrap(), ..rate(20.0, 6.0) };
-        assert_eq!(three.shifts(Decay::Constant, 1), [(0, 15)]);
+        assert_eq!(three.shifts(Decay::Constant, 1).unwrap(), [(0, 15)]);
         let large = Rate { batch: Batch::new(128).unwrap(), ..rate(20.0, 6.0) };
-        assert_eq!(large.shifts(Decay::Constant, 1), [(0, 15)]);
+        assert_eq!(large.shifts(Decay::Constant, 1).unwrap(), [(0, 15)]);
     }
 
     #[test]
@@ -308,30 +342,6 @@ mod tests {
         let number = |value| Positive::new(value).unwrap();
         assert_eq!(number(3.0).times(number(5.0)).map(Positive::get), Some(15.0));
         assert_eq!(number(1e4).times(number(1e3)), None);
-    }
-
-    #[test]
-    fn relu_and_identity_end_at_full_code() {
-        let bits = LutBits::new(10).unwrap();
-        let relu = Lut::new(Activation::Relu, bits, unit(0, 8, 8));
-        assert_eq!((relu.activity[512], relu.derivative[512]), (0, 0));
-        assert_eq!((relu.derivative[513], relu.activity[1023]), (255, 255));
-        let identity = Lut::new(Activation::Identity, bits, unit(0, 8, 8));
-        assert!(identity.derivative.iter().all(|&d| d == 255) && identity.activity[0] == 0);
-    }
-
-    #[test]
-    fn the_known_recipe_has_the_known_shift() {
-        // rate 20, B = 32, alpha = 6, weight_max = 4, 8 bits: k = 13 with 8-bit gates
-        assert_eq!(rate(20.0, 6.0).shifts(Decay::Constant, 1000), [(0, 13)]);
-    }
-
-    #[test]
-    fn a_cosine_starts_at_the_constant_shift_and_only_rises() {
-        let table = rate(20.0, 6.0).shifts(Decay::Cosine, 1000);
-        // 13.2404 - log2( (1 + cos(pi t / 1000)) / 2 ) passes 13.5, 14.5 and 15.5 there
-        assert_eq!(table[..4], [(0, 13), (267, 14), (553, 15), (698, 16)]);
-        assert!(table.is_sorted() && table.last().unwrap().1 <= SHIFT_MAX);
     }
 
     #[test]
@@ -369,6 +379,43 @@ mod tests {
                 assert!(code == 255 || twice < 2 * (code + 1) * scaled(bottom), "{i}");
             }
         }
+    }
+
+    #[test]
+    fn relu_and_identity_end_at_full_code() {
+        let bits = LutBits::new(10).unwrap();
+        let relu = Lut::new(Activation::Relu, bits, unit(0, 8, 8));
+        assert_eq!((relu.activity[512], relu.derivative[512]), (0, 0));
+        assert_eq!((relu.derivative[513], relu.activity[1023]), (255, 255));
+        let identity = Lut::new(Activation::Identity, bits, unit(0, 8, 8));
+        assert!(identity.derivative.iter().all(|&d| d == 255) && identity.activity[0] == 0);
+    }
+
+    #[test]
+    fn the_known_recipe_has_the_known_shift() {
+        // rate 20, B = 32, alpha = 6, weight_max = 4, 8 bits: k = 13 with 8-bit gates
+        assert_eq!(rate(20.0, 6.0).shifts(Decay::Constant, 1000).unwrap(), [(0, 13)]);
+        // 13.2404 is rounded to 13, so the rate is 20 x 2^0.2404
+        let effective = rate(20.0, 6.0).effective().unwrap().get();
+        assert_eq!(effective, 255.0 * 127.0 * 255.0 * 12.0 * 32.0 * 4.0 / 65536.0 / 8192.0);
+        assert!((23.62..23.63).contains(&effective), "{effective}");
+    }
+
+    #[test]
+    fn shifts_outside_0_to_30_are_refused_with_what_they_would_be() {
+        // a factor of 2^k moves the shift by k; 20 at 13.2404
+        let k = |times: f64| rate(20.0 * times, 6.0).shift().map_err(|error| error.found);
+        assert_eq!([k(8192.0), k(8192.0 * 1.8)], [Ok(0), Err(-1)]);
+        assert_eq!([k(1.0 / 131_072.0), k(0.8 / 131_072.0)], [Ok(30), Err(31)]);
+        assert!(rate(1e-6, 6.0).shifts(Decay::Constant, 1).is_err());
+    }
+
+    #[test]
+    fn a_cosine_starts_at_the_constant_shift_and_only_rises() {
+        let table = rate(20.0, 6.0).shifts(Decay::Cosine, 1000).unwrap();
+        // 13.2404 - log2( (1 + cos(pi t / 1000)) / 2 ) passes 13.5, 14.5 and 15.5 there
+        assert_eq!(table[..4], [(0, 13), (267, 14), (553, 15), (698, 16)]);
+        assert!(table.is_sorted() && table.last().unwrap().1 <= SHIFT_MAX);
     }
 
     #[test]

@@ -12,6 +12,7 @@ use dalean::chip::layer::LayerSpec;
 use dalean::chip::ledger::{During, Event};
 use dalean::chip::population::Wiring;
 use dalean::learn::error::Centre;
+use dalean::learn::network::NetworkSpec;
 use dalean::learn::route::Route;
 use dalean::learn::rule::{Rule, UpdateMode};
 use dalean::num::fixed::*;
@@ -130,9 +131,10 @@ fn experiment(s: &Value) -> Experiment {
             }
         })
         .collect();
-    Experiment {
-        seed: text(&s["seed_decimal"]).parse().unwrap(),
-        hardware: hardware(s),
+    let taps = int(&s["taps"]) as usize;
+    // one tap has no sum to shift
+    let shift = (taps > 1).then(|| int(&s["tap_shift"]) as u32);
+    let network = NetworkSpec {
         layers,
         rule: Rule::Ed,
         mode: match text(&s["mode"]) {
@@ -145,14 +147,16 @@ fn experiment(s: &Value) -> Experiment {
             "batch" => Centre::Batch,
             _ => Centre::Running,
         },
-        route: Route::Modulo {
-            taps: int(&s["taps"]) as usize,
-            shift: Some(int(&s["tap_shift"]) as u32),
-        },
+        route: Some(Route::Modulo { taps, shift }),
         batch: Batch::new(int(&s["batch"])).unwrap(),
         mantissa: RateMantissa::new(int(&s["mantissa"])).unwrap(),
         rates: s["rate"].as_array().unwrap().iter().map(positive).collect(),
         decay: Decay::Constant,
+    };
+    Experiment {
+        seed: text(&s["seed_decimal"]).parse().unwrap(),
+        hardware: hardware(s),
+        network,
         epochs: int(&s["epochs"]) as u32,
         augment: None,
     }
