@@ -66,7 +66,7 @@ impl From<RunError> for Failure {
     fn from(error: RunError) -> Self {
         let code = match error {
             RunError::Stopped { .. } => 3,
-            RunError::Config(_) | RunError::Plan(_) => 2,
+            RunError::Config(_) | RunError::Network(_) => 2,
             _ => 1,
         };
         Self { code, message: error.to_string() }

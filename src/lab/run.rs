@@ -23,11 +23,11 @@ pub use train::{Event, Keeping, Outcome, address_of, carry_on, evaluate, resume,
 pub use verify::{Verdict, verify};
 
 use crate::chip::crossbar::kernel::Backend;
-use crate::chip::layer::PlanError;
 use crate::lab::config::ConfigError;
 use crate::lab::data::DataError;
 use crate::lab::store::checkpoint::CheckpointError;
 use crate::lab::store::folder::FolderError;
+use crate::learn::network::NetworkError;
 
 /// What a run is carried out with; none of it changes a result.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -47,9 +47,9 @@ pub enum RunError {
     /// The data.
     #[error(transparent)]
     Data(#[from] DataError),
-    /// The network does not fit the chip.
+    /// The network does not fit together, or not on the chip.
     #[error(transparent)]
-    Plan(#[from] PlanError),
+    Network(#[from] NetworkError),
     /// The folder.
     #[error(transparent)]
     Folder(#[from] FolderError),

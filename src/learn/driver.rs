@@ -14,15 +14,15 @@ use crate::num::fixed::{ErrorBits, rail};
 
 /// How a network learns.
 #[derive(Debug, Clone)]
-pub struct Learning {
+pub(crate) struct Learning {
     /// The rule.
-    pub rule: Rule,
+    pub(crate) rule: Rule,
     /// When a batch is written.
-    pub mode: UpdateMode,
+    pub(crate) mode: UpdateMode,
     /// How errors reach each layer.
-    pub deliveries: Vec<Delivery>,
+    pub(crate) deliveries: Vec<Delivery>,
     /// Shifts of each layer: `(first update, k)`, in order.
-    pub shifts: Vec<Vec<(u64, u32)>>,
+    pub(crate) shifts: Vec<Vec<(u64, u32)>>,
 }
 
 /// Learning in progress on an engine.
@@ -35,9 +35,9 @@ pub struct Driver {
 }
 
 impl Driver {
-    /// Starts learning on an engine.
+    /// Starts learning on an engine whose layers `learning` fits: the network builder sees to that.
     #[must_use]
-    pub fn new(engine: Engine, learning: Learning, unit: ErrorUnit) -> Self {
+    pub(crate) fn new(engine: Engine, learning: Learning, unit: ErrorUnit) -> Self {
         Self { engine, learning, unit, updates: 0 }
     }
 

@@ -36,7 +36,7 @@ pub struct ErrorUnit {
 impl ErrorUnit {
     /// A unit for `outputs` channels.
     #[must_use]
-    pub fn new(centre: Centre, bits: ErrorBits, outputs: usize) -> Self {
+    pub(crate) fn new(centre: Centre, bits: ErrorBits, outputs: usize) -> Self {
         let means = if centre == Centre::Running { vec![0; outputs] } else { vec![] };
         Self { centre, bits, means }
     }
@@ -54,7 +54,7 @@ impl ErrorUnit {
     }
 
     /// Words for a batch of errors `[sample][output]`, and how many saturated.
-    pub fn words(&mut self, errors: &[i32], outputs: usize) -> (Vec<i16>, u64) {
+    pub(crate) fn words(&mut self, errors: &[i32], outputs: usize) -> (Vec<i16>, u64) {
         let bits = self.bits.get();
         let mut saturated = 0;
         let mut bounded = |v: i64| {

@@ -42,7 +42,7 @@ const DENSE_PART: usize = 128;
 
 /// A route built for one layer: what the error unit computes, and what the tile taps.
 #[derive(Debug, Clone)]
-pub struct Delivery {
+pub(crate) struct Delivery {
     taps: Taps,
     kind: Kind,
     bits: ErrorBits,
@@ -65,19 +65,19 @@ enum Kind {
 impl Delivery {
     /// The output layer: unit c takes word c.
     #[must_use]
-    pub fn output(outputs: usize, bits: ErrorBits) -> Self {
+    pub(crate) fn output(outputs: usize, bits: ErrorBits) -> Self {
         Self { taps: Taps::identity(outputs), kind: Kind::Bus, bits }
     }
 
     /// A layer whose units get a word each, made elsewhere (back-propagation).
     #[must_use]
-    pub fn own(units: usize, bits: ErrorBits) -> Self {
+    pub(crate) fn own(units: usize, bits: ErrorBits) -> Self {
         Self { taps: Taps::identity(units), kind: Kind::Own, bits }
     }
 
     /// A hidden layer of `units` that hears `outputs` channels by `route`.
     #[must_use]
-    pub fn hidden(
+    pub(crate) fn hidden(
         route: Route,
         units: usize,
         outputs: usize,
@@ -120,20 +120,20 @@ impl Delivery {
 
     /// The tile's part.
     #[must_use]
-    pub const fn taps(&self) -> &Taps {
+    pub(crate) const fn taps(&self) -> &Taps {
         &self.taps
     }
 
     /// Whether the words are those of the output, as they are: one bus brings them to all such layers at once.
     #[must_use]
-    pub const fn is_common(&self) -> bool {
+    pub(crate) const fn is_common(&self) -> bool {
         matches!(self.kind, Kind::Bus)
     }
 
     /// The words put on this layer's bus for output words `[sample][output]`; how many saturated and how many
     /// products the error unit computed.
     #[must_use]
-    pub fn words(&self, output: &[i16], outputs: usize) -> (Vec<i16>, u64, u64) {
+    pub(crate) fn words(&self, output: &[i16], outputs: usize) -> (Vec<i16>, u64, u64) {
         let mut saturated = 0;
         let mut bounded = |sum: i64, shift: u32| {
             let (word, changed) = sat(rsh(sum, shift), self.bits.get());

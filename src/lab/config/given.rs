@@ -13,6 +13,7 @@ use crate::chip::hardware::{
 use crate::chip::layer::LayerSpec;
 use crate::chip::population::Wiring;
 use crate::learn::error::Centre;
+use crate::learn::network::NetworkSpec;
 use crate::learn::route::Route;
 use crate::learn::rule::{Rule, UpdateMode};
 use crate::num::tables::{Activation, Decay};
@@ -92,21 +93,8 @@ impl Config {
 /// Everything a classification run was given, the data aside.
 fn classify(experiment: &Experiment, train_on: TrainOn, select: Select) -> Vec<Given> {
     // without `..`, here and below: what a run is given is listed or does not compile
-    let Experiment {
-        seed,
-        hardware,
-        layers,
-        rule,
-        mode,
-        centre,
-        route,
-        batch,
-        mantissa,
-        rates,
-        decay,
-        epochs,
-        augment,
-    } = experiment;
+    let Experiment { seed, hardware, network, epochs, augment } = experiment;
+    let NetworkSpec { layers, rule, mode, centre, route, batch, mantissa, rates, decay } = network;
     let mut list = List::default();
     list.put("task", "classify");
     list.put("seed", seed);
@@ -143,10 +131,11 @@ fn classify(experiment: &Experiment, train_on: TrainOn, select: Select) -> Vec<G
     list.put(
         "learning.route",
         match route {
-            Route::Modulo { taps, shift } => format!("modulo {taps}{}", shifted(shift)),
-            Route::RandomSparse => "random_sparse".into(),
-            Route::ScalarBroadcast => "scalar_broadcast".into(),
-            Route::RandomDense { shift } => format!("random_dense{}", shifted(shift)),
+            None => "none".into(),
+            Some(Route::Modulo { taps, shift }) => format!("modulo {taps}{}", shifted(shift)),
+            Some(Route::RandomSparse) => "random_sparse".into(),
+            Some(Route::ScalarBroadcast) => "scalar_broadcast".into(),
+            Some(Route::RandomDense { shift }) => format!("random_dense{}", shifted(shift)),
         },
     );
     list.put("learning.batch", batch.get());

@@ -185,7 +185,7 @@ fn check(config: &Config, data: &Loaded) -> Result<(String, f64), RunError> {
     // levels of more than a byte take about twice the time
     let planes = if config.hardware.cell.level_bits.get() > 8 { 2.0 } else { 1.0 };
     let samples = train.len() as f64 * f64::from(config.epochs);
-    Ok((key, experiment.layers.iter().map(cells).sum::<f64>() * planes * samples))
+    Ok((key, experiment.network.layers.iter().map(cells).sum::<f64>() * planes * samples))
 }
 
 impl Plan {
