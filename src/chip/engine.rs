@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! LOADW(row)             load a row of levels
-//! LOADX(row)             put drive codes on the rows of the first layer
+//! LOADX(row)             put drive codes of data on the rows of the first layer
 //! FWD(rows | columns)    read a layer, or read it backwards
 //! ERR(words)             deliver error words over the bus; units latch their taps and form gates
 //! UPD(now | add | write) now: accumulate one sample and program; add: accumulate; write: program and clear
@@ -21,7 +21,7 @@ use super::crossbar::Collect;
 use super::crossbar::kernel::{Backend, LookUp, Team};
 use super::crossbar::layout::BLOCK_ROWS;
 use super::hardware::Hardware;
-use super::layer::Layer;
+use super::layer::{DrivenBy, Layer};
 use super::ledger::{Cycles, During, Event, Ledger};
 use super::population::{Stream, Wiring};
 
@@ -160,11 +160,14 @@ impl Phase {
     }
 }
 
-/// Registers of a layer for the loaded samples. Streams are indexed by [`Stream`]; what a layer does not
+/// Registers of a layer for the loaded samples, by name. Streams are indexed by [`Stream`]; what a layer does not
 /// have stays empty. Units lie in blocks of 64, samples in a block: `[block][sample][64]`.
+///
+/// A layer whose units drive the next one hands their codes to its `drives`; the last one keeps `accumulators` and
+/// `activities` of every target stream that it has, for whoever reads them out.
 #[derive(Debug, Clone, Default)]
 struct Registers {
-    /// Drive codes by source stream. The first layer drives both streams alike and keeps one copy, at P.
+    /// Drive codes by source stream; a set that both share lies at P.
     drives: [Lines<u8>; 2],
     /// Derivatives by target stream.
     derivatives: [Lines<u8>; 2],
@@ -172,10 +175,10 @@ struct Registers {
     gates: [Lines<i8>; 2],
     /// Drives by source stream as an update takes them: `[block][64 rows][stride]`.
     turned: [Lines<u8>; 2],
-    /// Accumulators of stream p, of the last layer.
-    accumulators: Vec<i64>,
-    /// Activity by target stream, of the last layer.
-    values: [Vec<u8>; 2],
+    /// Accumulators by target stream, of the last layer.
+    accumulators: [Vec<i64>; 2],
+    /// Activities by target stream, of the last layer.
+    activities: [Vec<u8>; 2],
     /// Row sums of the last transposed read, `[sample][rows]`.
     backward: Vec<i64>,
     /// Samples added and not yet programmed, and their shift.
@@ -208,7 +211,7 @@ impl<T> std::ops::DerefMut for Lines<T> {
     }
 }
 
-/// Sum of bank currents of a layer since they were last taken: `[E, I]` by target stream.
+/// Sum of bank currents of a layer since they were last taken: of banks that excite and that inhibit, by target stream.
 pub type Currents = [[i64; 2]; 2];
 
 /// A network on a chip.
@@ -233,6 +236,8 @@ pub struct Engine {
     /// Sums of levels of each row, by layer and array; forgotten when a level moves.
     row_sums: Vec<Option<Vec<Vec<i64>>>>,
     samples: usize,
+    /// Samples that `LOADX` has brought since the start, by phase: state.
+    loaded: [u64; 3],
     phase: Phase,
     ledgers: [Ledger; 3],
     /// Counts cycles, on hardware that has a timing.
@@ -248,8 +253,9 @@ impl Engine {
     /// When the layers do not follow one another: the plan checks that.
     #[must_use]
     pub fn new(hardware: Hardware, backend: Backend, seed: u64, layers: Vec<Layer>) -> Self {
-        let joined = layers.windows(2).all(|pair| pair[0].spec.units == pair[1].spec.inputs);
+        let joined = layers.windows(2).all(|pair| pair[1].spec.follows(&pair[0].spec));
         assert!(joined && !layers.is_empty(), "layers follow one another");
+        assert!(layers[0].spec.driven_by == DrivenBy::Shared, "data drive both streams alike");
         let count = layers.len();
         let schedule = hardware.timing.map(|timing| Schedule::new(&hardware, timing, &layers));
         let ledger =
@@ -272,6 +278,7 @@ impl Engine {
             tables,
             layers,
             samples: 0,
+            loaded: [0; 3],
             phase: Phase::Training,
             ledgers: [ledger.clone(), ledger.clone(), ledger],
             schedule,
@@ -392,24 +399,44 @@ impl Engine {
         self.samples
     }
 
+    /// Samples that were loaded while a phase was charged, since the start.
+    #[must_use]
+    pub const fn samples_loaded(&self, phase: Phase) -> u64 {
+        self.loaded[phase as usize]
+    }
+
+    /// Restores how many samples were loaded in a phase.
+    pub const fn set_samples_loaded(&mut self, phase: Phase, samples: u64) {
+        self.loaded[phase as usize] = samples;
+    }
+
     /// Bank currents by layer since the last call, and starts over.
     pub fn take_currents(&mut self) -> Vec<Currents> {
         let zero = vec![[[0; 2]; 2]; self.layers.len()];
         std::mem::replace(&mut self.currents, zero)
     }
 
-    /// Accumulator of a unit of the last layer's p stream.
+    /// Accumulator and activity of a unit of the last layer, of one of its target streams.
+    ///
+    /// # Panics
+    /// When the last layer has no such stream, or has not been read.
+    #[must_use]
+    pub fn output(&self, target: Stream, sample: usize, unit: usize) -> (i64, u8) {
+        let registers = self.registers.last().expect("a network has layers");
+        let (at, stream) = (self.register_at(sample, unit), target.index());
+        (registers.accumulators[stream][at], registers.activities[stream][at])
+    }
+
+    /// Accumulator of a unit of the last layer's p stream, which predicts.
     #[must_use]
     pub fn output_accumulator(&self, sample: usize, unit: usize) -> i64 {
-        let registers = self.registers.last().expect("a network has layers");
-        registers.accumulators[self.register_at(sample, unit)]
+        self.output(Stream::P, sample, unit).0
     }
 
     /// Activity code of a unit of the last layer's p stream.
     #[must_use]
     pub fn output_activity(&self, sample: usize, unit: usize) -> u8 {
-        let registers = self.registers.last().expect("a network has layers");
-        registers.values[Stream::P.index()][self.register_at(sample, unit)]
+        self.output(Stream::P, sample, unit).1
     }
 
     /// Row sums of the last transposed read of `layer`, `[sample][inputs]`.
@@ -468,6 +495,7 @@ impl Engine {
         assert!(greatest <= self.hardware.drive.bits.code_max(), "codes have `drive_bits` bits");
         self.samples = codes.len() / inputs;
         let samples = self.samples;
+        self.loaded[self.phase as usize] += samples as u64;
         let drives = &mut self.registers[0].drives[Stream::P.index()];
         drives.resize(blocks * samples * BLOCK_ROWS, 0);
         let parts = drives.chunks_exact_mut((samples * BLOCK_ROWS).max(1)).enumerate();
@@ -506,8 +534,8 @@ impl Engine {
 
     /// Drives of a source stream of a layer.
     fn drives(&self, layer: usize, source: Stream) -> &[u8] {
-        let source = if layer == 0 { Stream::P } else { source };
-        &self.registers[layer].drives[source.index()]
+        let set = self.layers[layer].spec.drives_of(source);
+        &self.registers[layer].drives[set.index()]
     }
 
     fn charge(&mut self, layer: usize, pathway: u8, during: During, event: Event, count: u64) {
@@ -516,6 +544,6 @@ impl Engine {
 
     /// Code of the pathway that carries a target's excitatory bank: units are charged there.
     const fn code_of(wiring: Wiring, target: Stream) -> u8 {
-        wiring.pathways()[wiring.banks(target)[0]].code
+        wiring.pathways()[wiring.pairs(target)[0][0]].code
     }
 }

@@ -12,11 +12,21 @@ use super::crossbar::kernel::LookUp;
 use super::crossbar::layout::Layout;
 use super::hardware::{Adc, AdcRange, Hardware};
 use super::periphery;
-use super::population::Wiring;
+use super::population::{Stream, Wiring};
 use crate::num::fixed::DriveBits;
 use crate::num::tables::{Activation, Lut, Unit};
 
-/// What a layer is made of.
+/// Whose codes are on the rows of an array.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum DrivenBy {
+    /// One set of drives, for both streams: data.
+    Shared,
+    /// A set for each stream: activities of the array before.
+    Streams,
+}
+
+/// What a layer is made of. A network is a list of stages, input to output; an array, which is a layer, is the only
+/// kind there is.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LayerSpec {
     /// Units of the layer below, or features; without the constant row.
@@ -25,6 +35,8 @@ pub struct LayerSpec {
     pub units: usize,
     /// How the arrays are wired.
     pub wiring: Wiring,
+    /// Whose codes drive the rows.
+    pub driven_by: DrivenBy,
     /// Function of the units.
     pub activation: Activation,
     /// `log2(weight_max)`.
@@ -33,6 +45,33 @@ pub struct LayerSpec {
     pub gain_64ths: [u32; 2],
     /// Whether a constant row is driven at full code.
     pub constant_row: bool,
+}
+
+impl LayerSpec {
+    /// The stream whose set of drives stands on the rows that `source` drives.
+    #[must_use]
+    pub const fn drives_of(&self, source: Stream) -> Stream {
+        match self.driven_by {
+            DrivenBy::Shared => Stream::P,
+            DrivenBy::Streams => source,
+        }
+    }
+
+    /// Streams that have a set of drives of their own.
+    #[must_use]
+    pub const fn drive_sets(&self) -> &'static [Stream] {
+        match self.driven_by {
+            DrivenBy::Shared => &[Stream::P],
+            DrivenBy::Streams => self.wiring.sources(),
+        }
+    }
+
+    /// Whether the units of `below` can drive this array.
+    #[must_use]
+    pub fn follows(&self, below: &Self) -> bool {
+        let given = below.wiring.targets();
+        self.inputs == below.units && self.drive_sets().iter().all(|set| given.contains(set))
+    }
 }
 
 /// Which error words a unit latches: a static tap, no matrix.
@@ -192,7 +231,7 @@ fn tiles(layout: Layout, hardware: &Hardware) -> [usize; 2] {
     [layout.rows.div_ceil(hardware.tile.rows), layout.columns.div_ceil(hardware.tile.columns)]
 }
 
-/// Proves that a network fits: addresses, words and physical tiles. A tile holds the two banks of one target.
+/// Proves that a network fits: addresses, words and physical tiles. A tile holds two banks of one target.
 ///
 /// # Errors
 /// When it does not, with what is needed and what there is.
@@ -209,7 +248,7 @@ pub fn check(specs: &[LayerSpec], hardware: &Hardware) -> Result<(), PlanError> 
             return Err(PlanError::Size { layer, rows, columns, max: SIDE_MAX });
         }
         let [down, across] = tiles(layout, hardware);
-        by_layer.push(down * across * spec.wiring.targets().len());
+        by_layer.push(down * across * spec.wiring.planes().count());
     }
     let needed = by_layer.iter().sum();
     match hardware.tile.count_max {

@@ -6,7 +6,7 @@
 
 pub mod cycles;
 
-pub use cycles::{Cycles, Part, Stage};
+pub use cycles::{Cycles, Interval, Part};
 
 /// What can happen. The order is part of the state hash: append only.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

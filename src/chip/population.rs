@@ -61,6 +61,9 @@ const fn pathway(
     Pathway { code, name, source, target, polarity }
 }
 
+/// Banks a target can have.
+pub const BANKS_MAX: usize = 4;
+
 use Polarity::{Excites, Inhibits};
 use Stream::{N, P};
 
@@ -111,13 +114,26 @@ impl Wiring {
         }
     }
 
-    /// Places, in [`Wiring::pathways`], of the excitatory and the inhibitory bank of a target.
+    /// Places, in [`Wiring::pathways`], of the banks of a target, in pairs of one that excites and one that inhibits.
+    /// A pair is what a physical tile holds; what all pairs read adds up in the target's accumulators.
     #[must_use]
-    pub const fn banks(self, target: Stream) -> [usize; 2] {
+    pub const fn pairs(self, target: Stream) -> &'static [[usize; 2]] {
         match target {
-            P => [0, 1],
-            N => [2, 3],
+            P => &[[0, 1]],
+            N => &[[2, 3]],
         }
+    }
+
+    /// The pairs of all targets, target after target.
+    pub fn planes(self) -> impl Iterator<Item = (Stream, [usize; 2])> {
+        let of = move |&target| self.pairs(target).iter().map(move |&pair| (target, pair));
+        self.targets().iter().flat_map(of)
+    }
+
+    /// Places of the banks of a target, each of which has the polarity of its pathway.
+    #[must_use]
+    pub fn banks(self, target: Stream) -> &'static [usize] {
+        self.pairs(target).as_flattened()
     }
 
     /// Bits added to the rate's shift: a differential pair moves by two cells.
@@ -138,9 +154,14 @@ mod tests {
     fn the_banks_of_a_target_excite_and_inhibit_it() {
         for wiring in [Wiring::Dual, Wiring::DualReadout, Wiring::Single] {
             for &target in wiring.targets() {
-                let [e, i] = wiring.banks(target).map(|at| wiring.pathways()[at]);
-                assert_eq!((e.target, i.target), (target, target));
-                assert_eq!((e.polarity, i.polarity), (Excites, Inhibits));
+                for pair in wiring.pairs(target) {
+                    let [e, i] = pair.map(|at| wiring.pathways()[at]);
+                    assert_eq!((e.target, i.target), (target, target));
+                    assert_eq!((e.polarity, i.polarity), (Excites, Inhibits));
+                }
+                let mine = wiring.pathways().iter().filter(|pathway| pathway.target == target);
+                assert_eq!(mine.count(), wiring.banks(target).len(), "every array is a bank once");
+                assert!(wiring.banks(target).len() <= BANKS_MAX);
             }
             assert!(wiring.pathways().is_sorted_by_key(|pathway| pathway.code));
         }

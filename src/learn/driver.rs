@@ -217,7 +217,7 @@ mod tests {
     use crate::chip::crossbar::kernel::Backend;
     use crate::chip::engine::Phase;
     use crate::chip::hardware::{DitherBits, Hardware};
-    use crate::chip::layer::{Layer, LayerSpec};
+    use crate::chip::layer::{DrivenBy, Layer, LayerSpec};
     use crate::chip::population::Wiring;
     use crate::learn::error::Centre;
     use crate::learn::route::Route;
@@ -239,6 +239,7 @@ mod tests {
             inputs: 2,
             units: 2,
             wiring: Wiring::Single,
+            driven_by: DrivenBy::Shared,
             activation: Activation::Identity,
             weight_max_log2: 2,
             gain_64ths: [64, 64],

@@ -8,7 +8,7 @@ use dalean::chip::engine::Phase;
 use dalean::chip::hardware::{
     Adc, AdcRange, DitherBits, DitherPattern, FloorKind, Hardware, Subtract, Window,
 };
-use dalean::chip::layer::LayerSpec;
+use dalean::chip::layer::{DrivenBy, LayerSpec};
 use dalean::chip::ledger::{During, Event};
 use dalean::chip::population::Wiring;
 use dalean::learn::error::Centre;
@@ -122,6 +122,7 @@ fn experiment(s: &Value) -> Experiment {
                 inputs: pair[0] as usize,
                 units: pair[1] as usize,
                 wiring: if last { Wiring::DualReadout } else { Wiring::Dual },
+                driven_by: if l == 0 { DrivenBy::Shared } else { DrivenBy::Streams },
                 activation: match text(&s["act"][l]) {
                     "relu" => Activation::Relu,
                     _ => Activation::Sigmoid(positive(&s["alpha"][l])),

@@ -27,8 +27,10 @@ impl Engine {
             let gates = unpack(&self.registers[layer].gates[Stream::P.index()], samples);
             let gates = Drives::new(&gates, samples);
             let kernel = Kernel::start(self.backend);
-            let [e, i] =
-                wiring.banks(Stream::P).map(|at| this.arrays[at].read_columns(&kernel, gates));
+            let [pair] = wiring.pairs(Stream::P) else {
+                unreachable!("rows that several pairs of a target share are not read backwards")
+            };
+            let [e, i] = pair.map(|at| this.arrays[at].read_columns(&kernel, gates));
             let stride = layout.rows_padded();
             for (e, i) in e.chunks_exact(stride).zip(i.chunks_exact(stride)) {
                 let rows = e.iter().zip(i).take(this.spec.inputs);
@@ -45,8 +47,9 @@ impl Engine {
         let [down, across] = this.tiles(&self.hardware).map(|n| n as u64);
         let (rows, columns) = (this.layout.rows as u64, this.layout.columns as u64);
         let reads = 2 * u64::from(self.hardware.slices()) * self.samples as u64;
-        for at in this.spec.wiring.banks(Stream::P) {
-            let code = self.layers[layer].spec.wiring.pathways()[at].code;
+        let wiring = this.spec.wiring;
+        for &at in wiring.banks(Stream::P) {
+            let code = wiring.pathways()[at].code;
             let during = During::ForwardColumns;
             self.charge(layer, code, during, Event::DacSlices, columns * down * reads);
             self.charge(layer, code, during, Event::CellReads, rows * columns * reads);

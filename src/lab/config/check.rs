@@ -8,7 +8,7 @@ use super::chip;
 use super::file::{DataFile, ExperimentFile, HardwareFile, LearningFile, NetworkFile, PerLayer};
 use super::quantity::Constants;
 use crate::chip::hardware::{Adc, Hardware, WriteScheme};
-use crate::chip::layer::LayerSpec;
+use crate::chip::layer::{DrivenBy, LayerSpec};
 use crate::chip::population::Wiring;
 use crate::learn::error::Centre;
 use crate::learn::route::Route;
@@ -404,6 +404,7 @@ impl Config {
                 inputs: sizes[layer],
                 units: sizes[layer + 1],
                 wiring,
+                driven_by: if layer == 0 { DrivenBy::Shared } else { DrivenBy::Streams },
                 activation: self.activations[layer],
                 weight_max_log2: self.weight_max_log2[layer],
                 gain_64ths: self.gain_64ths[usize::from(last)],

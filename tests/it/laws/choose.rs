@@ -4,7 +4,7 @@ use dalean::chip::hardware::{
     Adc, AdcRange, DitherBits, DitherPattern, FloorKind, Hardware, HardwareSpec, PulseCode,
     Subtract, Timing, Window, WriteScheme,
 };
-use dalean::chip::layer::{LayerSpec, Taps};
+use dalean::chip::layer::{DrivenBy, LayerSpec, Taps};
 use dalean::chip::population::Wiring;
 use dalean::num::fixed::*;
 use dalean::num::tables::{Activation, Positive};
@@ -173,6 +173,8 @@ pub(crate) fn net(sides: impl Strategy<Value = Vec<usize>>) -> impl Strategy<Val
         |((sides, hardware, layers, (hidden, last)), (seed, mantissa, potentiation_only))| {
             let mut numbers = Numbers(seed);
             let count = layers.len();
+            // now and then, stream p drives both
+            let shared: Vec<_> = (0..count).map(|_| numbers.within(0, 9) == 0).collect();
             let (mut specs, mut taps) = (vec![], vec![]);
             for (at, (activation, weight_max_log2, constant_row)) in layers.into_iter().enumerate()
             {
@@ -180,6 +182,11 @@ pub(crate) fn net(sides: impl Strategy<Value = Vec<usize>>) -> impl Strategy<Val
                     inputs: sides[at],
                     units: sides[at + 1],
                     wiring: if at + 1 == count { last } else { hidden },
+                    driven_by: if at == 0 || shared[at] {
+                        DrivenBy::Shared
+                    } else {
+                        DrivenBy::Streams
+                    },
                     activation,
                     weight_max_log2,
                     gain_64ths: [96, 32],

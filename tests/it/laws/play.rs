@@ -372,6 +372,10 @@ pub(crate) fn law(
 fn compare_step(engine: &Engine, shadow: &Shadow, op: &Op) -> Result<(), String> {
     for (phase, want) in Phase::ALL.into_iter().zip(&shadow.ledgers) {
         compare_ledgers(engine.ledger(phase), want)?;
+        let (got, want) = (engine.samples_loaded(phase), shadow.loaded[phase as usize]);
+        if got != want {
+            return Err(format!("{got} samples were loaded in {phase:?}, not {want}"));
+        }
     }
     let last = shadow.layers.len() - 1;
     match op {
@@ -407,16 +411,16 @@ pub(crate) fn compare_ledgers(got: &Ledger, want: &Ledger) -> Result<(), String>
 
 fn compare_outputs(engine: &Engine, shadow: &Shadow) -> Result<(), String> {
     let layer = shadow.layers.last().unwrap();
-    for (sample, row) in layer.accumulators[0].iter().enumerate() {
-        for (unit, &want) in row.iter().enumerate() {
-            let got = engine.output_accumulator(sample, unit);
-            if got != want {
-                return Err(format!("accumulator {sample}, {unit} is {got}, not {want}"));
-            }
-            let (got, want) =
-                (engine.output_activity(sample, unit), layer.activity[0][sample][unit]);
-            if i64::from(got) != want {
-                return Err(format!("activity {sample}, {unit} is {got}, not {want}"));
+    for &stream in layer.spec.wiring.targets() {
+        let (sums, activity) =
+            (&layer.accumulators[stream.index()], &layer.activity[stream.index()]);
+        for (sample, (sums, activity)) in sums.iter().zip(activity).enumerate() {
+            for (unit, want) in sums.iter().zip(activity).enumerate() {
+                let got = engine.output(stream, sample, unit);
+                if (&got.0, &i64::from(got.1)) != want {
+                    let what = format!("{stream:?} {sample}, {unit}");
+                    return Err(format!("output of {what} is {got:?}, not {want:?}"));
+                }
             }
         }
     }

@@ -72,11 +72,13 @@ fn compare(engine: &Engine, tick: &Network, outputs: bool) -> Result<(), String>
         }
     }
     if outputs {
-        let units = engine.layers().last().unwrap().spec.units;
-        for (sample, unit) in (0..engine.samples()).flat_map(|s| (0..units).map(move |u| (s, u))) {
-            let sum = engine.output_accumulator(sample, unit);
-            if (sum, engine.output_activity(sample, unit)) != tick.output(sample, unit) {
-                return Err(format!("output {unit} of sample {sample} differs"));
+        let spec = &engine.layers().last().unwrap().spec;
+        for &stream in spec.wiring.targets() {
+            let places = (0..engine.samples()).flat_map(|s| (0..spec.units).map(move |u| (s, u)));
+            for (sample, unit) in places {
+                if engine.output(stream, sample, unit) != tick.output(stream, sample, unit) {
+                    return Err(format!("output {unit} of {stream:?}, sample {sample} differs"));
+                }
             }
         }
     }

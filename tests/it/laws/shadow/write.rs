@@ -88,7 +88,7 @@ impl Shadow {
         let hw = self.net.hardware.clone();
         let slices = u64::from(hw.drive.bits.get().div_ceil(hw.drive.dac_bits));
         let times = 2 * slices * self.samples as u64;
-        for at in banks {
+        for &at in banks {
             let code = self.code(layer, at);
             for (high, wide) in tile_sizes(rows, columns, hw.tile.rows, hw.tile.columns) {
                 for (event, count) in [
