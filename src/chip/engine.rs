@@ -31,6 +31,8 @@ mod currents;
 mod each;
 mod error;
 mod forward;
+#[cfg(test)]
+mod pairs;
 mod passes;
 mod pulses;
 mod read;
@@ -38,7 +40,9 @@ mod schedule;
 mod tape;
 pub mod tick;
 mod trains;
+mod unit;
 mod update;
+mod words;
 
 use each::{MOVE, each};
 use schedule::Schedule;
@@ -46,6 +50,7 @@ use schedule::Schedule;
 pub use calibrate::Calibration;
 pub use pulses::{Pulses, TilePeaks, active};
 pub use tape::Recorded;
+pub use unit::{Centre, ErrorUnit};
 
 /// Which side of a crossbar is driven.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -99,7 +104,8 @@ pub enum Operation<'a> {
         layer: usize,
         /// Which of the loaded samples.
         samples: Range<usize>,
-        /// `width` words a sample, for stream p; stream n latches them negated.
+        /// Output words, as many a sample as the layer's delivery takes: its own words are formed of them, for stream
+        /// p; stream n latches them negated.
         words: &'a [i16],
         /// Whether they are the words of the `ERR` before, which both layers hear at once.
         shared: bool,
@@ -228,6 +234,7 @@ pub struct Engine {
     collect: Collect,
     /// Rate mantissa.
     mantissa: u32,
+    unit: ErrorUnit,
     layers: Vec<Layer>,
     /// What units hand on and how steep they are there, by layer.
     tables: Vec<LookUp>,
@@ -265,13 +272,17 @@ impl Engine {
         let tables = layers.iter().zip(0..).map(|(l, at)| l.look_up(codes(at))).collect();
         let collect = passes::collect(&hardware);
         Self {
-            hardware,
             backend,
             team: Team::new(backend, 1),
             seed,
             potentiation_only: false,
             collect,
             mantissa: 1,
+            unit: ErrorUnit::new(
+                Centre::None,
+                hardware.digital.error_bits,
+                layers[last].spec.units,
+            ),
             registers: vec![Registers::default(); layers.len()],
             currents: vec![[[0; 2]; 2]; layers.len()],
             row_sums: vec![None; layers.len()],
@@ -283,6 +294,7 @@ impl Engine {
             ledgers: [ledger.clone(), ledger.clone(), ledger],
             schedule,
             tape: None,
+            hardware,
         }
     }
 
@@ -327,14 +339,6 @@ impl Engine {
     /// Ends what overlaps in time: the cycles of all operations so far are in the ledger.
     pub fn settle(&mut self) {
         self.time(Schedule::settle);
-    }
-
-    /// The error unit takes the mean of so many words over a batch.
-    pub fn centre(&mut self, samples: usize, words: usize) {
-        if let Some(tape) = &mut self.tape {
-            tape.push(Recorded::Centre { samples, words });
-        }
-        self.time(|schedule, cycles| schedule.centre(cycles, samples, words));
     }
 
     /// Counts cycles, if there is a timing.
@@ -382,7 +386,7 @@ impl Engine {
         &self.ledgers[phase as usize]
     }
 
-    /// A ledger, to restore a state or to charge what digital logic beside the tiles did.
+    /// A ledger, to restore a state.
     pub const fn ledger_mut(&mut self, phase: Phase) -> &mut Ledger {
         &mut self.ledgers[phase as usize]
     }
@@ -477,7 +481,10 @@ impl Engine {
             Operation::Forward { layer, side: Side::Rows } => self.forward(layer),
             Operation::Forward { layer, side: Side::Columns } => self.forward_columns(layer),
             Operation::Error { layer, ref samples, words, shared } => {
-                self.error(layer, samples.clone(), words);
+                let direct = self.layers[layer].delivery.is_direct();
+                assert!(direct || !shared, "formed words are heard by one layer");
+                let words = self.layer_words(layer, samples, words);
+                self.error(layer, samples.clone(), &words);
                 self.time(|schedule, cycles| schedule.error(cycles, layer, samples, shared));
             }
             Operation::Update { layer, write, ref samples, shift } => {

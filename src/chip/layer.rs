@@ -1,4 +1,4 @@
-//! A dense layer: its arrays, its table, its taps and its converters; and the plan that proves it fits.
+//! A dense layer: its arrays, its table, how errors reach it and its converters; and the plan that proves it fits.
 //!
 //! Layers with cells are numbered from 0 at the input. A layer of K inputs and N units is one unsigned K x N array a
 //! pathway, cut into tiles of `tile_rows` x `tile_columns`. A constant row, if any, is the last row. See
@@ -15,6 +15,10 @@ use super::periphery;
 use super::population::{Stream, Wiring};
 use crate::num::fixed::DriveBits;
 use crate::num::tables::{Activation, Lut, Unit};
+
+mod delivery;
+
+pub use delivery::{Delivery, Taps, WordSource};
 
 /// Whose codes are on the rows of an array.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -71,28 +75,6 @@ impl LayerSpec {
     pub fn follows(&self, below: &Self) -> bool {
         let given = below.wiring.targets();
         self.inputs == below.units && self.drive_sets().iter().all(|set| given.contains(set))
-    }
-}
-
-/// Which error words a unit latches: a static tap, no matrix.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Taps {
-    /// Words on the bus.
-    pub width: usize,
-    /// Words a unit adds.
-    pub per_unit: usize,
-    /// `[unit][tap]` word numbers.
-    pub words: Vec<u16>,
-    /// Shift of the sum of more than one word.
-    pub shift: u32,
-}
-
-impl Taps {
-    /// Unit c takes word c.
-    #[must_use]
-    pub fn identity(units: usize) -> Self {
-        let words = (0..units).map(|unit| u16::try_from(unit).expect("checked by the plan"));
-        Self { width: units, per_unit: 1, words: words.collect(), shift: 0 }
     }
 }
 
@@ -158,8 +140,8 @@ pub struct Layer {
     pub layout: Layout,
     /// Activation and derivative.
     pub lut: Lut,
-    /// Error taps.
-    pub taps: Taps,
+    /// How errors reach it.
+    pub delivery: Delivery,
     /// The arrays, in the order of [`Wiring::pathways`].
     pub arrays: Vec<Crossbar>,
     /// Writes each array has had.
@@ -171,7 +153,13 @@ pub struct Layer {
 impl Layer {
     /// A layer with every cell on the floor.
     #[must_use]
-    pub fn new(index: u16, spec: LayerSpec, taps: Taps, hardware: &Hardware) -> Self {
+    pub fn new(
+        index: u16,
+        spec: LayerSpec,
+        delivery: impl Into<Delivery>,
+        hardware: &Hardware,
+    ) -> Self {
+        let delivery = delivery.into();
         let rows = spec.inputs + usize::from(spec.constant_row);
         let layout = Layout { rows, columns: spec.units };
         let lut = Lut::new(spec.activation, hardware.digital.lut_bits, unit(&spec, hardware));
@@ -190,7 +178,7 @@ impl Layer {
             }
         };
         let writes = vec![0; arrays.len()];
-        Self { index, spec, layout, lut, taps, arrays, writes, adc_shifts }
+        Self { index, spec, layout, lut, delivery, arrays, writes, adc_shifts }
     }
 
     /// The table as kernels take it: what a unit hands on is its activity or, with `drive_bits`, the drive code of

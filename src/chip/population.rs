@@ -83,6 +83,10 @@ pub enum Wiring {
     DualReadout,
     /// One signed stream of differential pairs.
     Single,
+    /// Two populations whose four pathways are differential pairs: no rule uses it yet, so that it is here to show that
+    /// a target may have more than two banks.
+    #[cfg(test)]
+    DualPairs,
 }
 
 impl Wiring {
@@ -93,6 +97,8 @@ impl Wiring {
             Self::Dual => &[PP, NP, NN, PN],
             Self::DualReadout => &[PP, NP],
             Self::Single => &[PLUS, MINUS],
+            #[cfg(test)]
+            Self::DualPairs => &tests::PAIRS,
         }
     }
 
@@ -101,6 +107,8 @@ impl Wiring {
     pub const fn targets(self) -> &'static [Stream] {
         match self {
             Self::Dual => &[P, N],
+            #[cfg(test)]
+            Self::DualPairs => &[P, N],
             Self::DualReadout | Self::Single => &[P],
         }
     }
@@ -111,6 +119,8 @@ impl Wiring {
         match self {
             Self::Dual | Self::DualReadout => &[P, N],
             Self::Single => &[P],
+            #[cfg(test)]
+            Self::DualPairs => &[P, N],
         }
     }
 
@@ -118,9 +128,13 @@ impl Wiring {
     /// A pair is what a physical tile holds; what all pairs read adds up in the target's accumulators.
     #[must_use]
     pub const fn pairs(self, target: Stream) -> &'static [[usize; 2]] {
-        match target {
-            P => &[[0, 1]],
-            N => &[[2, 3]],
+        match (self, target) {
+            #[cfg(test)]
+            (Self::DualPairs, P) => &[[0, 4], [1, 5]],
+            #[cfg(test)]
+            (Self::DualPairs, N) => &[[2, 6], [3, 7]],
+            (_, P) => &[[0, 1]],
+            (_, N) => &[[2, 3]],
         }
     }
 
@@ -142,6 +156,8 @@ impl Wiring {
         match self {
             Self::Dual | Self::DualReadout => 0,
             Self::Single => 1,
+            #[cfg(test)]
+            Self::DualPairs => 1,
         }
     }
 }
@@ -150,9 +166,22 @@ impl Wiring {
 mod tests {
     use super::*;
 
+    /// Pathways of [`Wiring::DualPairs`].
+    pub(super) const PAIRS: [Pathway; 8] = [
+        pathway(0, "pp", P, P, Excites),
+        pathway(1, "np", N, P, Excites),
+        pathway(2, "nn", N, N, Excites),
+        pathway(3, "pn", P, N, Excites),
+        pathway(4, "pp_i", P, P, Inhibits),
+        pathway(5, "np_i", N, P, Inhibits),
+        pathway(6, "nn_i", N, N, Inhibits),
+        pathway(7, "pn_i", P, N, Inhibits),
+    ];
+
     #[test]
     fn the_banks_of_a_target_excite_and_inhibit_it() {
-        for wiring in [Wiring::Dual, Wiring::DualReadout, Wiring::Single] {
+        let all = [Wiring::Dual, Wiring::DualReadout, Wiring::Single, Wiring::DualPairs];
+        for wiring in all {
             for &target in wiring.targets() {
                 for pair in wiring.pairs(target) {
                     let [e, i] = pair.map(|at| wiring.pathways()[at]);

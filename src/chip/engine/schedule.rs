@@ -8,7 +8,8 @@
 //!                sum_l (1 + T_fwd(l)) + (B - 1) max_l (1 + again(l))
 //! rounds     ERR, FWD(columns), UPD(add), UPD(now), sample by sample in the order of the list; in a round a run of
 //!            ERR with the same words is heard by all their layers at once, and a run of UPD on different layers
-//!            goes side by side:  sum_b ( 1 + T_err + ... + 1 + max_l T_upd(l, b) )
+//!            goes side by side:  sum_b ( 1 + T_err + ... + 1 + max_l T_upd(l, b) ); words that the error unit forms for
+//!            a layer are formed before its ERR, while nothing else happens
 //! writes     UPD(write) on different layers side by side:  1 + max_l T_write(l)
 //! loads      LOADW, a row a cycle
 //! ```
@@ -37,6 +38,8 @@ struct Shape {
     levels: [u64; 2],
     /// Words on the bus.
     words: u64,
+    /// Cycles in which the error unit forms the words of a sample.
+    form: u64,
 }
 
 /// Layers whose commands of one kind run at the same time.
@@ -160,7 +163,8 @@ impl Schedule {
                 rows: layer.layout.rows.min(hardware.tile.rows) as u64,
                 columns: layer.layout.columns.min(hardware.tile.columns) as u64,
                 levels: [tree_levels(down * pairs), tree_levels(across)],
-                words: layer.taps.width as u64,
+                words: layer.delivery.taps.width as u64,
+                form: timing.form(layer.delivery.terms() as u64),
             }
         };
         Self {
@@ -261,6 +265,10 @@ impl Schedule {
         let (t, shape) = (self.timing, self.shapes[layer]);
         let one = t.accept() + t.error(shape.words, shape.columns);
         for round in self.rounds(cycles, samples) {
+            if shape.form > 0 {
+                round.close();
+                round.passed[Interval::Error as usize] += shape.form;
+            }
             round.join(Doing::Hearing, layer, one, !shared);
         }
         let count = samples.len() as u64;

@@ -5,10 +5,10 @@ use crate::chip::crossbar::kernel::Backend;
 use crate::chip::crossbar::{initial_levels, initial_scale};
 use crate::chip::engine::{Engine, Operation};
 use crate::chip::hardware::Hardware;
-use crate::chip::layer::{self, Layer, LayerSpec, PlanError};
+use crate::chip::layer::{self, Delivery, Layer, LayerSpec, PlanError};
 use crate::learn::driver::{Driver, Learning};
 use crate::learn::error::{Centre, ErrorUnit};
-use crate::learn::route::{Delivery, Route};
+use crate::learn::route::Route;
 use crate::learn::rule::{Rule, UpdateMode};
 use crate::num::draw::{Place, Site};
 use crate::num::fixed::{Batch, RateMantissa};
@@ -86,28 +86,17 @@ impl Experiment {
         let bits = self.hardware.digital.error_bits;
         let outputs = self.layers.last().expect("checked: at least one layer").units;
         let last = self.layers.len() - 1;
-        let deliveries: Vec<Delivery> = self
-            .layers
-            .iter()
-            .enumerate()
-            .map(|(at, spec)| match self.rule {
-                _ if at == last => Delivery::output(outputs, bits),
-                Rule::Bp => Delivery::own(spec.units, bits),
+        let layers = self.layers.iter().zip(0u16..).map(|(spec, index)| {
+            let delivery = match self.rule {
+                _ if usize::from(index) == last => Delivery::output(outputs),
+                Rule::Bp => Delivery::above(spec.units),
                 Rule::Ed | Rule::Kaneko | Rule::Dfa => {
-                    let index = u16::try_from(at).expect("checked: few layers");
-                    Delivery::hidden(self.route, spec.units, outputs, bits, self.seed, index)
+                    self.route.delivery(spec.units, outputs, self.seed, index)
                 }
-            })
-            .collect();
-        let layers: Vec<Layer> = self
-            .layers
-            .iter()
-            .zip(&deliveries)
-            .zip(0u16..)
-            .map(|((spec, delivery), index)| {
-                Layer::new(index, spec.clone(), delivery.taps().clone(), &self.hardware)
-            })
-            .collect();
+            };
+            Layer::new(index, spec.clone(), delivery, &self.hardware)
+        });
+        let layers: Vec<Layer> = layers.collect();
         let updates = self.updates_per_epoch(samples) * u64::from(self.epochs);
         let shifts = layers.iter().zip(&self.rates).map(|(layer, &rate)| {
             let rate = Rate {
@@ -120,8 +109,7 @@ impl Experiment {
             };
             rate.shifts(self.decay, updates)
         });
-        let learning =
-            Learning { rule: self.rule, mode: self.mode, deliveries, shifts: shifts.collect() };
+        let learning = Learning { rule: self.rule, mode: self.mode, shifts: shifts.collect() };
         let mut engine = Engine::new(self.hardware.clone(), backend, self.seed, layers);
         engine.set_potentiation_only(self.rule == Rule::Kaneko);
         engine.set_mantissa(self.mantissa.get());

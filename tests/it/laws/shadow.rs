@@ -7,14 +7,16 @@ use std::ops::Range;
 
 use dalean::chip::engine::{Calibration, Phase};
 use dalean::chip::hardware::{Adc, AdcRange, Subtract};
-use dalean::chip::layer::{self, DrivenBy, LayerSpec, Taps};
+use dalean::chip::layer::{self, Delivery, DrivenBy, LayerSpec};
 use dalean::chip::ledger::{During, Event, Ledger};
 use dalean::chip::population::{Polarity, Stream};
+use dalean::learn::error::Centre;
 use dalean::num::tables::Lut;
 
 use super::choose::Net;
 use super::fault::Fault;
 
+mod unit;
 mod write;
 
 /// `(v + 2^(s-1)) >> s`, in numbers so wide that nothing can wrap.
@@ -50,7 +52,7 @@ pub(crate) struct Array {
 #[derive(Debug, Clone)]
 pub(crate) struct Side {
     pub(crate) spec: LayerSpec,
-    taps: Taps,
+    delivery: Delivery,
     lut: Lut,
     rows: usize,
     pub(crate) arrays: Vec<Array>,
@@ -72,6 +74,8 @@ pub(crate) struct Shadow {
     samples: usize,
     /// Samples loaded so far, by phase.
     pub(crate) loaded: [u64; 3],
+    /// Running means of the error unit.
+    pub(crate) means: Vec<i64>,
     phase: Phase,
     pub(crate) ledgers: [Ledger; 3],
 }
@@ -84,7 +88,7 @@ impl Shadow {
     pub(crate) fn new(net: &Net, fault: Option<Fault>) -> Self {
         let hw = &net.hardware;
         let floor = i64::from(hw.cell.window.floor());
-        let layers = net.specs.iter().zip(&net.taps).map(|(spec, taps)| {
+        let layers = net.specs.iter().zip(&net.deliveries).map(|(spec, delivery)| {
             let rows = spec.inputs + usize::from(spec.constant_row);
             let array = Array {
                 level: table(rows, spec.units, floor),
@@ -111,7 +115,7 @@ impl Shadow {
             };
             Side {
                 spec: spec.clone(),
-                taps: taps.clone(),
+                delivery: delivery.clone(),
                 lut: Lut::new(spec.activation, hw.digital.lut_bits, layer::unit(spec, hw)),
                 rows,
                 arrays: vec![array; spec.wiring.pathways().len()],
@@ -125,12 +129,14 @@ impl Shadow {
             }
         });
         let ledger = Ledger::new(net.specs.len());
+        let outputs = net.specs.last().unwrap().units;
         Self {
             net: net.clone(),
             fault,
             layers: layers.collect(),
             samples: 0,
             loaded: [0; 3],
+            means: if net.centre == Centre::Running { vec![0; outputs] } else { vec![] },
             phase: Phase::Training,
             ledgers: [ledger.clone(), ledger.clone(), ledger],
         }

@@ -17,10 +17,12 @@ use crate::chip::population::Stream;
 
 mod layer;
 mod segment;
+mod unit;
 mod watch;
 
 use layer::TickLayer;
 use segment::Segment;
+use unit::Unit;
 use watch::Watch;
 pub use watch::{Span, TileAt};
 
@@ -29,6 +31,7 @@ pub use watch::{Span, TileAt};
 pub struct Network {
     timing: Timing,
     layers: Vec<TickLayer>,
+    unit: Unit,
     samples: usize,
     phase: Phase,
     ledgers: [Ledger; 3],
@@ -43,7 +46,7 @@ struct Order<'a> {
     layer: usize,
     command: Command<'a>,
     during: During,
-    /// Words on the bus while it lasts.
+    /// Output words of an `ERR`; while it is played, the words on the bus.
     words: &'a [i16],
 }
 
@@ -61,6 +64,7 @@ impl Network {
         Self {
             timing,
             layers: layers.collect(),
+            unit: Unit::new(hardware),
             samples: 0,
             phase: Phase::Training,
             ledgers: [ledger.clone(), ledger.clone(), ledger],
@@ -158,24 +162,14 @@ impl Network {
         self.watch.look(self.clock, &self.layers);
     }
 
-    /// The error unit takes the mean over a batch.
-    pub fn centre(&mut self, samples: usize, words: usize) {
-        let start = self.clock;
-        for _ in 0..self.timing.beat * (samples * words + words) as u64 {
-            self.begin(Interval::Centre);
-            self.end();
-        }
-        self.watch.span(Span { layer: None, name: "mean", sample: None, start, end: self.clock });
-    }
-
     /// Plays what an engine has recorded.
     pub fn play_tape(&mut self, tape: &[Recorded]) {
-        let error_unit = |recorded: &Recorded| matches!(recorded, Recorded::Centre { .. });
+        let error_unit = |recorded: &Recorded| matches!(recorded, Recorded::Words { .. });
         for stretch in tape.split_inclusive(error_unit) {
             let operations: Vec<_> = stretch.iter().filter_map(Recorded::operation).collect();
             self.run(&operations);
-            if let Some(&Recorded::Centre { samples, words }) = stretch.last() {
-                self.centre(samples, words);
+            if let Some(Recorded::Words { errors }) = stretch.last() {
+                self.output_words(errors);
             }
         }
     }
@@ -322,7 +316,7 @@ impl Network {
         let slot = sample;
         match *operation {
             Operation::Error { layer, words, shared, .. } => {
-                let width = self.layers[layer].width;
+                let width = self.layers[layer].delivery.output_words();
                 let words = &words[(sample - range.start) * width..][..width];
                 let command = Command::Error { slot };
                 (Order { layer, command, during: During::Error, words }, Interval::Error, !shared)
@@ -345,14 +339,21 @@ impl Network {
 
     fn play_in_round(&mut self, orders: &[(Order<'_>, Interval, bool)], sample: usize) {
         let interval = orders[0].1;
-        let plain: Vec<_> = orders.iter().map(|order| order.0).collect();
+        let formed: Vec<Vec<i16>> =
+            orders.iter().map(|(order, ..)| self.layer_words(order, sample)).collect();
+        let plain = orders.iter().zip(&formed);
+        let plain: Vec<_> = plain.map(|((order, ..), words)| Order { words, ..*order }).collect();
         self.play(&plain, interval);
         for order in &plain {
             let layer = &mut self.layers[order.layer];
             match order.command {
                 Command::Error { slot } => layer.share_gates(slot),
                 Command::Now { .. } => layer.written(),
-                Command::Columns { .. } => layer.keep_backward(sample),
+                Command::Columns { .. } => {
+                    layer.keep_backward(sample, self.samples);
+                    let (code, bits) = (layer.unit_code(Stream::P), 16 * layer.inputs as u64);
+                    self.charge(order.layer, code, order.during, Event::SramBits, bits);
+                }
                 _ => {}
             }
         }
@@ -435,8 +436,8 @@ impl Network {
         let updating = during == During::Update;
         let sums = if updating && !now { 64 * (e.accumulates + e.delta_computations) } else { 0 };
         let rests = 2 * hardware.residual_bits * e.delta_computations;
-        let drives =
-            if during == During::ForwardRows { hardware.dac_bits * e.dac_slices } else { 0 };
+        // every slice that is driven comes out of a memory, of codes or of gates
+        let drives = hardware.dac_bits * e.dac_slices;
         vec![
             (Event::DacSlices, e.dac_slices),
             (Event::CellReads, e.cell_reads),

@@ -12,7 +12,7 @@ use std::ops::Range;
 use super::super::tile::{BankEvents, Command, Launch, Tile, TileEvents, TileSize};
 use crate::chip::hardware::timing::tree_levels;
 use crate::chip::hardware::{DitherPattern, Hardware, Timing, WriteScheme};
-use crate::chip::layer::{DrivenBy, Layer};
+use crate::chip::layer::{Delivery, DrivenBy, Layer};
 use crate::chip::ledger::During;
 use crate::chip::periphery;
 use crate::chip::population::{Stream, Wiring};
@@ -35,7 +35,8 @@ pub(super) struct TickLayer {
     pub(super) tiles: Vec<Tile>,
     pub(super) inputs: usize,
     pub(super) columns: usize,
-    pub(super) width: usize,
+    pub(super) delivery: Delivery,
+    pub(super) weight_max_log2: i32,
     pub(super) memory: Memory,
     /// Accumulator and activity by target stream and sample, of what was read last.
     pub(super) outputs: [Vec<(i64, u8)>; 2],
@@ -78,7 +79,8 @@ impl TickLayer {
             tiles: vec![],
             inputs: layer.spec.inputs,
             columns,
-            width: layer.taps.width,
+            delivery: layer.delivery.clone(),
+            weight_max_log2: layer.spec.weight_max_log2,
             memory: Memory {
                 dac_bits: hardware.drive.dac_bits.into(),
                 residual_bits: hardware.write.residual_bits.get().into(),
@@ -309,11 +311,12 @@ impl TickLayer {
         }
     }
 
-    pub(super) fn keep_backward(&mut self, sample: usize) {
-        self.backward.truncate(sample * self.inputs);
+    /// Keeps what the last transposed read of a sample, of so many, gave.
+    pub(super) fn keep_backward(&mut self, sample: usize, samples: usize) {
+        self.backward.resize(samples * self.inputs, 0);
         for row in 0..self.inputs {
             let head = &self.tiles[self.at(self.heads(Stream::P), row / self.tile[0], 0)];
-            self.backward.push(head.backward_sum(row % self.tile[0]));
+            self.backward[sample * self.inputs + row] = head.backward_sum(row % self.tile[0]);
         }
     }
 
