@@ -7,3 +7,4 @@ pub mod layer;
 pub mod ledger;
 pub mod periphery;
 pub mod population;
+pub mod state;

@@ -40,7 +40,7 @@
 //!     for pathway in trainer.statistics() {
 //!         println!("layer {} {}: {} deaths", pathway.layer, pathway.name, pathway.deaths);
 //!     }
-//!     hashes.push(hash::state(trainer.driver()));
+//!     hashes.push(hash::state(&mut trainer));
 //! }
 //! assert_eq!(hashes[0], hashes[1]); // levels, counters, everything
 //! # Ok(())

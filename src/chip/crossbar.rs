@@ -18,6 +18,7 @@ use layout::{BLOCK_CELLS, BLOCK_ROWS, HALF_CELLS, HALF_COLUMNS, Layout, PANEL_CO
 pub mod kernel;
 pub mod layout;
 mod pulses;
+mod state;
 mod trains;
 mod write;
 

@@ -37,6 +37,7 @@ mod passes;
 mod pulses;
 mod read;
 mod schedule;
+mod state;
 mod tape;
 pub mod tick;
 mod trains;

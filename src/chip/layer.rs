@@ -17,6 +17,7 @@ use crate::num::fixed::DriveBits;
 use crate::num::tables::{Activation, Lut, Unit};
 
 mod delivery;
+mod state;
 
 pub use delivery::{Delivery, Taps, WordSource};
 

@@ -5,91 +5,112 @@
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
 pub mod cycles;
+mod state;
 
 pub use cycles::{Cycles, Interval, Part};
 
-/// What can happen. The order is part of the state hash: append only.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[repr(usize)]
-pub enum Event {
-    /// A row DAC applied one slice of a drive code.
-    DacSlices,
-    /// A cell carried a read current.
-    CellReads,
-    /// A column's current was sampled and held.
-    Holds,
-    /// A converter turned a current into a code.
-    Conversions,
-    /// A code was added to an accumulator.
-    ShiftAdds,
-    /// An accumulator was looked up (activation and derivative in one access).
-    LookUps,
-    /// An error word was multiplied with a derivative.
-    Multiplies,
-    /// A word crossed the error bus.
-    BusWords,
-    /// A product of drive and gate was added to a cell's digital accumulator.
-    Accumulates,
-    /// A cell's increment was computed (rounded and bounded).
-    DeltaComputations,
-    /// A cell's level was loaded.
-    CellLoads,
-    /// A cell's increment was not 0 before the bound.
-    Requested,
-    /// A cell's increment was changed by the bound.
-    Bounded,
-    /// A pulse was given to a cell.
-    PulsesAttempted,
-    /// A pulse moved a cell's level.
-    PulsesEffective,
-    /// A conversion hit its rail.
-    SaturatedConversions,
-    /// A table index hit its end.
-    SaturatedLookUps,
-    /// An error word hit its rail.
-    SaturatedErrors,
-    /// A gate hit its rail.
-    SaturatedGates,
-    /// A row of a tile was pulsed: its drivers and the lines of all its columns moved.
-    RowPulses,
-    /// A cell was read to see what a pulse had done.
-    VerifyReads,
-    /// A bit went into or came out of a digital memory beside the tiles.
-    SramBits,
+/// Enums whose variants have a code that files and hashes use, and a name: said once, in one table. Codes are never
+/// reused.
+macro_rules! coded {
+    ($(#[$doc:meta])* $name:ident {
+        $($(#[doc = $of:literal])* $(#[cfg($cfg:meta)])? $variant:ident = $code:literal, $word:literal;)*
+    }) => {
+        $(#[$doc])*
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+        #[repr(usize)]
+        pub enum $name {
+            $($(#[doc = $of])* $(#[cfg($cfg)])? $variant = $code,)*
+        }
+
+        impl $name {
+            /// How many there are.
+            pub const COUNT: usize = [$($(#[cfg($cfg)])? $code,)*].len();
+
+            /// All of them, in the order of their codes.
+            pub const ALL: [Self; Self::COUNT] = [$($(#[cfg($cfg)])? Self::$variant,)*];
+
+            /// Code in hashes and checkpoints.
+            #[must_use]
+            pub const fn code(self) -> u32 {
+                self as u32
+            }
+
+            /// The one with a code.
+            #[must_use]
+            pub fn of_code(code: u64) -> Option<Self> {
+                Self::ALL.into_iter().find(|one| u64::from(one.code()) == code)
+            }
+
+            /// Name in files.
+            #[must_use]
+            pub const fn name(self) -> &'static str {
+                match self {
+                    $($(#[cfg($cfg)])? Self::$variant => $word,)*
+                }
+            }
+        }
+    };
+}
+
+coded! {
+    /// What can happen.
+    Event {
+        /// A row DAC applied one slice of a drive code.
+        DacSlices = 0, "dac_slices";
+        /// A cell carried a read current.
+        CellReads = 1, "cell_reads";
+        /// A column's current was sampled and held.
+        Holds = 2, "holds";
+        /// A converter turned a current into a code.
+        Conversions = 3, "conversions";
+        /// A code was added to an accumulator.
+        ShiftAdds = 4, "shift_adds";
+        /// An accumulator was looked up (activation and derivative in one access).
+        LookUps = 5, "look_ups";
+        /// An error word was multiplied with a derivative.
+        Multiplies = 6, "multiplies";
+        /// A word crossed the error bus.
+        BusWords = 7, "bus_words";
+        /// A product of drive and gate was added to a cell's digital accumulator.
+        Accumulates = 8, "accumulates";
+        /// A cell's increment was computed (rounded and bounded).
+        DeltaComputations = 9, "delta_computations";
+        /// A cell's level was loaded.
+        CellLoads = 10, "cell_loads";
+        /// A cell's increment was not 0 before the bound.
+        Requested = 11, "requested";
+        /// A cell's increment was changed by the bound.
+        Bounded = 12, "bounded";
+        /// A pulse was given to a cell.
+        PulsesAttempted = 13, "pulses_attempted";
+        /// A pulse moved a cell's level.
+        PulsesEffective = 14, "pulses_effective";
+        /// A conversion hit its rail.
+        SaturatedConversions = 15, "saturated_conversions";
+        /// A table index hit its end.
+        SaturatedLookUps = 16, "saturated_look_ups";
+        /// An error word hit its rail.
+        SaturatedErrors = 17, "saturated_errors";
+        /// A gate hit its rail.
+        SaturatedGates = 18, "saturated_gates";
+        /// A row of a tile was pulsed: its drivers and the lines of all its columns moved.
+        RowPulses = 19, "row_pulses";
+        /// A cell was read to see what a pulse had done.
+        VerifyReads = 20, "verify_reads";
+        /// A bit went into or came out of a digital memory beside the tiles.
+        SramBits = 21, "sram_bits";
+        /// What a later program counts and no run of this one ever does.
+        #[cfg(feature = "grown")]
+        Grown = 22, "grown";
+    }
 }
 
 impl Event {
-    /// All events, in order.
-    pub const ALL: [Self; 22] = [
-        Self::DacSlices,
-        Self::CellReads,
-        Self::Holds,
-        Self::Conversions,
-        Self::ShiftAdds,
-        Self::LookUps,
-        Self::Multiplies,
-        Self::BusWords,
-        Self::Accumulates,
-        Self::DeltaComputations,
-        Self::CellLoads,
-        Self::Requested,
-        Self::Bounded,
-        Self::PulsesAttempted,
-        Self::PulsesEffective,
-        Self::SaturatedConversions,
-        Self::SaturatedLookUps,
-        Self::SaturatedErrors,
-        Self::SaturatedGates,
-        Self::RowPulses,
-        Self::VerifyReads,
-        Self::SramBits,
-    ];
-
-    /// Whether the count belongs to the state that is hashed. What depends on how arrays are cut into tiles, on
-    /// timing or on memories beside them does not: re-tiling with ideal converters changes no state.
+    /// Whether the count follows from how arrays are cut into tiles, from timing or from memories beside them. Such
+    /// counts are no part of the state hash: re-tiling with ideal converters changes no state.
     #[must_use]
-    pub const fn is_state(self) -> bool {
-        !matches!(
+    pub const fn moves_with_tiling(self) -> bool {
+        matches!(
             self,
             Self::DacSlices
                 | Self::Holds
@@ -100,75 +121,28 @@ impl Event {
                 | Self::SramBits
         )
     }
-
-    /// Name in files.
-    #[must_use]
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::DacSlices => "dac_slices",
-            Self::CellReads => "cell_reads",
-            Self::Holds => "holds",
-            Self::Conversions => "conversions",
-            Self::ShiftAdds => "shift_adds",
-            Self::LookUps => "look_ups",
-            Self::Multiplies => "multiplies",
-            Self::BusWords => "bus_words",
-            Self::Accumulates => "accumulates",
-            Self::DeltaComputations => "delta_computations",
-            Self::CellLoads => "cell_loads",
-            Self::Requested => "requested",
-            Self::Bounded => "bounded",
-            Self::PulsesAttempted => "pulses_attempted",
-            Self::PulsesEffective => "pulses_effective",
-            Self::SaturatedConversions => "saturated_conversions",
-            Self::SaturatedLookUps => "saturated_look_ups",
-            Self::SaturatedErrors => "saturated_errors",
-            Self::SaturatedGates => "saturated_gates",
-            Self::RowPulses => "row_pulses",
-            Self::VerifyReads => "verify_reads",
-            Self::SramBits => "sram_bits",
-        }
-    }
 }
 
-/// The operation during which something happened.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[repr(usize)]
-pub enum During {
-    /// `LOADW`.
-    LoadWeights,
-    /// `FWD(rows)`.
-    ForwardRows,
-    /// `FWD(columns)`.
-    ForwardColumns,
-    /// `ERR`.
-    Error,
-    /// `UPD`.
-    Update,
-}
-
-impl During {
-    /// All operations, in order.
-    pub const ALL: [Self; 5] =
-        [Self::LoadWeights, Self::ForwardRows, Self::ForwardColumns, Self::Error, Self::Update];
-
-    /// Name in files.
-    #[must_use]
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::LoadWeights => "load_weights",
-            Self::ForwardRows => "forward_rows",
-            Self::ForwardColumns => "forward_columns",
-            Self::Error => "error",
-            Self::Update => "update",
-        }
+coded! {
+    /// The operation during which something happened.
+    During {
+        /// `LOADW`.
+        LoadWeights = 0, "load_weights";
+        /// `FWD(rows)`.
+        ForwardRows = 1, "forward_rows";
+        /// `FWD(columns)`.
+        ForwardColumns = 2, "forward_columns";
+        /// `ERR`.
+        Error = 3, "error";
+        /// `UPD`.
+        Update = 4, "update";
     }
 }
 
 /// Pathway codes a layer can have.
 pub const PATHWAYS: usize = 8;
-const EVENTS: usize = Event::ALL.len();
-const OPERATIONS: usize = During::ALL.len();
+const EVENTS: usize = Event::COUNT;
+const OPERATIONS: usize = During::COUNT;
 
 /// Counts by layer, pathway code, operation and event.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -199,6 +173,11 @@ impl Ledger {
     /// Cycles, to count them or to restore a state.
     pub const fn cycles_mut(&mut self) -> Option<&mut Cycles> {
         self.cycles.as_mut()
+    }
+
+    /// Sets every count to 0.
+    fn forget_counts(&mut self) {
+        self.counts.fill([[[0; EVENTS]; OPERATIONS]; PATHWAYS]);
     }
 
     /// Adds `count` events.
@@ -251,9 +230,11 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_order_of_events_and_operations_is_their_number() {
-        assert!(Event::ALL.iter().enumerate().all(|(i, &e)| e as usize == i));
-        assert!(During::ALL.iter().enumerate().all(|(i, &d)| d as usize == i));
+    fn codes_are_places_and_come_back() {
+        assert!(Event::ALL.iter().enumerate().all(|(i, &e)| e.code() as usize == i));
+        assert!(During::ALL.iter().enumerate().all(|(i, &d)| d.code() as usize == i));
+        assert_eq!(Event::of_code(21), Some(Event::SramBits));
+        assert_eq!((Event::of_code(99), During::of_code(5)), (None, None));
     }
 
     #[test]

@@ -90,6 +90,18 @@ pub enum Wiring {
 }
 
 impl Wiring {
+    /// Name in files.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Dual => "dual",
+            Self::DualReadout => "dual_readout",
+            Self::Single => "single",
+            #[cfg(test)]
+            Self::DualPairs => "dual_pairs",
+        }
+    }
+
     /// The arrays, in code order.
     #[must_use]
     pub const fn pathways(self) -> &'static [Pathway] {

@@ -71,7 +71,7 @@ impl Meter {
     }
 
     /// Notes a finished epoch.
-    pub(super) fn epoch(&mut self, record: &EpochRecord) {
+    pub(super) fn epoch(&mut self, record: &EpochRecord, seconds: f64) {
         if self.quiet {
             return;
         }
@@ -90,7 +90,7 @@ impl Meter {
             percent(record.train),
             percent(record.validation),
             100.0 * floor as f64 / cells.max(1) as f64,
-            record.train_seconds,
+            seconds,
             &record.state_hash[..12],
         );
         self.line(&line);

@@ -131,10 +131,11 @@ pub(super) fn train(args: &TrainArgs) -> Done {
             }
             Event::Warning(warning) if quiet => eprintln!("warning: {warning}"),
             Event::Warning(warning) => meter.line(&format!("warning: {warning}")),
-            Event::Epoch(record) => {
-                meter.epoch(record);
+            Event::Epoch(record, seconds) => {
+                meter.epoch(record, seconds);
                 if json {
-                    say(&json!({"event": "epoch", "record": record}).to_string());
+                    say(&json!({"event": "epoch", "record": record, "train_seconds": seconds})
+                        .to_string());
                 }
             }
         }
@@ -163,7 +164,7 @@ pub(super) fn train(args: &TrainArgs) -> Done {
 }
 
 fn done(run: &str, outcome: &Outcome) -> serde_json::Value {
-    let receipt = &outcome.receipt;
+    let (receipt, seconds) = (&outcome.receipt, outcome.timing.train_seconds());
     let last = outcome.records.last();
     let images: u64 = outcome.records.iter().filter_map(|r| r.train).map(|score| score.total).sum();
     json!({
@@ -178,8 +179,8 @@ fn done(run: &str, outcome: &Outcome) -> serde_json::Value {
         "simulated_seconds": outcome.cost.seconds,
         "joules": outcome.cost.joules,
         "joules_assumed_share": outcome.cost.joules.map(|_| outcome.cost.assumed_share),
-        "train_seconds": receipt.train_seconds,
-        "images_per_second": images as f64 / receipt.train_seconds.max(1e-9),
+        "train_seconds": seconds,
+        "images_per_second": images as f64 / seconds.max(1e-9),
     })
 }
 
@@ -231,16 +232,17 @@ pub(super) fn verify(args: &VerifyArgs) -> Done {
         });
     meter.finish();
     match verdict? {
-        Verdict::Same { epochs, state_hash, test } => {
+        Verdict::Same { epochs, state_hash, test, unchecked } => {
             if shared.json {
                 say(&json!({"event": "done", "verified": true, "epochs": epochs.saturating_sub(1),
-                    "state_hash": state_hash, "test": test})
+                    "state_hash": state_hash, "test": test, "unchecked": unchecked})
                 .to_string());
             } else {
-                let test = if test { " and the test result" } else { "" };
+                let test = if test { ", the test result" } else { "" };
                 say(&format!(
-                    "verified: {epochs} state hashes{test} are the same, up to {state_hash}"
+                    "verified: {epochs} records{test} and all that was compared are the same, up to state {state_hash}"
                 ));
+                say(&format!("not compared: {}", unchecked.join(", ")));
             }
             Ok(())
         }

@@ -16,7 +16,6 @@ mod list;
 mod load;
 mod md5;
 pub mod npy;
-mod npy_header;
 pub mod npz;
 mod own;
 mod source;

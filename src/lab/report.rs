@@ -24,7 +24,7 @@ mod sample;
 
 use super::price::Cost;
 use super::store::ledger::LedgerRecord;
-use super::store::record::{EpochRecord, Receipt};
+use super::store::record::{EpochRecord, Receipt, TimingRecord};
 
 /// Levels of one pathway of one layer in the final state.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -71,6 +71,12 @@ pub struct RunView<'a> {
     pub config: &'a str,
     /// What went in and came out.
     pub receipt: &'a Receipt,
+    /// What was learnt from, in one line.
+    pub data: String,
+    /// What it took on the machine that ran it.
+    pub timing: &'a TimingRecord,
+    /// What the user should know.
+    pub warnings: &'a [String],
     /// One record an epoch, in order; epoch 0 is the state before the first update.
     pub epochs: &'a [EpochRecord],
     /// Highest level a cell can hold.

@@ -4,6 +4,7 @@
 //! one. Neither prints: callers get [`Event`]s.
 
 mod profile;
+mod proof;
 mod report;
 mod repriced;
 mod session;
@@ -11,10 +12,11 @@ mod train;
 mod verify;
 
 pub use profile::{Act, Profile, profile};
+pub use proof::records;
 pub use report::{ReportMade, report};
-pub use repriced::{Repriced, reprice};
+pub use repriced::{Prices, Repriced, reprice, reprice_as};
 pub use session::{Machine, Session};
-pub use train::{Event, Keeping, Outcome, carry_on, evaluate, resume, train};
+pub use train::{Event, Keeping, Outcome, address_of, carry_on, evaluate, resume, train};
 pub use verify::{Verdict, verify};
 
 use crate::chip::layer::PlanError;
@@ -57,13 +59,13 @@ pub enum RunError {
         wanted: String,
     },
     /// The configuration is not what the run was made with.
-    #[error(
-        "config.toml has the hash {found}, but receipt.json says {wanted}; one of them was changed"
-    )]
+    #[error("the {what} {found}, but receipt.json says {wanted}; something was changed since")]
     ConfigChanged {
-        /// Hash now.
+        /// What does not fit, with its verb.
+        what: &'static str,
+        /// Now.
         found: String,
-        /// Hash in the receipt.
+        /// In the receipt.
         wanted: String,
     },
     /// The run was made with other arithmetic.

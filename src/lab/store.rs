@@ -18,10 +18,11 @@
 pub mod address;
 pub mod checkpoint;
 pub mod folder;
+pub mod given;
 pub mod hash;
 pub mod index;
 pub mod ledger;
 pub mod record;
 
 /// Version of the arithmetic. It rises when an equation moves; `verify` refuses another.
-pub const ARITHMETIC: u32 = 1;
+pub const ARITHMETIC: u32 = 2;

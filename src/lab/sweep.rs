@@ -26,7 +26,7 @@ pub use merge::{Merged, merge, reindex};
 pub use plan::{Estimate, Plan, Planned, Shard, Task, estimate, plan};
 pub use points::Point;
 pub use report::{SweepPage, report};
-pub use row::{RESULTS, ResultColumn, Row, row};
+pub use row::{RESULTS, ResultColumn, ResultKind, Row, row, row_as};
 pub use sample::{Sampled, sample};
 pub use table::{Results, find, results};
 

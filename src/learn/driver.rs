@@ -7,6 +7,7 @@
 use super::error::ErrorUnit;
 use super::rule::{Rule, Step, UpdateMode};
 use crate::chip::engine::{Engine, Operation, Side, Write};
+use crate::chip::state::{Section, State, StateError, Visitor, visit_counts};
 
 /// How a network learns.
 #[derive(Debug, Clone)]
@@ -52,20 +53,10 @@ impl Driver {
         self.engine.error_unit()
     }
 
-    /// The error unit, to restore.
-    pub const fn unit_mut(&mut self) -> &mut ErrorUnit {
-        self.engine.error_unit_mut()
-    }
-
     /// Batches learnt from.
     #[must_use]
     pub const fn updates(&self) -> u64 {
         self.updates
-    }
-
-    /// Restores the number of batches learnt from.
-    pub const fn set_updates(&mut self, updates: u64) {
-        self.updates = updates;
     }
 
     /// The shift of a layer for the update in progress.
@@ -137,6 +128,14 @@ impl Driver {
     }
 }
 
+impl State for Driver {
+    fn visit(&mut self, visitor: &mut dyn Visitor) -> Result<(), StateError> {
+        self.engine.visit(visitor)?;
+        let updates = std::iter::once(&mut self.updates);
+        visit_counts(visitor, "updates", Section::Progress, updates)
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -191,7 +190,7 @@ mod tests {
     fn a_shift_holds_from_its_first_update_to_the_next_one() {
         let mut driver = driver(Rule::Dfa, UpdateMode::Accumulate, &[(0, 3), (2, 4), (5, 6)]);
         let shifts = [0, 1, 2, 4, 5, 100].map(|updates| {
-            driver.set_updates(updates);
+            driver.updates = updates;
             driver.shift(1)
         });
         assert_eq!(shifts, [3, 3, 4, 4, 6, 6]);

@@ -102,27 +102,39 @@ fn a_damaged_run_is_refused_or_continued_never_trusted() {
         "",
         "{",
         "[]",
-        "{\"version\": 1}",
-        &running.replace("\"arithmetic\": 1", "\"arithmetic\": -1"),
+        "{\"arithmetic\": 2}",
+        &running.replace("\"arithmetic\": 2", "\"arithmetic\": -1"),
     ] {
         put("receipt.json", text.as_bytes());
         refused(&verify(), &["receipt.json"]);
     }
     put("metrics.jsonl", &metrics);
     let price = || run(dalean().arg("price").arg(&folder));
+    let honest = String::from_utf8(receipt.clone()).unwrap();
+    put("receipt.json", &receipt);
     assert_eq!(price().code, Some(0));
-    let count = "{\"phase\": \"training\", \"layer\": 0, \"pathway\": \"pp\", \"operation\": \"update\", \"event\": \"holds\", \"count\": -1}";
-    for text in ["", "[]", "{}", &format!("{{\"counts\": [{count}]}}"), &count.replace("-1", "1")] {
+    put("ledger.json", b"{}");
+    refused(&price(), &["ledger.json", "is not the ledger that receipt.json speaks of"]);
+    // a receipt that goes along with any ledger
+    let ledger = dalean::lab::store::folder::parse_receipt(&honest).unwrap().ledger.unwrap();
+    let put_ledger = |text: &str| {
         put("ledger.json", text.as_bytes());
+        let hash = dalean::lab::store::hash::bytes(text);
+        put("receipt.json", honest.replace(&ledger, &hash).as_bytes());
+    };
+    let count = "{\"phase\": \"training\", \"layer\": 0, \"pathway\": \"pp\", \"operation\": \"update\", \"event\": \"holds\", \"count\": -1}";
+    let whole = |counts: &str| format!("{{\"counts\": [{counts}], \"cycles\": null}}");
+    for text in ["", "[]", "{}", &whole(count), &count.replace("-1", "1")] {
+        put_ledger(text);
         refused(&price(), &["ledger.json"]);
     }
     let most = count.replace("-1", &u64::MAX.to_string());
-    put("ledger.json", format!("{{\"counts\": [{most}, {most}]}}").as_bytes());
+    put_ledger(&whole(&format!("{most}, {most}")));
     assert_eq!(price().code, Some(0), "any counts have a price");
     put("receipt.json", &receipt);
     let text = String::from_utf8(config).unwrap();
     put("config.toml", text.replace("batch = 16", "batch = 8").as_bytes());
-    refused(&verify(), &["config.toml has the hash"]);
+    refused(&verify(), &["bytes of config.toml have"]);
     refused(&run(dalean().arg("verify").arg(out.path().join("nothing"))), &["folder of a run"]);
 }
 

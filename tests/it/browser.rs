@@ -237,8 +237,14 @@ fn ten_thousand_rows_open_quickly() {
     assert_eq!(sample.table.columns.len(), 25);
     let page = html(&sample.view());
     for graphics in [Graphics::Software, Graphics::None] {
-        let Some(found) = open(&page, "await drawn(); return look();", graphics) else { return };
+        let steps = "await drawn(); const first = look(); choose('choose-x', 'write_noise'); \
+                     return { ...first, second: look() };";
+        let Some(found) = open(&page, steps, graphics) else { return };
         check(&found);
+        // where values were drawn from a range, every run of a setting is a point of its own
+        let second = traces(&found["second"], "curves", "mean");
+        let points = second.iter().flat_map(|trace| trace["customdata"].as_array().unwrap());
+        assert!(points.clone().count() > 500 && points.clone().all(|point| point[0] == 1));
         let (ready, nodes) = (found["ready"].as_f64().unwrap(), found["nodes"].as_u64().unwrap());
         println!(
             "10 000 x 25, {graphics:?}: {} bytes, all drawn after {ready} ms, {nodes} nodes",
@@ -280,7 +286,8 @@ fn odd_tables_make_pages_without_errors() {
 fn an_address_brings_its_choices_back() {
     let sample = Sample::grid();
     let steps = "await drawn(); location.hash = '#x=rounding&series=rule&hold.level_bits=5&panel='; await rest(300); \
-                 return look();";
+                 const first = look(); location.hash = '#x=rounding&series=rule&hold.level_bits=*&panel='; await rest(300); \
+                 return { ...first, second: look() };";
     let Some(found) = open(&html(&sample.view()), steps, Graphics::None) else { return };
     check(&found);
     let curves = traces(&found, "curves", "mean");
@@ -295,6 +302,29 @@ fn an_address_brings_its_choices_back() {
             );
             close(&curve["y"][at], 100.0 * mean(&values));
             close(&curve["error_y"]["array"][at], 100.0 * half(&values));
+        }
+    }
+    pooled(&sample, &found["second"]);
+}
+
+/// Pooled settings have a mean and a range.
+fn pooled(sample: &Sample, found: &Value) {
+    let caption = found["figures"]["curves"]["caption"].as_str().unwrap();
+    assert!(caption.contains("over level bits, pooled") && caption.contains("range"), "{caption}");
+    let curves = traces(found, "curves", "mean");
+    assert_eq!(curves.len(), 2);
+    for curve in curves {
+        let rule = curve["meta"]["series"].as_str().unwrap();
+        for (at, rounding) in ["nearest", "stochastic", "separable"].into_iter().enumerate() {
+            let values = values(sample, "test_accuracy", &[("rounding", rounding), ("rule", rule)]);
+            let ends = [
+                values.iter().copied().fold(1.0, f64::min),
+                values.iter().copied().fold(0.0, f64::max),
+            ];
+            close(&curve["y"][at], 100.0 * mean(&values));
+            close(&curve["error_y"]["array"][at], 100.0 * (ends[1] - mean(&values)));
+            close(&curve["error_y"]["arrayminus"][at], 100.0 * (mean(&values) - ends[0]));
+            assert_eq!(curve["customdata"][at][0], values.len());
         }
     }
 }

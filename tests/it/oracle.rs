@@ -92,7 +92,8 @@ fn hardware(s: &Value) -> Hardware {
             h.tile.columns = 128;
             h.tile.transposed_read = false;
             h.drive.bits = DriveBits::new(int(&s["drive_bits"])).unwrap();
-            h.drive.dac_bits = int(&s["dac_bits"]) as u32;
+            // what the oracle leaves at 8 bits of a narrower code is one slice
+            h.drive.dac_bits = (int(&s["dac_bits"]) as u32).min(h.drive.bits.get());
             h.adc = adc;
             h.digital.lut_bits = LutBits::new(int(&s["lut_bits"])).unwrap();
             h.digital.error_bits = ErrorBits::new(int(&s["error_bits"])).unwrap();

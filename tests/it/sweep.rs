@@ -227,11 +227,20 @@ fn shards_in_stores_of_their_own_merge_into_the_whole() {
     assert_eq!(table(&whole), wanted);
     // a run that says something else is not merged in silence
     let key = wanted.lines().nth(1).unwrap().rsplit(',').nth(1).unwrap();
-    let receipt = parts[0].join("runs").join(&key[..2]).join(key).join("metrics.jsonl");
-    let text = std::fs::read_to_string(&receipt).unwrap();
+    let folder = parts[0].join("runs").join(&key[..2]).join(key);
+    let [metrics, receipt] = ["metrics.jsonl", "receipt.json"].map(|name| folder.join(name));
+    let text = std::fs::read_to_string(&metrics).unwrap();
     let at = text.rfind("\"state_hash\":\"").unwrap() + 14;
-    let forged = format!("{}{}{}", &text[..at], "0".repeat(64), &text[at + 64..]);
-    std::fs::write(&receipt, forged).unwrap();
+    let zeros = "0".repeat(64);
+    let forged = format!("{}{zeros}{}", &text[..at], &text[at + 64..]);
+    std::fs::write(&metrics, &forged).unwrap();
+    let ran = merge(&[&parts[0]]);
+    assert!(ran.code == Some(1) && ran.stderr.contains("does not hold the"), "{ran:?}");
+    // nor one whose receipt goes along with it
+    let honest = std::fs::read_to_string(&receipt).unwrap();
+    let hash = dalean::lab::store::hash::bytes;
+    let lying = honest.replace(&text[at..at + 64], &zeros).replace(&hash(&text), &hash(&forged));
+    std::fs::write(&receipt, lying).unwrap();
     let ran = merge(&[&parts[0]]);
     assert_eq!(ran.code, Some(1), "{ran:?}");
     assert!(ran.stderr.contains("one of the two machines is wrong"), "{ran:?}");

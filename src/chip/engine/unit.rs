@@ -13,6 +13,7 @@
 use super::{Engine, Recorded};
 use crate::chip::ledger::{During, Event};
 use crate::chip::population::Stream;
+use crate::chip::state::{Piece, Section, State, StateError, Visitor};
 use crate::num::fixed::{ErrorBits, rsh, sat};
 
 /// What is subtracted from the error of a class.
@@ -59,15 +60,6 @@ impl ErrorUnit {
     #[must_use]
     pub fn means(&self) -> &[i64] {
         &self.means
-    }
-
-    /// Restores the running means.
-    ///
-    /// # Panics
-    /// When their number differs.
-    pub fn load_means(&mut self, means: &[i64]) {
-        assert_eq!(means.len(), self.means.len(), "one mean an output, of running centres");
-        self.means.copy_from_slice(means);
     }
 
     /// Words for a batch of errors `[sample][output]`, and how many saturated.
@@ -120,6 +112,21 @@ impl ErrorUnit {
     }
 }
 
+impl State for ErrorUnit {
+    fn visit(&mut self, visitor: &mut dyn Visitor) -> Result<(), StateError> {
+        if self.means.is_empty() {
+            return Ok(());
+        }
+        // a mean of errors of at most 255, 8 fractional bits
+        let within = -(256 << 8)..=256 << 8;
+        let piece = Piece { name: "means", section: Some(Section::Centres), within };
+        if let Some(means) = visitor.numbers(&piece, &self.means)? {
+            self.means = means;
+        }
+        Ok(())
+    }
+}
+
 impl Engine {
     /// Makes output words of the errors of the loaded samples, `[sample][output]`.
     pub fn output_words(&mut self, errors: &[i32]) -> Vec<i16> {
@@ -143,11 +150,6 @@ impl Engine {
     #[must_use]
     pub const fn error_unit(&self) -> &ErrorUnit {
         &self.unit
-    }
-
-    /// The error unit, to restore.
-    pub const fn error_unit_mut(&mut self) -> &mut ErrorUnit {
-        &mut self.unit
     }
 
     /// Puts another error unit beside the output layer.
@@ -179,7 +181,7 @@ mod tests {
         let (words, _) = unit.words(&[128, -128], 2);
         assert_eq!((words, unit.means()), (vec![64, -64], &[128, -128][..]));
         let mut again = unit.clone();
-        again.load_means(&[128 << 8, -(128 << 8)]);
+        again.means = vec![128 << 8, -(128 << 8)];
         assert_eq!(again.words(&[128, -128], 2).0, [0, 0]);
     }
 

@@ -170,24 +170,42 @@ impl Cycles {
         self.busy.len()
     }
 
-    /// All numbers in a fixed order, to store them.
-    #[must_use]
-    pub fn numbers(&self) -> Vec<u64> {
-        let layers = self.busy.iter().flatten().chain(self.used.iter().flatten());
-        self.elapsed.iter().chain(layers).copied().collect()
+    /// All numbers with their places: view (0 elapsed, 1 busy, 2 used), layer, code of stage, operation or part.
+    pub(super) fn entries(&self) -> impl Iterator<Item = ([usize; 3], u64)> + '_ {
+        fn coded<const N: usize>(
+            view: usize,
+            layers: &[[u64; N]],
+        ) -> impl Iterator<Item = ([usize; 3], u64)> + '_ {
+            layers.iter().enumerate().flat_map(move |(layer, cycles)| {
+                cycles.iter().enumerate().map(move |(code, &n)| ([view, layer, code], n))
+            })
+        }
+        coded(0, std::slice::from_ref(&self.elapsed))
+            .chain(coded(1, &self.busy))
+            .chain(coded(2, &self.used))
     }
 
-    /// Puts stored numbers back; `None` when they are not as many.
-    #[must_use]
-    pub fn from_numbers(layers: usize, numbers: &[u64]) -> Option<Self> {
-        let mut cycles = Self::new(layers);
-        if numbers.len() != cycles.numbers().len() {
-            return None;
+    /// The number at a place, if there is one.
+    pub(super) fn slot(&mut self, [view, layer, code]: [usize; 3]) -> Option<&mut u64> {
+        match (view, layer) {
+            (0, 0) => self.elapsed.get_mut(code),
+            (1, _) => self.busy.get_mut(layer)?.get_mut(code),
+            (2, _) => self.used.get_mut(layer)?.get_mut(code),
+            _ => None,
         }
-        let busy = cycles.busy.iter_mut().flatten();
-        let slots = cycles.elapsed.iter_mut().chain(busy).chain(cycles.used.iter_mut().flatten());
-        slots.zip(numbers).for_each(|(slot, &number)| *slot = number);
-        Some(cycles)
+    }
+
+    /// What has passed since these cycles stood at `before`.
+    ///
+    /// # Panics
+    /// When `before` has other layers or stood later.
+    #[must_use]
+    pub fn since(&self, before: &Self) -> Self {
+        let mut passed = self.clone();
+        for (place, then) in before.entries() {
+            *passed.slot(place).expect("the same network") -= then;
+        }
+        passed
     }
 }
 
@@ -202,13 +220,16 @@ mod tests {
     }
 
     #[test]
-    fn stored_cycles_come_back() {
+    fn what_passed_is_the_difference() {
         let mut cycles = Cycles::new(2);
         cycles.pass(Interval::Error, 3);
+        let before = cycles.clone();
         cycles.occupy(1, During::Update, 5);
         cycles.engage(0, Part::Writers, 7);
-        assert_eq!(Cycles::from_numbers(2, &cycles.numbers()), Some(cycles.clone()));
-        assert_eq!(Cycles::from_numbers(1, &cycles.numbers()), None);
-        assert_eq!((cycles.elapsed(), cycles.interval(Interval::Error)), (3, 3));
+        cycles.pass(Interval::Error, 4);
+        let passed = cycles.since(&before);
+        assert_eq!((passed.elapsed(), passed.interval(Interval::Error)), (4, 4));
+        assert_eq!((passed.busy(1, During::Update), passed.used(0, Part::Writers)), (5, 7));
+        assert_eq!(passed.entries().filter(|(_, n)| *n > 0).count(), 3);
     }
 }

@@ -273,6 +273,8 @@ pub(super) fn config(mut file: ExperimentFile) -> Result<Config, ConfigError> {
                        hw.adc = \"ideal\" (finite converters on rows are not simulated)";
         return Err(wrong("learning.rule", "is \"bp\"", allowed));
     }
+    #[cfg(feature = "grown")]
+    learning.grown.get_or_insert(0);
     let outputs = network.outputs;
     Ok(Config {
         seed,

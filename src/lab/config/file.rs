@@ -130,6 +130,9 @@ keys! {
         train_on: String,
         /// `best_validation` or `last`: the epoch whose state reads the test set.
         select: String,
+        /// What a later program reads and no run uses.
+        #[cfg(feature = "grown")]
+        grown: i64,
     }
     /// A hardware model file, or `[hw]` of an experiment.
     HardwareFile {

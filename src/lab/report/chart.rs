@@ -1,51 +1,35 @@
-//! Line charts as inline SVG: axes, lines, bars, labels at the line ends, and bands the pointer reads values from.
-//! Colours and type come from the page's style sheet.
+//! Every drawing of this program that needs no script: run pages, figures for papers, what a sweep's page shows without
+//! one. Inline SVG; its classes are those of chart.css, its colours those of page.css (`colour::on_white` for paper).
+//!
+//! ```text
+//! chart.rs          frame, axes, lines, bars, texts          chart/series.rs   series with labels at their ends
+//! chart/marks.rs    bands, whiskers, markers, keys           chart/margin.rs   bars beside the plot
+//! chart/ramp.rs     the map of colours and its scale
+//! ```
 
 mod margin;
+mod marks;
+mod ramp;
+mod series;
 
 use std::fmt::Write as _;
 
-mod marks;
+use super::number::{escape, place, size};
+use super::scale::{Axis, Curve};
 
-use super::number::{escape, place};
-use super::scale::Axis;
+pub(super) use ramp::ramp;
+pub(super) use series::{Series, spark};
 
 /// Points kept of one line; more would not be seen.
 const POINTS_MAX: usize = 400;
-/// Bands kept for the pointer.
-const BANDS_MAX: usize = 120;
-/// Lines with no more points than this show them as dots.
-const DOTS_MAX: usize = 24;
+/// Units that a letter takes, about.
+const LETTER: f64 = 7.0;
+/// Strokes that tell lines apart without colour.
+const DASHES: [&str; 8] = ["", "6 3", "2 3", "9 3 2 3", "12 4", "5 2", "2 2", "9 3 2 3 2 3"];
 
-/// One line, or one single mark.
-#[derive(Debug, Clone)]
-pub(super) struct Series {
-    pub name: String,
-    pub colour: &'static str,
-    pub dashed: bool,
-    /// Drawn as a diamond, not as a line.
-    pub mark: bool,
-    /// Epoch and value, in order.
-    pub points: Vec<(f64, f64)>,
-}
-
-impl Series {
-    /// A plain line.
-    pub(super) fn new(name: &str, colour: &'static str, points: Vec<(f64, f64)>) -> Self {
-        Self { name: name.into(), colour, dashed: false, mark: false, points }
-    }
-
-    /// The same, dashed or not.
-    pub(super) fn dashed(mut self, dashed: bool) -> Self {
-        self.dashed = dashed;
-        self
-    }
-
-    /// The same as a single mark.
-    pub(super) fn marked(mut self) -> Self {
-        self.mark = true;
-        self
-    }
+/// Units that a text of ticks and keys takes, about.
+pub(super) fn wide(text: &str) -> f64 {
+    LETTER * size(text.chars().count())
 }
 
 /// A chart being drawn.
@@ -59,6 +43,8 @@ pub(super) struct Chart {
     bottom: f64,
     x: Axis,
     y: Axis,
+    /// Whether names along the abscissa are too long to lie flat.
+    turned: bool,
     body: String,
 }
 
@@ -75,10 +61,17 @@ impl Chart {
         x: Axis,
         y: Axis,
     ) -> Self {
-        let digits = y.ticks.iter().map(|(_, text)| text.chars().count()).max().unwrap_or(1);
-        let left = 30.0 + 6.9 * super::number::size(digits);
-        let body = String::new();
-        let mut chart = Self { width, height, left, right, top, bottom: 42.0, x, y, body };
+        let left = 30.0 + y.ticks.iter().map(|(_, text)| wide(text)).fold(LETTER, f64::max);
+        let (bottom, body) = (42.0, String::new());
+        let mut chart = Self { width, height, left, right, top, bottom, x, y, turned: false, body };
+        let near = |pair: &[(f64, String)]| {
+            let room = (chart.x(pair[1].0) - chart.x(pair[0].0)).abs();
+            0.5 * (wide(&pair[0].1) + wide(&pair[1].1)) > room
+        };
+        if chart.x.ticks.windows(2).any(near) {
+            let longest = chart.x.ticks.iter().map(|(_, text)| wide(text)).fold(0.0, f64::max);
+            (chart.turned, chart.bottom) = (true, 30.0 + 0.8 * longest);
+        }
         chart.axes();
         chart
     }
@@ -96,38 +89,95 @@ impl Chart {
         self.height - self.bottom
     }
 
+    /// Width and height of the frame inside the axes.
+    pub(super) fn inside(&self) -> (f64, f64) {
+        (self.width - self.left - self.right, self.base() - self.top)
+    }
+
     fn axes(&mut self) {
         let (left, right, base) = (self.left, self.width - self.right, self.base());
+        // cells show by themselves where they end
+        let cells = self.y.scale.curve == Curve::Cells;
         for (tick, text) in self.y.ticks.clone() {
             let y = self.y(tick);
-            self.segment("grid", left, y, right, y);
+            if !cells {
+                self.segment("grid", left, y, right, y);
+            }
             self.text("tick end", left - 7.0, y + 4.0, &text);
         }
         for (tick, text) in self.x.ticks.clone() {
             let x = self.x(tick);
-            self.segment("axis", x, base, x, base + 4.0);
-            self.text("tick middle", x, base + 17.0, &text);
+            if !cells {
+                self.segment("axis", x, base, x, base + 4.0);
+            }
+            if self.turned {
+                self.leaning("tick end", (x + 4.0, base + 13.0), -45, &text);
+            } else {
+                self.text("tick middle", x, base + 17.0, &text);
+            }
         }
-        self.segment("axis", left, base, right, base);
+        if !cells {
+            self.segment("axis", left, base, right, base);
+        }
         let (x_label, y_label) = (self.x.label.clone(), self.y.label.clone());
         self.text("label middle", (left + right) / 2.0, self.height - 6.0, &x_label);
-        let middle = place((self.top + base) / 2.0);
-        let _ = write!(
-            self.body,
-            "<text class=\"label middle\" transform=\"translate(12 {middle}) rotate(-90)\">{}</text>",
-            escape(&y_label)
-        );
+        self.leaning("label middle", (12.0, (self.top + base) / 2.0), -90, &y_label);
     }
 
     fn segment(&mut self, class: &str, x0: f64, y0: f64, x1: f64, y1: f64) {
-        let [x0, y0, x1, y1] = [x0, y0, x1, y1].map(place);
-        let _ = write!(self.body, "<path class=\"{class}\" d=\"M{x0} {y0}L{x1} {y1}\"/>");
+        let d = track([(x0, y0), (x1, y1)]);
+        let _ = write!(self.body, "<path class=\"{class}\" d=\"{d}\"/>");
     }
 
     fn text(&mut self, class: &str, x: f64, y: f64, text: &str) {
         let (x, y) = (place(x), place(y));
         let text = escape(text);
         let _ = write!(self.body, "<text class=\"{class}\" x=\"{x}\" y=\"{y}\">{text}</text>");
+    }
+
+    fn leaning(&mut self, class: &str, at: (f64, f64), degrees: i32, text: &str) {
+        self.body += &leaning(class, at, degrees, text);
+    }
+
+    /// Words at a point, in a colour and size, in the middle of it.
+    pub(super) fn words(&mut self, at: (f64, f64), colour: &str, font: f64, text: &str) {
+        let [x, y] = [self.x(at.0), self.y(at.1) + 0.34 * font].map(place);
+        let text = escape(text);
+        let _ = write!(
+            self.body,
+            "<text class=\"middle\" style=\"fill:{colour};font-size:{font:.1}px\" x=\"{x}\" y=\"{y}\">{text}</text>"
+        );
+    }
+
+    /// A line of places on the page.
+    fn path(&mut self, class: &str, colour: &str, dash: usize, d: &str) {
+        let dash = match DASHES[dash % DASHES.len()] {
+            "" => String::new(),
+            dash => format!(" stroke-dasharray=\"{dash}\""),
+        };
+        let _ = write!(
+            self.body,
+            "<path class=\"{class}\" style=\"stroke:{colour}\"{dash} d=\"{d}\"/>"
+        );
+    }
+
+    /// A line through points, thinned where there are too many to see.
+    pub(super) fn line(&mut self, points: &[(f64, f64)], colour: &str, class: &str, number: usize) {
+        let stride = points.len().div_ceil(POINTS_MAX).max(1);
+        let last = points.len().saturating_sub(1);
+        let kept = points.iter().enumerate().filter(|(i, _)| i % stride == 0 || *i == last);
+        let d = track(kept.map(|(_, &(x, y))| (self.x(x), self.y(y))));
+        if points.len() > 1 {
+            self.path(class, colour, number, &d);
+        }
+    }
+
+    /// From point to point by way of corners: along the abscissa first.
+    pub(super) fn steps(&mut self, points: &[(f64, f64)], colour: &str) {
+        let corner = |pair: &[(f64, f64)]| [(pair[1].0, pair[0].1), pair[1]];
+        let corners = points.windows(2).flat_map(corner);
+        let all: Vec<_> = points.first().copied().into_iter().chain(corners).collect();
+        self.line(&all, colour, "line", 0);
     }
 
     /// A named horizontal line.
@@ -137,133 +187,33 @@ impl Chart {
         self.text("note", self.left + 5.0, y - 5.0, name);
     }
 
-    /// A filled rectangle between two values of each axis.
-    pub(super) fn bar(&mut self, x: (f64, f64), y: (f64, f64), colour: &str, opacity: f64) {
+    /// A filled rectangle between two values of each axis; with a tip it answers to the pointer.
+    pub(super) fn bar(
+        &mut self,
+        x: (f64, f64),
+        y: (f64, f64),
+        (colour, opacity): (&str, f64),
+        tip: &str,
+    ) {
         let (x0, x1) = (self.x(x.0), self.x(x.1));
         let (y0, y1) = (self.y(y.0), self.y(y.1));
         let [left, top] = [x0.min(x1), y0.min(y1)].map(place);
         let [wide, high] = [(x1 - x0).abs(), (y1 - y0).abs()].map(place);
+        let tip = if tip.is_empty() {
+            String::new()
+        } else {
+            format!(" class=\"square\" data-tip=\"{}\"", escape(tip).replace('\n', "&#10;"))
+        };
         let _ = write!(
             self.body,
-            "<rect x=\"{left}\" y=\"{top}\" width=\"{wide}\" height=\"{high}\" fill=\"{colour}\" \
-             fill-opacity=\"{opacity:.2}\"/>"
+            "<rect{tip} x=\"{left}\" y=\"{top}\" width=\"{wide}\" height=\"{high}\" \
+             style=\"fill:{colour};fill-opacity:{opacity:.3}\"/>"
         );
-    }
-
-    /// A line through points, thinned where there are too many to see.
-    pub(super) fn line(&mut self, points: &[(f64, f64)], colour: &str, class: &str) {
-        let stride = points.len().div_ceil(POINTS_MAX).max(1);
-        let last = points.len().saturating_sub(1);
-        let mut path = String::new();
-        for (i, &(x, y)) in points.iter().enumerate() {
-            if i % stride == 0 || i == last {
-                let pen = if path.is_empty() { 'M' } else { 'L' };
-                let _ = write!(path, "{pen}{} {}", place(self.x(x)), place(self.y(y)));
-            }
-        }
-        if points.len() > 1 {
-            let _ = write!(
-                self.body,
-                "<path class=\"{class}\" style=\"stroke:{colour}\" d=\"{path}\"/>"
-            );
-        }
-    }
-
-    /// Draws every series with its dots, the labels at the ends and the bands for the pointer.
-    pub(super) fn series(&mut self, all: &[Series], show: impl Fn(f64) -> String) {
-        for one in all {
-            if !one.mark {
-                self.line(&one.points, one.colour, if one.dashed { "line dashed" } else { "line" });
-            }
-        }
-        for one in all {
-            if !one.mark && one.points.len() <= DOTS_MAX {
-                for &(x, y) in &one.points {
-                    self.dot(x, y, one.colour);
-                }
-            }
-        }
-        for one in all.iter().filter(|one| one.mark) {
-            for &(x, y) in &one.points {
-                let (x, y) = (self.x(x), self.y(y));
-                let _ = write!(
-                    self.body,
-                    "<path class=\"mark\" style=\"fill:{}\" d=\"M{} {}l7 7l-7 7l-7 -7z\"/>",
-                    one.colour,
-                    place(x),
-                    place(y - 7.0)
-                );
-            }
-        }
-        let ends: Vec<End> = all
-            .iter()
-            .filter_map(|one| {
-                let &(_, value) = one.points.last()?;
-                let text = format!("{} {}", one.name, show(value));
-                Some(End { y: self.y(value), text, colour: one.colour })
-            })
-            .collect();
-        self.ends(ends);
-        self.bands(all, show);
-    }
-
-    fn dot(&mut self, x: f64, y: f64, colour: &str) {
-        let (x, y) = (place(self.x(x)), place(self.y(y)));
-        let _ = write!(
-            self.body,
-            "<circle class=\"dot\" style=\"fill:{colour}\" cx=\"{x}\" cy=\"{y}\" r=\"2.6\"/>"
-        );
-    }
-
-    /// Labels right of the plot, in the colour of text, each beside a value.
-    pub(super) fn beside(&mut self, labels: impl Iterator<Item = (f64, String)>) {
-        let end = |(value, text)| End { y: self.y(value), text, colour: "var(--ink)" };
-        let ends = labels.map(end).collect();
-        self.ends(ends);
-    }
-
-    /// Labels right of the plot, pushed apart until none overlaps.
-    fn ends(&mut self, mut ends: Vec<End>) {
-        const GAP: f64 = 15.0;
-        ends.sort_by(|a, b| a.y.total_cmp(&b.y));
-        for i in 1..ends.len() {
-            ends[i].y = ends[i].y.max(ends[i - 1].y + GAP);
-        }
-        let mut room = self.base() + 6.0;
-        for end in ends.iter_mut().rev() {
-            end.y = end.y.min(room);
-            room = end.y - GAP;
-        }
-        let x = place(self.width - self.right + 9.0);
-        for end in ends {
-            let (y, text) = (place(end.y + 4.0), escape(&end.text));
-            let _ = write!(
-                self.body,
-                "<text class=\"name\" style=\"fill:{}\" x=\"{x}\" y=\"{y}\">{text}</text>",
-                end.colour
-            );
-        }
-    }
-
-    fn bands(&mut self, all: &[Series], show: impl Fn(f64) -> String) {
-        let mut epochs: Vec<f64> = all.iter().flat_map(|one| &one.points).map(|p| p.0).collect();
-        epochs.sort_by(f64::total_cmp);
-        epochs.dedup();
-        let stride = epochs.len().div_ceil(BANDS_MAX).max(1);
-        let bands = epochs.into_iter().step_by(stride).map(|epoch| {
-            let values = all.iter().filter_map(|one| {
-                let at = one.points.iter().find(|point| point.0 == epoch)?;
-                Some(format!("\n{} {}", one.name, show(at.1)))
-            });
-            (epoch, format!("epoch {epoch:.0}{}", values.collect::<String>()))
-        });
-        let bands: Vec<_> = bands.collect();
-        self.tips(&bands);
     }
 
     /// Invisible bands that tell their text to the pointer.
     pub(super) fn tips(&mut self, tips: &[(f64, String)]) {
-        let wide = (self.width - self.left - self.right) / super::number::size(tips.len().max(1));
+        let wide = (self.width - self.left - self.right) / size(tips.len().max(1));
         let high = place(self.base() - self.top);
         for (at, text) in tips {
             let x = place(self.x(*at) - wide / 2.0);
@@ -275,6 +225,11 @@ impl Chart {
                 escape(text).replace('\n', "&#10;")
             );
         }
+    }
+
+    /// What has been drawn, moved to a place, as part of a larger picture.
+    pub(super) fn part(self, x: f64, y: f64) -> String {
+        format!("<g transform=\"translate({} {})\">{}</g>", place(x), place(y), self.body)
     }
 
     /// The picture. `alt` says in words what it shows.
@@ -290,31 +245,20 @@ impl Chart {
     }
 }
 
-struct End {
-    y: f64,
-    text: String,
-    colour: &'static str,
+/// Straight from place to place.
+fn track(places: impl IntoIterator<Item = (f64, f64)>) -> String {
+    let mut d = String::new();
+    for (x, y) in places {
+        let pen = if d.is_empty() { 'M' } else { 'L' };
+        let _ = write!(d, "{pen}{} {}", place(x), place(y));
+    }
+    d
 }
 
-/// A line without axes, for tables.
-pub(super) fn spark(values: &[f64], colour: &str) -> String {
-    const WIDTH: f64 = 110.0;
-    const HEIGHT: f64 = 24.0;
-    let high = values.iter().copied().fold(0.0, f64::max);
-    let last = super::number::size(values.len().saturating_sub(1)).max(1.0);
-    let stride = values.len().div_ceil(POINTS_MAX / 2).max(1);
-    let mut path = String::new();
-    for (i, value) in values.iter().enumerate().step_by(stride) {
-        let x = 2.0 + super::number::size(i) / last * (WIDTH - 4.0);
-        let y = HEIGHT - 3.0 - if high > 0.0 { value / high } else { 0.0 } * (HEIGHT - 6.0);
-        let pen = if path.is_empty() { 'M' } else { 'L' };
-        let _ = write!(path, "{pen}{} {}", place(x), place(y));
-    }
-    if path.is_empty() {
-        path.push_str("M0 0");
-    }
+/// A text turned around its anchor.
+fn leaning(class: &str, (x, y): (f64, f64), degrees: i32, text: &str) -> String {
+    let (x, y, text) = (place(x), place(y), escape(text));
     format!(
-        "<svg class=\"spark\" viewBox=\"0 0 {WIDTH} {HEIGHT}\" width=\"{WIDTH}\" height=\"{HEIGHT}\" \
-         aria-hidden=\"true\"><path class=\"line\" style=\"stroke:{colour}\" d=\"{path}\"/></svg>"
+        "<text class=\"{class}\" transform=\"translate({x} {y}) rotate({degrees})\">{text}</text>"
     )
 }

@@ -1,6 +1,46 @@
 //! Colours. Pathways use the Okabe-Ito set, blues for excitation and oranges for inhibition; the page's style
 //! sheet holds the values, lighter ones for dark mode. Levels use a map of steadily rising lightness.
 
+/// Colours of curves: apart for every kind of colour vision, on white and on black (Okabe and Ito).
+pub(super) const HUES: [&str; 8] = [
+    "var(--d)",
+    "var(--e)",
+    "var(--a)",
+    "var(--b)",
+    "var(--nn)",
+    "var(--f)",
+    "var(--c)",
+    "var(--ink)",
+];
+
+/// The colour of a curve.
+pub(super) fn hue(number: usize) -> &'static str {
+    HUES[number % HUES.len()]
+}
+
+/// The same text with each colour of the style sheet as it is on white, for what stands alone.
+pub(super) fn on_white(text: &str) -> String {
+    let mut parts = text.split("var(--");
+    let mut out = parts.next().unwrap_or_default().to_owned();
+    for part in parts {
+        let known = part.split_once(')').and_then(|(name, rest)| Some((light(name)?, rest)));
+        match known {
+            Some((colour, rest)) => out.extend([colour, rest]),
+            None => out.extend(["var(--", part]),
+        }
+    }
+    out
+}
+
+/// What the style sheet says of a colour on white.
+fn light(name: &str) -> Option<&'static str> {
+    let (_, rest) = SHEET.split_once(&format!("--{name}:light-dark("))?;
+    Some(rest.split_once(',')?.0)
+}
+
+/// The one place of colours: `--name:light-dark(on white,on black)`.
+const SHEET: &str = include_str!("page.css");
+
 /// A 256-entry table of red, green, blue, alpha.
 pub(super) type Palette = [[u8; 4]; 256];
 
@@ -46,6 +86,12 @@ pub(super) fn levels() -> Palette {
         };
         [mix(0), mix(1), mix(2), 255]
     })
+}
+
+/// Sixteen steps of it, as words.
+pub(super) fn ramp() -> Vec<String> {
+    let word = |[red, green, blue, _]: &[u8; 4]| format!("#{red:02x}{green:02x}{blue:02x}");
+    levels().iter().step_by(17).map(word).collect()
 }
 
 /// The place in [`shares`] of a share, 0 to 1: clear at 0, then logarithmic from 0.01 % on.
@@ -110,6 +156,18 @@ mod tests {
         let map = levels();
         assert!(map.windows(2).all(|pair| light(pair[1]) >= light(pair[0]) - 0.8));
         assert_eq!((map[0], map[255]), ([68, 1, 84, 255], [253, 231, 37, 255]));
+    }
+
+    #[test]
+    fn every_colour_of_curves_and_charts_is_known_on_white() {
+        for text in HUES.into_iter().chain([include_str!("chart.css")]) {
+            assert!(!on_white(text).contains("var("), "{text}");
+        }
+        assert_eq!(
+            on_white("fill:var(--pp);var(--unknown) var(--"),
+            "fill:#0072b2;var(--unknown) var(--"
+        );
+        assert_eq!((ramp().len(), ramp()[15].as_str()), (16, "#fde725"));
     }
 
     #[test]

@@ -33,19 +33,18 @@ pub(super) fn render(view: &RunView<'_>) -> String {
         title = escape(&view.title),
         header = header(view),
         notices = notices(view),
-        version = escape(&view.receipt.version),
+        version = escape(&view.timing.version),
     )
 }
 
 fn header(view: &RunView<'_>) -> String {
-    let receipt = view.receipt;
     let shape: Vec<String> = shape(view).iter().map(ToString::to_string).collect();
-    let mut facts = vec![escape(&receipt.data)];
+    let mut facts = vec![escape(&view.data)];
     if !shape.is_empty() {
         facts.push(format!("<span class=\"nowrap\">{}</span>", shape.join("\u{202f}–\u{202f}")));
     }
-    facts.push(format!("kernel {}", escape(&receipt.kernel)));
-    facts.push(match receipt.threads {
+    facts.push(format!("kernel {}", escape(&view.timing.kernel)));
+    facts.push(match view.timing.threads {
         1 => "1 thread".into(),
         threads => format!("{threads} threads"),
     });
@@ -130,7 +129,7 @@ fn keys(view: &RunView<'_>) -> String {
     out +=
         &key("floor fraction", &percent_of(floor, cells, 1), &format!("of {} cells", count(cells)));
     out += &key("epochs", &last.epoch.to_string(), &format!("{} updates", count(last.updates)));
-    out += &key("learning took", &seconds(view.receipt.train_seconds), "wall clock");
+    out += &key("learning took", &seconds(view.timing.train_seconds()), "wall clock");
     out += &view.cost.map_or_else(String::new, |cost| chip(cost, &key));
     let balance = last.layers.iter().map(|layer| {
         let [excite, inhibit] = layer.levels;
@@ -197,7 +196,7 @@ fn notices(view: &RunView<'_>) -> String {
     let absent = not_simulated(view.config);
     // the receipt repeats them, one a line
     let repeated = |text: &&String| !absent.is_empty() && text.starts_with("not simulated");
-    for warning in view.receipt.warnings.iter().filter(|text| !repeated(text)) {
+    for warning in view.warnings.iter().filter(|text| !repeated(text)) {
         out += &format!("<li>{}</li>", escape(warning));
     }
     if !absent.is_empty() {

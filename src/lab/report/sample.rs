@@ -6,7 +6,7 @@ use super::{Heat, Picture, RunView};
 use crate::lab::price::Cost;
 use crate::lab::store::ledger::LedgerRecord;
 use crate::lab::store::record::{
-    EpochRecord, LayerRecord, PathwayRecord, Receipt, Score, TestRecord,
+    DataRecord, EpochRecord, LayerRecord, PathwayRecord, Receipt, Score, TestRecord, TimingRecord,
 };
 
 /// An invented run: layers as rows, columns and names of pathways.
@@ -19,6 +19,8 @@ pub(super) struct Sample {
     pub class_names: Vec<String>,
     pub ledger: Option<LedgerRecord>,
     pub cost: Option<Cost>,
+    pub timing: TimingRecord,
+    pub warnings: Vec<String>,
 }
 
 impl Sample {
@@ -37,6 +39,13 @@ impl Sample {
             class_names: vec!["zero".into(), "<one>".into()],
             ledger: None,
             cost: None,
+            timing: TimingRecord {
+                version: "0.1.0".into(),
+                kernel: "scalar".into(),
+                threads: 2,
+                epoch_seconds: vec![0.0, 12.3],
+            },
+            warnings: vec!["a <warning>".into()],
         }
     }
 
@@ -45,6 +54,9 @@ impl Sample {
             title: "digits & \"dales\"".into(),
             config: &self.config,
             receipt: &self.receipt,
+            data: "digits".into(),
+            timing: &self.timing,
+            warnings: &self.warnings,
             epochs: &self.epochs,
             level_max: 15,
             heats: &self.heats,
@@ -116,7 +128,8 @@ fn record(layers: &[(usize, usize, &[&str])], epoch: u32) -> EpochRecord {
         pathways,
         events: [("evaluation".into(), counts(1)), ("training".into(), counts(4))].into(),
         cycles: Some([("training".to_owned(), 9000 * e)].into()),
-        train_seconds: 1.5,
+        #[cfg(feature = "grown")]
+        grown: 0,
     }
 }
 
@@ -133,19 +146,27 @@ fn receipt(records: &[EpochRecord], classes: usize) -> Receipt {
         confused: vec![[18, 0, 1]],
     };
     Receipt {
-        version: "0.1.0".into(),
-        arithmetic: 1,
-        config_hash: "c0".into(),
-        data: "digits".into(),
-        data_hash: "d0".into(),
-        tables_hash: "e0".into(),
-        epoch_hashes: records.iter().map(|record| record.state_hash.clone()).collect(),
+        arithmetic: 2,
         status: "finished".into(),
+        run: "a0".into(),
+        config: "c0".into(),
+        data: DataRecord {
+            hash: "d0".into(),
+            examples: [1000, 100, 1797],
+            features: 64,
+            full_scale: 16,
+            classes,
+            image: None,
+        },
+        tables: "e0".into(),
+        metrics: "f0".into(),
+        ledger: Some("b0".into()),
+        checkpoint: "90".into(),
+        best: None,
+        states: true,
+        epoch_hashes: records.iter().map(|record| record.state_hash.clone()).collect(),
         test: Some(test),
-        kernel: "scalar".into(),
-        threads: 2,
-        train_seconds: 12.3,
-        warnings: vec!["a <warning>".into()],
+        notes: vec![],
     }
 }
 

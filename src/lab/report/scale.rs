@@ -13,6 +13,8 @@ pub(super) enum Curve {
     Linear,
     Log,
     Root,
+    /// As linear, for whole numbers that stand for cells side by side.
+    Cells,
 }
 
 /// Values `from ..= to` laid along a curve. Values outside are drawn at the nearer end.
@@ -27,7 +29,7 @@ impl Scale {
     fn bend(self, value: f64) -> f64 {
         let value = value.clamp(self.from, self.to);
         match self.curve {
-            Curve::Linear => value,
+            Curve::Linear | Curve::Cells => value,
             Curve::Log => value.max(f64::MIN_POSITIVE).log2(),
             Curve::Root => value.max(0.0).sqrt(),
         }
@@ -55,6 +57,11 @@ fn step(span: f64, parts: f64) -> f64 {
     let lead = raw / power;
     let round = [1.0, 2.0, 5.0].into_iter().find(|&round| lead <= round).unwrap_or(10.0);
     round * power
+}
+
+/// The least and the greatest.
+fn ends(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
+    values.map(|value| (value, value)).reduce(|(a, b), (c, d)| (a.min(c), b.max(d)))
 }
 
 fn multiples(from: f64, to: f64, step: f64) -> impl Iterator<Item = f64> {
@@ -141,49 +148,40 @@ impl Axis {
 
     /// Counts on a log curve; 0 is drawn on the bottom line.
     pub(super) fn counts(values: impl Iterator<Item = f64>, label: &str) -> Self {
-        let (mut low, mut high) = (f64::MAX, 1f64);
-        for value in values.filter(|&value| value >= 1.0) {
-            low = low.min(value);
-            high = high.max(value);
-        }
-        let from = low.min(high).log10().floor();
+        let (low, high) = ends(values.filter(|&value| value >= 1.0)).unwrap_or((1.0, 1.0));
+        let from = low.log10().floor();
         let to = high.log10().ceil().max(from + 1.0);
-        let stride = ((to - from) / 6.0).ceil();
-        let tick = |power: f64| {
-            let count = 10f64.powf(power);
-            (count, short(count as u64))
-        };
-        let ticks = multiples(from, to, stride).map(tick).collect();
-        let scale = Scale { curve: Curve::Log, from: 10f64.powf(from), to: 10f64.powf(to) };
-        Self { scale, ticks, label: label.into() }
+        Self::log(10f64.powf(from), 10f64.powf(to), |count| short(count.round() as u64), label)
     }
 
     /// Energies, given in picojoules, on a log curve that ends where they do.
     pub(super) fn picojoules(values: impl Iterator<Item = f64>, label: &str) -> Self {
-        let (mut low, mut high) = (f64::MAX, f64::MIN_POSITIVE);
-        for value in values.filter(|&value| value > 0.0 && value.is_finite()) {
-            low = low.min(value);
-            high = high.max(value);
-        }
-        if low > high {
-            (low, high) = (1.0, 1.0);
-        }
-        let (from, to) = (0.8 * low, 1.25 * high);
-        let decades = to.log10() - from.log10();
-        let stride = (decades / 6.0).ceil().max(1.0);
-        let parts: &[f64] = if decades > 2.5 {
-            &[1.0]
-        } else if decades > 0.9 {
-            &[1.0, 2.0, 5.0]
-        } else {
-            &[1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0]
+        let there = values.filter(|&value| value > 0.0 && value.is_finite());
+        let (low, high) = ends(there).unwrap_or((1.0, 1.0));
+        Self::log(0.8 * low, 1.25 * high, |tick| round(1e-12 * tick), label)
+    }
+
+    /// Positive numbers on a log curve.
+    pub(super) fn powers(low: f64, high: f64, label: &str) -> Self {
+        let show =
+            |mark: f64| if mark >= 1e4 { short(mark.round() as u64) } else { significant(mark) };
+        Self::log(low, high, show, label)
+    }
+
+    /// A log curve, marked at powers of ten and as many of their multiples as there is room for.
+    fn log(from: f64, to: f64, show: impl Fn(f64) -> String, label: &str) -> Self {
+        let decades = (to / from).log10();
+        let leads: &[f64] = match decades {
+            decades if decades > 4.0 => &[1.0],
+            decades if decades > 2.0 => &[1.0, 3.0],
+            decades if decades > 0.9 => &[1.0, 2.0, 5.0],
+            _ => &[1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0],
         };
-        let powers = multiples(from.log10().floor(), to.log10(), stride);
-        let ticks = powers
-            .flat_map(|power| parts.iter().map(move |part| part * 10f64.powf(power)))
-            .filter(|&tick| tick >= from && tick <= to)
-            .map(|tick| (tick, round(1e-12 * tick)))
-            .collect();
+        let powers = multiples(from.log10().floor(), to.log10(), (decades / 7.0).ceil().max(1.0));
+        let marks = powers.flat_map(|power| leads.iter().map(move |lead| lead * 10f64.powf(power)));
+        // powers of ten are not exact
+        let inside = marks.filter(|mark| (from * 0.999_999..=to * 1.000_001).contains(mark));
+        let ticks = inside.map(|mark| (mark, show(mark))).collect();
         Self { scale: Scale { curve: Curve::Log, from, to }, ticks, label: label.into() }
     }
 
@@ -206,6 +204,12 @@ impl Axis {
         Self { scale: Scale { curve, from, to }, ticks, label: label.into() }
     }
 
+    /// Cells side by side, some with a name; the first is number 0.
+    pub(super) fn cells(count: usize, ticks: Vec<(f64, String)>, label: &str) -> Self {
+        let scale = Scale { curve: Curve::Cells, from: -0.5, to: size(count) - 0.5 };
+        Self { scale, ticks, label: label.into() }
+    }
+
     /// Any numbers, with round marks; `low` and `high` stay where they are.
     pub(super) fn round(low: f64, high: f64, label: &str) -> Self {
         let high = if high > low { high } else { low + low.abs().max(1.0) };
@@ -217,24 +221,6 @@ impl Axis {
             ticks,
             label: label.into(),
         }
-    }
-
-    /// Positive numbers over several powers of ten.
-    pub(super) fn powers(low: f64, high: f64, label: &str) -> Self {
-        let (from, to) = (low.log10().floor(), high.log10().ceil());
-        let leads: &[f64] = match to - from {
-            span if span > 4.0 => &[1.0],
-            span if span > 2.0 => &[1.0, 3.0],
-            _ => &[1.0, 2.0, 5.0],
-        };
-        let stride = ((to - from) / 8.0).ceil().max(1.0);
-        let marks = multiples(from, to, stride);
-        let marks = marks.flat_map(|power| leads.iter().map(move |lead| lead * 10f64.powf(power)));
-        let inside = marks.filter(|mark| (low..=high).contains(mark));
-        let show =
-            |mark: f64| if mark >= 1e4 { short(mark.round() as u64) } else { significant(mark) };
-        let ticks = inside.map(|mark| (mark, show(mark))).collect();
-        Self { scale: Scale { curve: Curve::Log, from: low, to: high }, ticks, label: label.into() }
     }
 
     /// Levels from 0.

@@ -6,13 +6,15 @@
 //! png(svg)        such a figure as a picture of 300 dots an inch
 //! ```
 //!
-//! The script on the page computes its means, intervals and fronts itself, from the table, so that a reader can change
-//! what is shown; `statistics` holds the law, and tests/it/browser.rs compares.
+//! Means and intervals of all settings, fronts of all pairs of results, scales and the order of values are computed here
+//! and go to the page as data. Its script selects among them as a reader chooses, and draws. tests/it/browser.rs compares
+//! what is drawn with the table.
 
 mod curves;
 mod heat;
 mod json;
 mod library;
+mod measure;
 mod page;
 mod paper;
 mod pareto;

@@ -18,7 +18,7 @@ use crate::lab::report::{self, Heat, Picture, RunView};
 use crate::lab::store::checkpoint::{self, CheckpointError, Identity};
 use crate::lab::store::folder::{self, FolderError, RunFolder, names};
 use crate::lab::store::ledger::LedgerRecord;
-use crate::lab::store::record::{EpochRecord, Receipt};
+use crate::lab::store::record::{EpochRecord, Receipt, TimingRecord};
 use crate::task::classify::Examples;
 
 /// A report on disk.
@@ -40,7 +40,7 @@ pub struct ReportMade {
 pub fn report(path: &Path, data_root: Option<&DataRoot>) -> Result<ReportMade, RunError> {
     let folder = RunFolder::open(path)?;
     let text = folder::read_text(path, names::CONFIG)?;
-    let config = read_config(path)?;
+    let (config, _) = read_config(path)?;
     let receipt = folder::read_receipt(path)?;
     let mut records = folder::read_metrics(path)?;
     // the receipt is written last: what it does not name was not finished
@@ -64,7 +64,7 @@ pub fn report(path: &Path, data_root: Option<&DataRoot>) -> Result<ReportMade, R
     };
     let source = config.source()?;
     let loaded = match data_root.map(|root| data::load(&source, root)) {
-        Some(Ok(loaded)) if loaded.hash == receipt.data_hash => Some(loaded),
+        Some(Ok(loaded)) if loaded.hash == receipt.data.hash => Some(loaded),
         Some(Ok(_)) => {
             notes.push("no pictures of wrong answers: the data has changed since".into());
             None
@@ -79,6 +79,7 @@ pub fn report(path: &Path, data_root: Option<&DataRoot>) -> Result<ReportMade, R
         config: &config,
         text: &text,
         receipt: &receipt,
+        timing: &folder::read_timing(path),
         records: &records,
         counted: ledger.as_ref().zip(cost.as_ref()),
         state: state.as_deref(),
@@ -115,6 +116,8 @@ pub(super) struct Parts<'a> {
     pub text: &'a str,
     /// What went in and came out.
     pub receipt: &'a Receipt,
+    /// What it took.
+    pub timing: &'a TimingRecord,
     /// One an epoch.
     pub records: &'a [EpochRecord],
     /// What was counted, and its price.
@@ -144,10 +147,15 @@ impl Parts<'_> {
             Err(error) => (vec![], Some(error)),
         };
         let pictures = self.pictures();
+        let notes = self.receipt.notes.iter().map(ToString::to_string);
+        let warnings: Vec<_> = self.config.warnings().into_iter().chain(notes).collect();
         let view = RunView {
             title: self.title(),
             config: self.text,
             receipt: self.receipt,
+            data: format!("{}: {}", self.config.data_name(), self.receipt.data),
+            timing: self.timing,
+            warnings: &warnings,
             epochs: self.records,
             level_max: self.config.hardware.cell.level_bits.level_max(),
             heats: &heats,
@@ -182,8 +190,7 @@ impl Parts<'_> {
         let (Some(state), Some(record)) = (self.state, self.records.iter().find(of_epoch)) else {
             return Ok(vec![]);
         };
-        let identity =
-            Identity { config: &self.receipt.config_hash, data: &self.receipt.data_hash };
+        let identity = Identity { run: &self.receipt.run, data: &self.receipt.data.hash };
         let pathways = &record.pathways;
         let arrays: Vec<_> = pathways.iter().map(|p| (p.layer, &*p.pathway, p.shape)).collect();
         let levels = checkpoint::levels(state, identity, &record.state_hash, &arrays)?;

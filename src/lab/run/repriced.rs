@@ -3,12 +3,13 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use super::RunError;
 use super::train::read_config;
+use super::{RunError, records};
 use crate::chip::hardware::Hardware;
-use crate::lab::config::{Constants, load_model};
+use crate::lab::config::{Config, Constants, Model, load_model};
 use crate::lab::price::{Bill, Change, Cost, Plan, changes, price};
 use crate::lab::store::folder::{self, FolderError, names};
+use crate::lab::store::hash;
 use crate::lab::store::ledger::LedgerRecord;
 
 /// A run and the constants it is priced with.
@@ -24,9 +25,43 @@ pub struct Repriced {
     pub ledger: LedgerRecord,
     /// What the chip that made the run does and this program does not simulate.
     pub not_simulated: BTreeMap<String, String>,
+    /// [`Prices::fingerprint`] of the chip whose constants are used.
+    pub fingerprint: String,
     plan: Plan,
     hardware: Hardware,
     constants: Constants,
+}
+
+/// A chip as prices see it.
+#[derive(Debug, Clone)]
+pub struct Prices {
+    /// Its name.
+    pub name: String,
+    /// What it does and this program does not simulate.
+    pub not_simulated: BTreeMap<String, String>,
+    /// The chip.
+    pub hardware: Hardware,
+    /// Its constants.
+    pub constants: Constants,
+}
+
+impl Prices {
+    /// Those of a configuration.
+    #[must_use]
+    pub fn of(config: &Config) -> Self {
+        Self {
+            name: config.hardware_name.clone(),
+            not_simulated: config.not_simulated.clone(),
+            hardware: config.hardware.clone(),
+            constants: config.constants.clone(),
+        }
+    }
+
+    /// Says whether two are the same, without keeping either.
+    #[must_use]
+    pub fn fingerprint(&self) -> String {
+        hash::bytes(format!("{self:?}"))[..16].to_owned()
+    }
 }
 
 /// Reads a finished run, and another model if one is named.
@@ -34,41 +69,51 @@ pub struct Repriced {
 /// # Errors
 /// When the run is not finished or damaged, or there is no such model.
 pub fn reprice(path: &Path, other: Option<&str>) -> Result<Repriced, RunError> {
-    let config = read_config(path)?;
+    let prices = |name: &str| -> Result<Prices, RunError> {
+        let Model { name, hardware, constants, .. } = load_model(name)?;
+        Ok(Prices { name, hardware, constants, not_simulated: BTreeMap::new() })
+    };
+    let other = other.map(prices).transpose()?;
+    let mut repriced = reprice_as(path, other)?;
+    // what the run leaves out is what the chip that made it leaves out
+    repriced.not_simulated = read_config(path)?.0.not_simulated;
+    Ok(repriced)
+}
+
+/// Reads a finished run and prices it as if made on another chip; without one, as its own folder says.
+///
+/// # Errors
+/// When the run is not finished or damaged.
+pub fn reprice_as(path: &Path, other: Option<Prices>) -> Result<Repriced, RunError> {
+    let (config, _) = read_config(path)?;
+    let receipt = folder::read_receipt(path)?;
     let text = folder::read_text(path, names::LEDGER)?;
     let damaged = |name: &str, found| FolderError::Content { path: path.join(name), found };
+    if receipt.ledger.as_ref().is_some_and(|kept| *kept != hash::bytes(&text)) {
+        let found = format!("is not the ledger that {} speaks of", names::RECEIPT);
+        return Err(damaged(names::LEDGER, found).into());
+    }
     let ledger = LedgerRecord::parse(&text).map_err(|found| damaged(names::LEDGER, found))?;
-    let records = folder::read_metrics(path)?;
+    let records = records(path, &receipt)?;
     let Some(record) = records.last() else {
         return Err(damaged(names::METRICS, "has no record".into()).into());
     };
     let plan = Plan::of_records(&record.pathways);
-    let (made_on, run) = (config.hardware_name.clone(), config.hardware);
-    let not_simulated = config.not_simulated;
-    Ok(match other {
-        None => Repriced {
-            priced_as: made_on.clone(),
-            made_on,
-            changes: vec![],
-            ledger,
-            not_simulated,
-            plan,
-            hardware: run,
-            constants: config.constants,
-        },
-        Some(name) => {
-            let model = load_model(name)?;
-            Repriced {
-                made_on,
-                priced_as: model.name,
-                changes: changes(&run, &model.hardware),
-                ledger,
-                not_simulated,
-                plan,
-                hardware: model.hardware,
-                constants: model.constants,
-            }
-        }
+    let made_on = config.hardware_name.clone();
+    let changes = other.as_ref().map_or_else(Vec::new, |o| changes(&config.hardware, &o.hardware));
+    let prices = other.unwrap_or_else(|| Prices::of(&config));
+    let fingerprint = prices.fingerprint();
+    let Prices { name: priced_as, not_simulated, hardware, constants } = prices;
+    Ok(Repriced {
+        made_on,
+        priced_as,
+        changes,
+        ledger,
+        not_simulated,
+        fingerprint,
+        plan,
+        hardware,
+        constants,
     })
 }
 

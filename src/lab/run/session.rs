@@ -15,8 +15,10 @@ use crate::chip::ledger::{Event, Ledger};
 use crate::lab::config::{Config, Select, TrainOn};
 use crate::lab::data::Loaded;
 use crate::lab::store::checkpoint::{self, CheckpointError, Identity};
-use crate::lab::store::hash;
-use crate::lab::store::record::{EpochRecord, LayerRecord, PathwayRecord, Score, TestRecord};
+use crate::lab::store::record::{
+    DataRecord, EpochRecord, LayerRecord, Note, PathwayRecord, Score, TestRecord,
+};
+use crate::lab::store::{address, given, hash};
 use crate::task::classify::{Evaluation, Examples, Progress, Trainer};
 
 /// Wrong answers kept for the report.
@@ -41,9 +43,13 @@ pub struct Session {
     validation: Examples,
     test: Examples,
     select: Select,
-    config_hash: String,
-    data_hash: String,
+    /// Address of the run.
+    run: String,
+    data: DataRecord,
+    /// What the configuration lets expect.
     warnings: Vec<String>,
+    /// What the run showed.
+    notes: Vec<Note>,
 }
 
 impl Session {
@@ -55,13 +61,15 @@ impl Session {
     /// # Panics
     /// When threads cannot be started.
     pub fn new(config: &Config, data: Loaded, machine: Machine) -> Result<Self, RunError> {
-        let image = data.image.map(|shape| [shape.height, shape.width, shape.channels]);
+        let record = DataRecord::of(&data);
         let split = data.split;
         if split.train.is_empty() {
             let hint = "give it at least one example";
             return Err(RunError::Empty { part: "training", hint });
         }
-        let experiment = config.experiment(split.train.features(), split.train.classes(), image)?;
+        let experiment = config.experiment(record.features, record.classes, record.image)?;
+        let given = given::given(&experiment, config.train_on, config.select);
+        let run = address::key(given, &record.hash);
         let train = match config.train_on {
             TrainOn::Train => split.train,
             TrainOn::All => split.train.joined(&split.validation),
@@ -83,12 +91,13 @@ impl Session {
             validation,
             test: split.test,
             select: config.select,
-            config_hash: hash::text(&config.to_toml()),
-            data_hash: data.hash,
+            run,
+            data: record,
             warnings: config.warnings(),
+            notes: vec![],
         };
         if let Some(calibration) = session.calibrate() {
-            session.warn_of_low_codes(&calibration);
+            session.note_low_codes(&calibration);
         }
         Ok(session)
     }
@@ -136,48 +145,50 @@ impl Session {
         trainer.calibrate(train)
     }
 
-    fn warn_of_low_codes(&mut self, calibration: &Calibration) {
-        for (layer, &code) in calibration.code_max.iter().enumerate() {
-            if code <= 3 {
-                self.warnings.push(format!(
-                    "layer {layer}: on the first training examples the converters use codes 0 to {code} only; currents \
-                     grow while learning, but if accuracy stays low, give them more hw.adc.bits or a smaller range"
-                ));
+    fn note_low_codes(&mut self, calibration: &Calibration) {
+        for (layer, &code_max) in calibration.code_max.iter().enumerate() {
+            if code_max <= 3 {
+                self.notes.push(Note::LowCodes { layer, code_max });
             }
         }
     }
 
-    /// Hash of the resolved configuration.
+    /// Address of the run.
     #[must_use]
-    pub fn config_hash(&self) -> &str {
-        &self.config_hash
+    pub fn run(&self) -> &str {
+        &self.run
     }
 
-    /// Hash of the data.
+    /// What is learnt from.
     #[must_use]
-    pub fn data_hash(&self) -> &str {
-        &self.data_hash
+    pub const fn data(&self) -> &DataRecord {
+        &self.data
     }
 
-    /// What the user should know.
+    /// What the configuration lets expect, and what the run showed so far.
     #[must_use]
-    pub fn warnings(&self) -> &[String] {
-        &self.warnings
+    pub fn warnings(&self) -> Vec<String> {
+        self.warnings.iter().cloned().chain(self.notes.iter().map(ToString::to_string)).collect()
     }
 
-    /// Warns, once, when many conversions of the epochs so far saturated. Returns the warning.
-    pub fn warn_of_saturation(&mut self) -> Option<String> {
-        let ledger = self.trainer.driver().engine().ledger(Phase::Training);
-        let saturated = ledger.total(Event::SaturatedConversions);
-        let conversions = ledger.total(Event::Conversions);
-        let warning = "of the conversions so far saturate; converter ranges come from a net that has not learnt yet. \
-                       Raise hw.adc.headroom (4 or 5 trained MNIST)";
-        if saturated * 20 <= conversions || self.warnings.iter().any(|w| w.contains(warning)) {
+    /// What the run showed so far.
+    #[must_use]
+    pub fn notes(&self) -> &[Note] {
+        &self.notes
+    }
+
+    /// Notes, once, when many conversions of the epochs up to that of a record saturated.
+    pub fn note(&mut self, record: &EpochRecord) -> Option<&Note> {
+        let training = record.events.get(Phase::Training.name())?;
+        let total = |event: Event| training.get(event.name()).copied().unwrap_or(0);
+        let (saturated, conversions) =
+            (total(Event::SaturatedConversions), total(Event::Conversions));
+        let known = self.notes.iter().any(|note| matches!(note, Note::Saturated { .. }));
+        if known || saturated.saturating_mul(20) <= conversions {
             return None;
         }
-        let text = format!("{} % {warning}", saturated * 100 / conversions);
-        self.warnings.push(text.clone());
-        Some(text)
+        self.notes.push(Note::Saturated { epoch: record.epoch, saturated, conversions });
+        self.notes.last()
     }
 
     /// The training.
@@ -200,8 +211,15 @@ impl Session {
 
     /// The state as a checkpoint.
     #[must_use]
-    pub fn checkpoint(&self) -> Vec<u8> {
-        checkpoint::write(&self.trainer, self.identity())
+    pub fn checkpoint(&mut self) -> Vec<u8> {
+        let Self { trainer, run, data, .. } = self;
+        checkpoint::write(trainer, Identity { run, data: &data.hash })
+    }
+
+    /// Hash of the state.
+    #[must_use]
+    pub fn state_hash(&mut self) -> String {
+        hash::state(&mut self.trainer)
     }
 
     /// Restores a state.
@@ -209,25 +227,21 @@ impl Session {
     /// # Errors
     /// When the checkpoint is damaged or another run's.
     pub fn restore(&mut self, bytes: &[u8]) -> Result<(), CheckpointError> {
-        let (config, data) = (self.config_hash.clone(), self.data_hash.clone());
-        checkpoint::read(bytes, &mut self.trainer, Identity { config: &config, data: &data })
-    }
-
-    fn identity(&self) -> Identity<'_> {
-        Identity { config: &self.config_hash, data: &self.data_hash }
+        let Self { trainer, run, data, .. } = self;
+        checkpoint::read(bytes, trainer, Identity { run, data: &data.hash })
     }
 
     /// The record of the state before the first update.
     pub fn start(&mut self) -> EpochRecord {
         let (validation, currents) = self.validate();
-        self.record(None, validation, &currents, 0.0)
+        self.record(None, validation, &currents)
     }
 
-    /// One epoch and its record. `None` when `go_on` said to stop.
+    /// One epoch, its record, and the seconds of learning. `None` when `go_on` said to stop.
     pub fn epoch(
         &mut self,
         go_on: &mut (dyn FnMut(Progress) -> bool + Send),
-    ) -> Option<EpochRecord> {
+    ) -> Option<(EpochRecord, f64)> {
         let started = Instant::now();
         let again = matches!(
             self.trainer.experiment().hardware.adc,
@@ -241,7 +255,7 @@ impl Session {
         let seconds = started.elapsed().as_secs_f64();
         let total = self.train.len() as u64;
         let (validation, currents) = self.validate();
-        Some(self.record(Some(Score { correct, total }), validation, &currents, seconds))
+        Some((self.record(Some(Score { correct, total }), validation, &currents), seconds))
     }
 
     fn validate(&mut self) -> (Option<Score>, Vec<Currents>) {
@@ -289,12 +303,12 @@ impl Session {
     }
 
     fn record(
-        &self,
+        &mut self,
         train: Option<Score>,
         validation: Option<Score>,
         currents: &[Currents],
-        train_seconds: f64,
     ) -> EpochRecord {
+        let state_hash = self.state_hash();
         let driver = self.trainer.driver();
         let engine = driver.engine();
         let statistics = self.trainer.statistics();
@@ -346,12 +360,13 @@ impl Session {
             updates: driver.updates(),
             train,
             validation,
-            state_hash: hash::state(driver),
+            state_hash,
             layers,
             pathways,
             events: events.into_iter().collect(),
             cycles: cycles.into_iter().collect(),
-            train_seconds,
+            #[cfg(feature = "grown")]
+            grown: 7,
         }
     }
 }

@@ -8,15 +8,16 @@ use std::path::Path;
 use std::time::{Duration, Instant};
 
 use super::session::chosen;
-use super::{Machine, RunError, Session};
+use super::{Machine, RunError, Session, proof};
 use crate::lab::config::{self, Config, Select, Sources};
 use crate::lab::data::{self, DataRoot, ImageShape, Loaded};
 use crate::lab::price::Cost;
-use crate::lab::store::ARITHMETIC;
-use crate::lab::store::folder::{self, RunFolder, names};
-use crate::lab::store::hash;
+use crate::lab::store::folder::{self, FolderError, RunFolder, names};
 use crate::lab::store::ledger::LedgerRecord;
-use crate::lab::store::record::{EpochRecord, Receipt, TestRecord};
+use crate::lab::store::record::{
+    BestRecord, DataRecord, EpochRecord, Receipt, TestRecord, TimingRecord,
+};
+use crate::lab::store::{address, given, hash};
 use crate::task::classify::Progress;
 
 /// What happens while a run is carried out.
@@ -37,8 +38,8 @@ pub enum Event<'a> {
     },
     /// A batch was learnt from. Returning false stops the run.
     Batch(Progress),
-    /// An epoch is finished and on disk.
-    Epoch(&'a EpochRecord),
+    /// An epoch is finished and on disk; learning took so many seconds.
+    Epoch(&'a EpochRecord, f64),
     /// Something to know came up.
     Warning(&'a str),
 }
@@ -64,6 +65,8 @@ pub struct Outcome {
     pub receipt: Receipt,
     /// Its records.
     pub records: Vec<EpochRecord>,
+    /// What it took here.
+    pub timing: TimingRecord,
     /// The summary table.
     pub summary: String,
     /// What it cost on its chip, the final test aside.
@@ -82,12 +85,13 @@ pub fn train(
     on_event: &mut (dyn FnMut(Event<'_>) -> bool + Send),
 ) -> Result<Outcome, RunError> {
     let loaded = data::load(&config.source()?, data_root)?;
-    let (description, image) = (loaded.description.clone(), loaded.image);
+    let about = (loaded.description.clone(), loaded.image);
     let session = Session::new(config, loaded, machine)?;
     let name = format!("{}-{}-seed{}", config.data_name(), config.rule_name(), config.seed);
     let folder = RunFolder::create(root, &name)?;
-    folder.write(names::CONFIG, config.to_toml().as_bytes())?;
-    Run::new(config, folder, machine, (description, image), session).carry_out(on_event)
+    let text = config.to_toml();
+    folder.write(names::CONFIG, text.as_bytes())?;
+    Run::new(config, text, folder, machine, about, session).carry_out(on_event)
 }
 
 /// Continues a run from its last finished epoch.
@@ -101,13 +105,13 @@ pub fn resume(
     on_event: &mut (dyn FnMut(Event<'_>) -> bool + Send),
 ) -> Result<Outcome, RunError> {
     let folder = RunFolder::open(path)?;
-    let config = read_config(path)?;
+    let (config, text) = read_config(path)?;
     let loaded = data::load(&config.source()?, data_root)?;
-    let (description, image) = (loaded.description.clone(), loaded.image);
-    let mut session = Session::new(&config, loaded, machine)?;
-    let records = restored(&mut session, path)?;
-    let run = Run::new(&config, folder, machine, (description, image), session);
-    Run { records, ..run }.carry_out(on_event)
+    let about = (loaded.description.clone(), loaded.image);
+    let session = Session::new(&config, loaded, machine)?;
+    let mut run = Run::new(&config, text, folder, machine, about, session);
+    run.restore()?;
+    run.carry_out(on_event)
 }
 
 /// Carries a run out in a folder that the caller holds: new, or from where it was left. A damaged state is thrown away.
@@ -122,76 +126,50 @@ pub fn carry_on(
     keeping: Keeping,
     on_event: &mut (dyn FnMut(Event<'_>) -> bool + Send),
 ) -> Result<Outcome, RunError> {
-    let mut session = Session::new(config, loaded.clone(), machine)?;
+    let about = (loaded.description.clone(), loaded.image);
+    let session = || Session::new(config, loaded.clone(), machine);
     let text = config.to_toml();
     let begun = folder::read_text(folder.path(), names::CONFIG).is_ok_and(|found| found == text);
-    let records = if begun { restored(&mut session, folder.path()) } else { Ok(vec![]) };
-    let records = match records {
-        Ok(records) => records,
-        Err(error @ RunError::Finished { .. }) => return Err(error),
-        Err(_) => {
-            session = Session::new(config, loaded.clone(), machine)?;
-            vec![]
+    let mut run = Run::new(config, text, folder, machine, about, session()?);
+    run.keeping = keeping;
+    if begun {
+        match run.restore() {
+            Ok(()) => {}
+            Err(error @ RunError::Finished { .. }) => return Err(error),
+            Err(_) => run.start_over(session()?),
         }
-    };
-    if !begun {
-        folder.write(names::CONFIG, text.as_bytes())?;
+    } else {
+        run.folder.write(names::CONFIG, run.text.as_bytes())?;
     }
-    let about = (loaded.description.clone(), loaded.image);
-    let run = Run::new(config, folder, machine, about, session);
-    Run { records, keeping, ..run }.carry_out(on_event)
+    run.carry_out(on_event)
 }
 
-/// Brings a session to the last finished epoch on disk; none of it when there is no checkpoint.
-fn restored(session: &mut Session, path: &Path) -> Result<Vec<EpochRecord>, RunError> {
-    if !path.join(names::CHECKPOINT).exists() {
-        return Ok(vec![]);
-    }
-    if let Ok(receipt) = folder::read_receipt(path) {
-        if receipt.status == "finished" {
-            return Err(RunError::Finished { path: path.display().to_string() });
-        }
-        check_receipt(&receipt, session)?;
-    }
-    restore(session, path, names::CHECKPOINT)?;
-    let mut records = folder::read_metrics(path)?;
-    let finished = session.trainer().epoch() as usize;
-    if records.len() <= finished {
-        let found = format!("has {} records, but epoch {finished} is finished", records.len());
-        return Err(folder::FolderError::Content { path: path.join(names::METRICS), found }.into());
-    }
-    records.truncate(finished + 1);
-    Ok(records)
-}
-
-/// The configuration a run was made with.
-pub(super) fn read_config(path: &Path) -> Result<Config, RunError> {
+/// The configuration a run was made with, and its text.
+pub(super) fn read_config(path: &Path) -> Result<(Config, String), RunError> {
     let text = folder::read_text(path, names::CONFIG)?;
     let name = path.join(names::CONFIG).display().to_string();
-    Ok(config::load(&Sources { experiment: Some((&name, &text)), ..Sources::default() })?)
+    let sources = Sources { experiment: Some((&name, &text)), ..Sources::default() };
+    Ok((config::load(&sources)?, text))
 }
 
-pub(super) fn check_receipt(receipt: &Receipt, session: &Session) -> Result<(), RunError> {
-    if receipt.arithmetic != ARITHMETIC {
-        return Err(RunError::Arithmetic { found: receipt.arithmetic, wanted: ARITHMETIC });
-    }
-    if receipt.data_hash != session.data_hash() {
-        let (found, wanted) = (session.data_hash().into(), receipt.data_hash.clone());
-        return Err(RunError::DataChanged { found, wanted });
-    }
-    if receipt.config_hash != session.config_hash() {
-        let (found, wanted) = (session.config_hash().into(), receipt.config_hash.clone());
-        return Err(RunError::ConfigChanged { found, wanted });
-    }
-    Ok(())
+/// The address that a run folder's configuration has with these data.
+///
+/// # Errors
+/// When the configuration is missing, damaged, or does not fit the data.
+pub fn address_of(path: &Path, data: &DataRecord) -> Result<String, RunError> {
+    let (config, _) = read_config(path)?;
+    let experiment = config.experiment(data.features, data.classes, data.image)?;
+    let given = given::given(&experiment, config.train_on, config.select);
+    Ok(address::key(given, &data.hash))
 }
 
-fn restore(session: &mut Session, path: &Path, name: &str) -> Result<(), RunError> {
+fn restore(session: &mut Session, path: &Path, name: &str) -> Result<Vec<u8>, RunError> {
     let bytes = folder::read_checkpoint(path, name)?;
     session.restore(&bytes).map_err(|error| RunError::Checkpoint {
         path: path.join(name).display().to_string(),
         error,
-    })
+    })?;
+    Ok(bytes)
 }
 
 /// Reads the test set with the chosen state of a run.
@@ -203,57 +181,140 @@ pub fn evaluate(
     data_root: &DataRoot,
     machine: Machine,
 ) -> Result<(TestRecord, String), RunError> {
-    let config = read_config(path)?;
+    let (config, text) = read_config(path)?;
     let mut session = Session::new(&config, data::load(&config.source()?, data_root)?, machine)?;
-    check_receipt(&folder::read_receipt(path)?, &session)?;
-    let records = folder::read_metrics(path)?;
-    let best = chosen(config.select, &records).map(RunFolder::best_name);
-    let name = best.filter(|name| path.join(name).exists());
-    restore(&mut session, path, name.as_deref().unwrap_or(names::CHECKPOINT))?;
-    let state = hash::state(session.trainer().driver());
-    Ok((session.test(), state))
+    let receipt = folder::read_receipt(path)?;
+    proof::inputs(&receipt, &session, &text)?;
+    let records = proof::records(path, &receipt)?;
+    let best = chosen(config.select, &records).filter(|_| config.select == Select::BestValidation);
+    if best != receipt.best.as_ref().map(|best| best.epoch) {
+        let found = "names another best state than its records do".into();
+        return Err(FolderError::Content { path: path.join(names::RECEIPT), found }.into());
+    }
+    let name = best.map_or_else(|| names::CHECKPOINT.to_owned(), RunFolder::best_name);
+    let name = &*name;
+    let bytes = restore(&mut session, path, name)?;
+    let state = session.state_hash();
+    let epoch = session.trainer().epoch();
+    proof::checkpoint(path, name, &receipt, epoch, (&bytes, &state))?;
+    let test = session.test();
+    if receipt.test.as_ref().is_some_and(|kept| *kept != test) {
+        let found = "has another test result than its own state gives".into();
+        return Err(FolderError::Content { path: path.join(names::RECEIPT), found }.into());
+    }
+    Ok((test, state))
 }
 
 struct Run<'a> {
     config: &'a Config,
+    /// `config.toml`, as it lies in the folder.
+    text: String,
     folder: RunFolder,
-    machine: Machine,
     description: String,
     image: Option<ImageShape>,
     session: Session,
     records: Vec<EpochRecord>,
+    timing: TimingRecord,
     keeping: Keeping,
     /// When files were written last.
     written: Instant,
     /// Whether epochs have ended since.
     pending: bool,
-    /// The best state so far and its epoch, while it is not on disk.
-    best: Option<(u32, Vec<u8>)>,
+    /// The best state so far, if the configuration chooses one.
+    best: Option<BestRecord>,
+    /// It, while it is not on disk.
+    best_state: Option<Vec<u8>>,
 }
 
 impl<'a> Run<'a> {
     fn new(
         config: &'a Config,
+        text: String,
         folder: RunFolder,
         machine: Machine,
         (description, image): (String, Option<ImageShape>),
         session: Session,
     ) -> Self {
-        let (written, keeping) = (Instant::now(), Keeping::ALL);
-        let records = vec![];
         Self {
             config,
+            text,
             folder,
-            machine,
             description,
             image,
             session,
-            records,
-            keeping,
-            written,
+            records: vec![],
+            timing: TimingRecord {
+                version: env!("CARGO_PKG_VERSION").into(),
+                kernel: machine.backend.name().into(),
+                threads: machine.threads,
+                epoch_seconds: vec![],
+            },
+            keeping: Keeping::ALL,
+            written: Instant::now(),
             pending: false,
             best: None,
+            best_state: None,
         }
+    }
+
+    /// Forgets everything and starts with another session.
+    fn start_over(&mut self, session: Session) {
+        self.session = session;
+        self.records.clear();
+        self.timing.epoch_seconds.clear();
+        (self.best, self.best_state) = (None, None);
+    }
+
+    /// Brings the session to the last finished epoch on disk; to none when there is no checkpoint.
+    fn restore(&mut self) -> Result<(), RunError> {
+        let path = self.folder.path().to_path_buf();
+        if !path.join(names::CHECKPOINT).exists() && !path.join(names::RECEIPT).exists() {
+            return Ok(());
+        }
+        let receipt = folder::read_receipt(&path)?;
+        if receipt.status == "finished" {
+            return Err(RunError::Finished { path: path.display().to_string() });
+        }
+        proof::inputs(&receipt, &self.session, &self.text)?;
+        let mut records = proof::records(&path, &receipt)?;
+        if !path.join(names::CHECKPOINT).exists() {
+            // killed before the first one was in its place
+            return Ok(());
+        }
+        let bytes = restore(&mut self.session, &path, names::CHECKPOINT)?;
+        let (epoch, state) = (self.session.trainer().epoch(), self.session.state_hash());
+        proof::checkpoint(&path, names::CHECKPOINT, &receipt, epoch, (&bytes, &state))?;
+        // a kill may have come between the receipt and the checkpoint it speaks of
+        let last = records.len() == epoch as usize + 1;
+        records.truncate(epoch as usize + 1);
+        for record in &records {
+            let _ = self.session.note(record);
+        }
+        self.best = self.best_on_disk(&path, &records)?;
+        self.records = records;
+        if last {
+            let expected = self.receipt("running", None, hash::bytes(&bytes), None);
+            let expected = Receipt { states: receipt.states, ..expected };
+            proof::same_receipt(&path, &receipt, &expected)?;
+        }
+        let seconds = folder::read_timing(&path).epoch_seconds;
+        self.timing.epoch_seconds =
+            seconds.into_iter().chain(std::iter::repeat(0.0)).take(self.records.len()).collect();
+        Ok(())
+    }
+
+    /// The best state that the records name, from its file.
+    fn best_on_disk(
+        &mut self,
+        path: &Path,
+        records: &[EpochRecord],
+    ) -> Result<Option<BestRecord>, RunError> {
+        let best = chosen(self.config.select, records);
+        let (Select::BestValidation, Some(epoch)) = (self.config.select, best) else {
+            return Ok(None);
+        };
+        let bytes = folder::read_checkpoint(path, &RunFolder::best_name(epoch))?;
+        Ok(Some(BestRecord { epoch, checkpoint: hash::bytes(bytes) }))
     }
 
     fn carry_out(
@@ -265,33 +326,34 @@ impl<'a> Run<'a> {
         on_event(Event::Started {
             folder: &path,
             data: &self.description,
-            warnings: self.session.warnings(),
+            warnings: &self.session.warnings(),
             epoch: self.session.trainer().epoch(),
             epochs,
         });
         if self.records.is_empty() {
             let record = self.session.start();
-            self.keep(record)?;
+            self.keep(record, 0.0)?;
         }
         while self.session.trainer().epoch() < epochs {
             let epoch = self.session.trainer().epoch();
-            let record = self.session.epoch(&mut |progress| on_event(Event::Batch(progress)));
-            let Some(record) = record else {
+            let learnt = self.session.epoch(&mut |progress| on_event(Event::Batch(progress)));
+            let Some((record, seconds)) = learnt else {
                 return Err(RunError::Stopped { epoch, path: path.display().to_string() });
             };
-            let warning = self.session.warn_of_saturation();
-            self.keep(record)?;
-            on_event(Event::Epoch(self.records.last().expect("just kept")));
-            if let Some(warning) = warning {
-                on_event(Event::Warning(&warning));
+            let note = self.session.note(&record).map(ToString::to_string);
+            self.keep(record, seconds)?;
+            on_event(Event::Epoch(self.records.last().expect("just kept"), seconds));
+            if let Some(note) = note {
+                on_event(Event::Warning(&note));
             }
         }
         self.finish()
     }
 
-    /// Puts a finished epoch on disk: best state and records first, the checkpoint that makes them count last.
-    fn keep(&mut self, record: EpochRecord) -> Result<(), RunError> {
+    /// Puts a finished epoch on disk, if it is time to.
+    fn keep(&mut self, record: EpochRecord, seconds: f64) -> Result<(), RunError> {
         self.records.push(record);
+        self.timing.epoch_seconds.push(seconds);
         let epoch = self.session.trainer().epoch();
         let best = chosen(self.config.select, &self.records);
         let is_best = self.config.select == Select::BestValidation && best == Some(epoch);
@@ -302,7 +364,8 @@ impl<'a> Run<'a> {
         }
         let state = self.session.checkpoint();
         if is_best {
-            self.best = Some((epoch, state.clone()));
+            self.best = Some(BestRecord { epoch, checkpoint: hash::bytes(&state) });
+            self.best_state = Some(state.clone());
         }
         if !due {
             return Ok(());
@@ -310,66 +373,85 @@ impl<'a> Run<'a> {
         self.flush(&state)
     }
 
-    /// Writes down all epochs so far; `state` is the present one.
+    /// Writes down all epochs so far; `state` is the present one. Best state and records come first, then the receipt
+    /// that speaks of them, and last the checkpoint that makes them count.
     fn flush(&mut self, state: &[u8]) -> Result<(), RunError> {
-        if let Some((epoch, state)) = self.best.take() {
-            self.folder.write(&RunFolder::best_name(epoch), &state)?;
+        if let (Some(state), Some(best)) = (self.best_state.take(), &self.best) {
+            self.folder.write(&RunFolder::best_name(best.epoch), &state)?;
         }
         self.folder.write_metrics(&self.records)?;
+        self.folder.write_timing(&self.timing)?;
+        self.folder.write_receipt(&self.receipt("running", None, hash::bytes(state), None))?;
         self.folder.write(names::CHECKPOINT, state)?;
-        self.folder.write_receipt(&self.receipt("running", None))?;
-        self.folder.tidy(chosen(self.config.select, &self.records));
+        self.folder.tidy(self.best.as_ref().map(|best| best.epoch));
         (self.written, self.pending) = (Instant::now(), false);
         Ok(())
     }
 
-    fn receipt(&self, status: &str, test: Option<TestRecord>) -> Receipt {
+    /// What the run can prove so far; `checkpoint` is the hash of the state after the last record.
+    fn receipt(
+        &self,
+        status: &str,
+        ledger: Option<&str>,
+        checkpoint: String,
+        test: Option<TestRecord>,
+    ) -> Receipt {
+        let Self { session, records, best, text, .. } = self;
+        let receipt = proof::receipt(session, text, records, checkpoint, best.clone());
         Receipt {
-            version: env!("CARGO_PKG_VERSION").into(),
-            arithmetic: ARITHMETIC,
-            config_hash: self.session.config_hash().into(),
-            data: self.description.clone(),
-            data_hash: self.session.data_hash().into(),
-            tables_hash: hash::tables(self.session.trainer().driver()),
-            epoch_hashes: self.records.iter().map(|r| r.state_hash.clone()).collect(),
             status: status.into(),
+            ledger: ledger.map(hash::bytes),
+            states: self.keeping.states,
             test,
-            kernel: self.machine.backend.name().into(),
-            threads: self.machine.threads,
-            train_seconds: self.records.iter().map(|r| r.train_seconds).sum(),
-            warnings: self.session.warnings().to_vec(),
+            ..receipt
         }
     }
 
     fn finish(mut self) -> Result<Outcome, RunError> {
+        let state = self.session.checkpoint();
         if self.keeping.states && self.pending {
-            self.flush(&self.session.checkpoint())?;
+            self.flush(&state)?;
         }
+        let checkpoint = hash::bytes(&state);
         let ledger = LedgerRecord::of(self.session.trainer().driver().engine());
+        let ledger_text = ledger.to_json();
         self.folder.write_metrics(&self.records)?;
-        self.folder.write(names::LEDGER, ledger.to_json().as_bytes())?;
+        self.folder.write_timing(&self.timing)?;
+        self.folder.write(names::LEDGER, ledger_text.as_bytes())?;
         let cost = super::report::cost(self.config, &ledger, &self.records);
         let epoch = self.session.trainer().epoch();
-        let best = chosen(self.config.select, &self.records).unwrap_or(epoch);
         let path = self.folder.path().to_path_buf();
-        if best != epoch {
-            match self.best.take() {
-                Some((_, state)) => self.session.restore(&state).map_err(|error| {
-                    RunError::Checkpoint { path: "the best state".into(), error }
-                })?,
-                None => restore(&mut self.session, &path, &RunFolder::best_name(best))?,
+        match self.best.clone() {
+            Some(best) if best.epoch != epoch => {
+                let bytes = match self.best_state.take() {
+                    Some(state) => {
+                        self.session.restore(&state).map_err(|error| RunError::Checkpoint {
+                            path: "the best state".into(),
+                            error,
+                        })?;
+                        state
+                    }
+                    None => restore(&mut self.session, &path, &RunFolder::best_name(best.epoch))?,
+                };
+                if hash::bytes(bytes) != best.checkpoint {
+                    let path = path.join(RunFolder::best_name(best.epoch));
+                    let found = "is not the state that the run wrote".into();
+                    return Err(FolderError::Content { path, found }.into());
+                }
             }
+            _ => {}
         }
-        let state = self.session.checkpoint();
+        let read = self.session.checkpoint();
         let test = (!self.session.test_examples().is_empty()).then(|| self.session.test());
-        let receipt = self.receipt("finished", test);
+        let receipt = self.receipt("finished", Some(&ledger_text), checkpoint, test);
         let page = super::report::Parts {
             config: self.config,
-            text: &self.config.to_toml(),
+            text: &self.text,
             receipt: &receipt,
+            timing: &self.timing,
             records: &self.records,
             counted: Some((&ledger, &cost)),
-            state: self.keeping.states.then_some(&state),
+            state: self.keeping.states.then_some(&read),
             examples: self.image.map(|image| (self.session.test_examples(), image)),
         };
         let page = page.draw();
@@ -378,6 +460,7 @@ impl<'a> Run<'a> {
         if !self.keeping.states {
             self.folder.forget_states();
         }
-        Ok(Outcome { receipt, records: self.records, summary: page.summary, cost })
+        let Self { records, timing, .. } = self;
+        Ok(Outcome { receipt, records, timing, summary: page.summary, cost })
     }
 }

@@ -1,20 +1,27 @@
-//! Doing a run again and comparing.
+//! Doing a run again and comparing everything that its folder says.
 
 use std::path::Path;
 
-use super::train::{check_receipt, read_config};
+use serde::Serialize;
+use serde_json::Value;
+
+use super::proof::{self, Difference};
+use super::session::chosen;
+use super::train::read_config;
 use super::{Machine, RunError, Session};
 use crate::lab::config::Select;
 use crate::lab::data::{self, DataRoot};
-use crate::lab::store::folder;
+use crate::lab::store::checkpoint;
+use crate::lab::store::folder::{self, FolderError, RunFolder, names};
 use crate::lab::store::hash;
-use crate::lab::store::record::TestRecord;
+use crate::lab::store::ledger::LedgerRecord;
+use crate::lab::store::record::{BestRecord, EpochRecord, Receipt, TestRecord};
 use crate::task::classify::Progress;
 
 /// What doing a run again showed.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Verdict {
-    /// Every hash compared is equal.
+    /// Everything compared is equal.
     Same {
         /// Epochs compared, epoch 0 included.
         epochs: usize,
@@ -22,10 +29,12 @@ pub enum Verdict {
         state_hash: String,
         /// Whether the final test was compared too.
         test: bool,
+        /// Files, or parts of them, that were not compared.
+        unchecked: Vec<String>,
     },
     /// Something differs.
     Different {
-        /// What, in words: which epoch, layer, pathway.
+        /// What, in words: which file, epoch, field.
         what: String,
         /// What the run says.
         wanted: String,
@@ -34,7 +43,20 @@ pub enum Verdict {
     },
 }
 
-/// Re-executes a run, or its first `epochs` epochs, and compares every state hash and, at the end, the test.
+/// What stops a comparison: a difference, or an error.
+enum Halt {
+    Different { what: String, wanted: String, found: String },
+    Error(RunError),
+}
+
+impl<E: Into<RunError>> From<E> for Halt {
+    fn from(error: E) -> Self {
+        Self::Error(error.into())
+    }
+}
+
+/// Re-executes a run, or its first `epochs` epochs, and compares every number of its records, its ledger, its receipt and
+/// its checkpoints with what comes out, and every file with the hash that the receipt has of it.
 ///
 /// # Errors
 /// When the run is damaged, its data is not the same, or the caller stops it.
@@ -45,75 +67,205 @@ pub fn verify(
     epochs: Option<u32>,
     on_batch: &mut (dyn FnMut(Progress) -> bool + Send),
 ) -> Result<Verdict, RunError> {
-    let config = read_config(path)?;
+    match compare(path, data_root, machine, epochs, on_batch) {
+        Ok(verdict) => Ok(verdict),
+        Err(Halt::Error(error)) => Err(error),
+        Err(Halt::Different { what, wanted, found }) => {
+            Ok(Verdict::Different { what, wanted, found })
+        }
+    }
+}
+
+fn differ(what: impl Into<String>, wanted: &str, found: &str) -> Halt {
+    Halt::Different { what: what.into(), wanted: wanted.into(), found: found.into() }
+}
+
+fn same<T: Serialize>(what: &str, kept: &Value, found: &T) -> Result<(), Halt> {
+    match proof::difference(kept, found) {
+        None => Ok(()),
+        Some(Difference { place, kept, found }) => {
+            Err(differ(format!("{what}, `{place}`"), &kept, &found))
+        }
+    }
+}
+
+fn compare(
+    path: &Path,
+    data_root: &DataRoot,
+    machine: Machine,
+    epochs: Option<u32>,
+    on_batch: &mut (dyn FnMut(Progress) -> bool + Send),
+) -> Result<Verdict, Halt> {
+    let (config, text) = read_config(path)?;
     let receipt = folder::read_receipt(path)?;
     let mut session = Session::new(&config, data::load(&config.source()?, data_root)?, machine)?;
-    check_receipt(&receipt, &session)?;
-    let different = |what: String, wanted: &str, found: &str| {
-        Ok(Verdict::Different { what, wanted: wanted.into(), found: found.into() })
+    proof::inputs(&receipt, &session, &text)?;
+    let kept = proof::records(path, &receipt)?;
+    // as they were written: a record of an earlier program has fewer fields
+    let lines = proof::records_text(path, &receipt)?;
+    let lines: Vec<Value> =
+        lines.lines().filter_map(|line| serde_json::from_str(line).ok()).collect();
+    let written: Value = parsed(path, names::RECEIPT)?;
+    let files = Files::read(path, &receipt)?;
+    let last = epochs.map_or(kept.len(), |epochs| kept.len().min(epochs as usize + 1));
+    let whole = last == kept.len();
+    let finished = receipt.status == "finished";
+    let best_epoch = match config.select {
+        Select::BestValidation => chosen(config.select, &kept),
+        Select::Last => None,
     };
-    let tables = hash::tables(session.trainer().driver());
-    if tables != receipt.tables_hash {
-        return different("activation tables".into(), &receipt.tables_hash, &tables);
-    }
-    let kept = folder::read_metrics(path)?;
-    let wanted = &receipt.epoch_hashes;
-    let last = epochs.map_or(wanted.len(), |epochs| wanted.len().min(epochs as usize + 1));
-    let mut best: Option<(u64, TestRecord)> = None;
-    let whole = last == wanted.len() && receipt.status == "finished";
-    let mut state_hash = String::new();
-    for (epoch, wanted) in wanted.iter().enumerate().take(last) {
+
+    let mut records: Vec<EpochRecord> = Vec::new();
+    let mut seen = false;
+    let mut best: Option<(BestRecord, Option<TestRecord>)> = None;
+    for (kept, line) in kept[..last].iter().zip(&lines) {
+        let epoch = kept.epoch;
         let record = if epoch == 0 {
             session.start()
         } else {
-            let stopped =
-                || RunError::Stopped { epoch: epoch as u32 - 1, path: path.display().to_string() };
-            session.epoch(on_batch).ok_or_else(stopped)?
+            let path = path.display().to_string();
+            let stopped = || RunError::Stopped { epoch: epoch - 1, path };
+            session.epoch(on_batch).ok_or_else(stopped)?.0
         };
-        if record.state_hash != *wanted {
-            let what =
-                kept.get(epoch).map_or_else(String::new, |kept| first_difference(kept, &record));
-            let what = format!("state after epoch {epoch}{what}");
-            return different(what, wanted, &record.state_hash);
+        let _ = session.note(&record);
+        let state_differs = record.state_hash != kept.state_hash;
+        if state_differs && epoch as usize + 1 == receipt.epoch_hashes.len() {
+            let found = session.checkpoint();
+            let place = files.checkpoint.as_deref();
+            let place = place.and_then(|kept| checkpoint::first_difference(kept, &found));
+            let place = place.map_or(String::new(), |place| format!(", first seen in {place}"));
+            let what = format!("state after epoch {epoch}{place}");
+            return Err(differ(what, &kept.state_hash, &record.state_hash));
         }
-        state_hash.clone_from(&record.state_hash);
-        if whole && epoch > 0 && config.select == Select::BestValidation {
-            let score = record.validation.map_or(0, |score| score.correct);
-            if best.as_ref().is_none_or(|(most, _)| score > *most) {
-                // reading the test set charges a ledger, which is part of the state
-                let state = session.checkpoint();
-                best = Some((score, session.test()));
+        same(&format!("record of epoch {epoch} in {}", names::METRICS), line, &record)?;
+        records.push(record);
+        let kept = files.checkpoint.as_ref().filter(|_| !finished);
+        seen |= kept.is_some_and(|kept| *kept == session.checkpoint());
+        if best_epoch == Some(epoch) {
+            let state = session.checkpoint();
+            let checkpoint = hash::bytes(&state);
+            files.best(&state, epoch)?;
+            // reading the test set charges a ledger, which is part of the state
+            let tested = whole && finished && receipt.test.is_some();
+            let test = tested.then(|| session.test());
+            if test.is_some() {
                 session
                     .restore(&state)
                     .map_err(|error| RunError::Checkpoint { path: "memory".into(), error })?;
             }
+            best = Some((BestRecord { epoch, checkpoint }, test));
         }
     }
-    let mut tested = false;
-    if let (true, Some(wanted)) = (whole, &receipt.test) {
-        let mut found = best.map_or_else(|| session.test(), |(_, test)| test);
-        // receipts of earlier programs list none
-        if wanted.confused.is_empty() {
-            found.confused.clear();
-        }
-        if found != *wanted {
-            let show = |test: &TestRecord| format!("{:?} in epoch {}", test.score, test.epoch);
-            return different("test result".into(), &show(wanted), &show(&found));
-        }
-        tested = true;
+    let state_hash = records.last().map(|record| record.state_hash.clone()).unwrap_or_default();
+    let mut unchecked = vec![names::REPORT.to_owned(), names::TIMING.to_owned()];
+    if !whole {
+        unchecked.push(format!("epochs after {}", last.saturating_sub(1)));
+        unchecked.push(format!("{} and {} beyond their hashes", names::LEDGER, names::CHECKPOINT));
+        return Ok(Verdict::Same { epochs: last, state_hash, test: false, unchecked });
     }
-    Ok(Verdict::Same { epochs: last, state_hash, test: tested })
+
+    let state = session.checkpoint();
+    files.last(&state, seen)?;
+    let (best, mut test) = best.map_or((None, None), |(best, test)| (Some(best), test));
+    let mut expected = proof::receipt(&session, &text, &records, hash::bytes(&state), best);
+    if finished {
+        let ledger = LedgerRecord::of(session.trainer().driver().engine());
+        if let Some(kept) = &files.ledger {
+            same(names::LEDGER, kept, &ledger)?;
+        }
+        expected.ledger.clone_from(&receipt.ledger);
+        expected.status.clone_from(&receipt.status);
+        let untested = test.is_none() && !session.test_examples().is_empty();
+        if untested {
+            test = Some(session.test());
+        }
+        expected.test = test;
+    }
+    // compared number by number; their bytes are those that the receipt names
+    expected.metrics.clone_from(&receipt.metrics);
+    expected.states = receipt.states;
+    same(names::RECEIPT, &written, &expected)?;
+    Ok(Verdict::Same { epochs: last, state_hash, test: expected.test.is_some(), unchecked })
 }
 
-/// The first layer and pathway whose statistics differ.
-fn first_difference(
-    kept: &crate::lab::store::record::EpochRecord,
-    found: &crate::lab::store::record::EpochRecord,
-) -> String {
-    let pairs = kept.pathways.iter().zip(&found.pathways);
-    pairs
-        .filter(|(kept, found)| kept != found)
-        .map(|(kept, _)| format!(", first seen in layer {} {}", kept.layer, kept.pathway))
-        .next()
-        .unwrap_or_default()
+/// A JSON file as it was written.
+fn parsed(path: &Path, name: &str) -> Result<Value, Halt> {
+    let text = folder::read_text(path, name)?;
+    let damaged = |found: serde_json::Error| FolderError::Content {
+        path: path.join(name),
+        found: found.to_string(),
+    };
+    Ok(serde_json::from_str(&text).map_err(damaged)?)
+}
+
+/// The files of a folder beside its records, each as its receipt says.
+struct Files<'a> {
+    path: &'a Path,
+    ledger: Option<Value>,
+    checkpoint: Option<Vec<u8>>,
+    best: Option<Vec<u8>>,
+}
+
+impl<'a> Files<'a> {
+    fn read(path: &'a Path, receipt: &Receipt) -> Result<Self, Halt> {
+        let finished = match &*receipt.status {
+            "finished" => true,
+            "running" => false,
+            other => return Err(differ("status in the receipt", other, "finished or running")),
+        };
+        let ledger = match &receipt.ledger {
+            None if finished => {
+                return Err(differ("ledger in the receipt", "null", "a hash, when finished"));
+            }
+            None => None,
+            Some(wanted) => {
+                let text = folder::read_text(path, names::LEDGER)?;
+                if hash::bytes(&text) != *wanted {
+                    return Err(differ("bytes of ledger.json", wanted, &hash::bytes(&text)));
+                }
+                let damaged =
+                    |found| FolderError::Content { path: path.join(names::LEDGER), found };
+                LedgerRecord::parse(&text).map_err(damaged)?;
+                Some(parsed(path, names::LEDGER)?)
+            }
+        };
+        if finished && !receipt.states && path.join(names::CHECKPOINT).exists() {
+            return Err(differ("states in the receipt", "false", "they are in the folder"));
+        }
+        // a run that is going on has its states, whatever it will keep of them
+        let (mut checkpoint, mut best) = (None, None);
+        if receipt.states || !finished {
+            checkpoint = Some(folder::read_checkpoint(path, names::CHECKPOINT)?);
+            if let Some(record) = &receipt.best {
+                best = Some(folder::read_checkpoint(path, &RunFolder::best_name(record.epoch))?);
+            }
+        }
+        Ok(Self { path, ledger, checkpoint, best })
+    }
+
+    /// Compares the state after the last record with the checkpoint. `seen`: the checkpoint is that of an epoch before,
+    /// as a kill between a receipt and the checkpoint it speaks of leaves it.
+    fn last(&self, state: &[u8], seen: bool) -> Result<(), Halt> {
+        match &self.checkpoint {
+            Some(kept) if kept != state && !seen => Err(self.other(names::CHECKPOINT, kept, state)),
+            _ => Ok(()),
+        }
+    }
+
+    /// Compares the best state, reached in `epoch`, with its file.
+    fn best(&self, state: &[u8], epoch: u32) -> Result<(), Halt> {
+        match &self.best {
+            Some(kept) if kept != state => {
+                Err(self.other(&RunFolder::best_name(epoch), kept, state))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    fn other(&self, name: &str, kept: &[u8], state: &[u8]) -> Halt {
+        let place = checkpoint::first_difference(kept, state);
+        let place = place.map_or(String::new(), |place| format!(", {place}"));
+        let file = self.path.join(name);
+        differ(format!("{}{place}", file.display()), &hash::bytes(kept), &hash::bytes(state))
+    }
 }

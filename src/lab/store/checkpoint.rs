@@ -1,20 +1,25 @@
 //! The state of a run as safetensors, written whole and read with suspicion.
 //!
-//! Tensors: `layer0.pp.levels` (U16, rows x columns), `.residuals` (U16), `.pruned` (U8, one byte a cell),
-//! `layer0.writes`, `layer0.adc_shifts`, `means`, `ledger.training` and so on, `cycles.training` and so on where
-//! cycles are counted (I64). Metadata: arithmetic version, hash of
-//! the configuration, hash of the data, epoch, updates, state hash. What is read is checked against all of them.
+//! One tensor a piece of state, by its name (`layer0.pp.levels`, `epoch`, `ledger.training`, ...), and one entry of
+//! metadata, `dalean`, that holds as JSON:
+//!
+//! ```text
+//! arithmetic   version        run, data   address of the run, hash of its data
+//! state_hash   of the state   content     BLAKE3 over names, kinds, shapes and bytes of all tensors, then the metadata
+//! ```
+//!
+//! Nothing in it depends on machine or time, so a run that is done again gives the same bytes. What is read is checked
+//! against all of it.
 
 use std::borrow::Cow;
+use std::collections::BTreeMap;
 
 use bitvec::prelude::*;
-use safetensors::tensor::Metadata;
 use safetensors::{Dtype, SafeTensors, View};
 
 use super::{ARITHMETIC, hash};
-use crate::chip::engine::Phase;
-use crate::chip::ledger::{Cycles, During, Event, Ledger, PATHWAYS};
-use crate::task::classify::Trainer;
+use crate::chip::layer::Layer;
+use crate::chip::state::{Piece, Seen, State, StateError, Visitor};
 
 /// Why a checkpoint cannot be used.
 #[derive(Debug, thiserror::Error)]
@@ -24,7 +29,7 @@ pub enum CheckpointError {
     Format(#[from] safetensors::SafeTensorError),
     /// Another run's, or another version's.
     #[error(
-        "its {what} is {found}, but this run has {wanted}; it belongs to another run or version"
+        "its {what} is {found}, but this run has {wanted}; it belongs to another run or version, or was changed"
     )]
     Other {
         /// Which entry.
@@ -34,21 +39,16 @@ pub enum CheckpointError {
         /// What this run says.
         wanted: String,
     },
-    /// A tensor is missing or has another shape.
-    #[error("tensor `{name}` {found}; the file is damaged: start the run again")]
-    Tensor {
-        /// Which tensor.
-        name: String,
-        /// What is wrong.
-        found: String,
-    },
+    /// A tensor is missing, has another shape or holds what no run has.
+    #[error("tensor {0}; the file is damaged: start the run again")]
+    Tensor(#[from] StateError),
 }
 
 /// What a checkpoint belongs to.
 #[derive(Debug, Clone, Copy)]
 pub struct Identity<'a> {
-    /// Hash of the resolved configuration.
-    pub config: &'a str,
+    /// Address of the run.
+    pub run: &'a str,
     /// Hash of the data.
     pub data: &'a str,
 }
@@ -59,7 +59,7 @@ struct Tensor {
     bytes: Vec<u8>,
 }
 
-impl View for Tensor {
+impl View for &Tensor {
     fn dtype(&self) -> Dtype {
         self.dtype
     }
@@ -74,19 +74,84 @@ impl View for Tensor {
     }
 }
 
-fn halves(values: impl Iterator<Item = u16>, shape: [usize; 2]) -> Tensor {
-    let bytes = values.flat_map(u16::to_le_bytes).collect();
-    Tensor { dtype: Dtype::U16, shape: shape.to_vec(), bytes }
+/// Gathers the pieces of a state as tensors.
+#[derive(Default)]
+struct Writer(BTreeMap<String, Tensor>);
+
+impl Writer {
+    fn put<T>(
+        &mut self,
+        piece: &Piece<'_>,
+        dtype: Dtype,
+        shape: &[usize],
+        bytes: Vec<u8>,
+    ) -> Seen<T> {
+        let tensor = Tensor { dtype, shape: shape.to_vec(), bytes };
+        let before = self.0.insert(piece.name.to_owned(), tensor);
+        assert!(before.is_none(), "two pieces of state are called {}", piece.name);
+        Ok(None)
+    }
 }
 
-fn numbers(values: Vec<i64>) -> Tensor {
-    let shape = vec![values.len()];
-    let bytes = values.into_iter().flat_map(i64::to_le_bytes).collect();
-    Tensor { dtype: Dtype::I64, shape, bytes }
+fn bytes_of_numbers(numbers: &[i64]) -> Vec<u8> {
+    numbers.iter().flat_map(|number| number.to_le_bytes()).collect()
 }
 
-fn count(n: u64) -> i64 {
-    i64::try_from(n).expect("a run has fewer than 2^63 events")
+impl Visitor for Writer {
+    fn halves(
+        &mut self,
+        piece: &Piece<'_>,
+        shape: [usize; 2],
+        values: &dyn Fn() -> Vec<u16>,
+    ) -> Seen<Vec<u16>> {
+        let bytes = values().into_iter().flat_map(u16::to_le_bytes).collect();
+        self.put(piece, Dtype::U16, &shape, bytes)
+    }
+
+    fn bits(
+        &mut self,
+        piece: &Piece<'_>,
+        shape: [usize; 2],
+        values: &dyn Fn() -> BitVec<u8, Lsb0>,
+    ) -> Seen<BitVec<u8, Lsb0>> {
+        let bytes = values().iter().by_vals().map(u8::from).collect();
+        self.put(piece, Dtype::U8, &shape, bytes)
+    }
+
+    fn numbers(&mut self, piece: &Piece<'_>, values: &[i64]) -> Seen<Vec<i64>> {
+        self.put(piece, Dtype::I64, &[values.len()], bytes_of_numbers(values))
+    }
+
+    fn rows(
+        &mut self,
+        piece: &Piece<'_>,
+        width: usize,
+        values: &dyn Fn() -> Vec<i64>,
+    ) -> Seen<Vec<i64>> {
+        let values = values();
+        self.put(piece, Dtype::I64, &[values.len() / width, width], bytes_of_numbers(&values))
+    }
+}
+
+/// The entry of the metadata that says what the checkpoint is.
+const ABOUT: &str = "dalean";
+/// Names in it, `content` aside.
+const ENTRIES: [&str; 4] = ["arithmetic", "run", "data", "state_hash"];
+
+/// Hash of everything a checkpoint says.
+fn content<'a>(
+    tensors: impl Iterator<Item = (&'a str, Dtype, &'a [usize], &'a [u8])>,
+    entries: &[String; ENTRIES.len()],
+) -> String {
+    let mut hash = blake3::Hasher::new();
+    for (name, dtype, shape, bytes) in tensors {
+        let head = format!("{name}\n{dtype:?} {shape:?}\n");
+        hash.update(head.as_bytes()).update(bytes);
+    }
+    for (name, value) in ENTRIES.iter().zip(entries) {
+        hash.update(format!("{name} {value}\n").as_bytes());
+    }
+    hash.finalize().to_hex().to_string()
 }
 
 /// The state as bytes.
@@ -94,167 +159,175 @@ fn count(n: u64) -> i64 {
 /// # Panics
 /// Never: names are unique and sizes small.
 #[must_use]
-pub fn write(trainer: &Trainer, identity: Identity<'_>) -> Vec<u8> {
-    let engine = trainer.driver().engine();
-    let mut tensors = Vec::new();
-    for layer in engine.layers() {
-        let name = |what: &str| format!("layer{}.{what}", layer.index);
-        let shape = [layer.layout.rows, layer.layout.columns];
-        for (array, pathway) in layer.arrays.iter().zip(layer.spec.wiring.pathways()) {
-            let name = |what: &str| name(&format!("{}.{what}", pathway.name));
-            tensors.push((name("levels"), halves(array.levels(), shape)));
-            if let Some(residuals) = array.residuals() {
-                tensors.push((name("residuals"), halves(residuals.into_iter(), shape)));
-            }
-            if let Some(bits) = array.pruned() {
-                let bytes = bits.iter().by_vals().map(u8::from).collect();
-                let tensor = Tensor { dtype: Dtype::U8, shape: shape.to_vec(), bytes };
-                tensors.push((name("pruned"), tensor));
-            }
-        }
-        let writes = layer.writes.iter().map(|&n| count(n)).collect();
-        tensors.push((name("writes"), numbers(writes)));
-        let shifts = layer.adc_shifts.iter().flatten().map(|&n| i64::from(n)).collect();
-        tensors.push((name("adc_shifts"), numbers(shifts)));
-    }
-    tensors.push(("means".into(), numbers(trainer.driver().unit().means().to_vec())));
-    for phase in Phase::ALL {
-        let ledger = engine.ledger(phase);
-        let mut counts = Vec::new();
-        for layer in 0..ledger.layers() {
-            for pathway in 0..PATHWAYS {
-                let code = u8::try_from(pathway).expect("few pathways");
-                for during in During::ALL {
-                    let of = |event| count(ledger.get(layer, code, during, event));
-                    counts.extend(Event::ALL.map(of));
-                }
-            }
-        }
-        tensors.push((format!("ledger.{}", phase.name()), numbers(counts)));
-        if let Some(cycles) = ledger.cycles() {
-            let cycles = cycles.numbers().into_iter().map(count).collect();
-            tensors.push((format!("cycles.{}", phase.name()), numbers(cycles)));
-        }
-    }
-    let entries = [
-        ("arithmetic", ARITHMETIC.to_string()),
-        ("config_hash", identity.config.to_owned()),
-        ("data_hash", identity.data.to_owned()),
-        ("epoch", trainer.epoch().to_string()),
-        ("updates", trainer.driver().updates().to_string()),
-        ("state_hash", hash::state(trainer.driver())),
-    ];
-    // the library takes a hash map and writes its names in order
-    let metadata = entries.into_iter().map(|(key, value)| (key.to_owned(), value)).collect();
-    safetensors::serialize(tensors, Some(metadata)).expect("names are unique and sizes small")
+pub fn write(state: &mut dyn State, identity: Identity<'_>) -> Vec<u8> {
+    let mut writer = Writer::default();
+    state.visit(&mut writer).expect("nothing is replaced");
+    let tensors = writer.0;
+    let Identity { run, data } = identity;
+    let entries = [ARITHMETIC.to_string(), run.into(), data.into(), hash::state(state)];
+    let views = tensors.iter().map(|(name, t)| (&**name, t.dtype, &*t.shape, &*t.bytes));
+    let content = content(views, &entries);
+    let named = ENTRIES.map(str::to_owned).into_iter().zip(entries);
+    let about: BTreeMap<_, _> = named.chain([("content".to_owned(), content)]).collect();
+    let about = serde_json::to_string(&about).expect("words have a JSON form");
+    // the library takes a hash map and writes its entries in any order: so there is one
+    let metadata = [(ABOUT.to_owned(), about)].into();
+    safetensors::serialize(&tensors, Some(metadata)).expect("names are unique and sizes small")
 }
 
-/// Puts the state in `bytes` into `trainer`, which was built from the same configuration.
+/// A checkpoint whose content is what it says.
+struct Checked<'a> {
+    file: SafeTensors<'a>,
+    about: BTreeMap<String, String>,
+}
+
+impl<'a> Checked<'a> {
+    fn new(bytes: &'a [u8], identity: Identity<'_>) -> Result<Self, CheckpointError> {
+        let (_, header) = SafeTensors::read_metadata(bytes)?;
+        let file = SafeTensors::deserialize(bytes)?;
+        let about = header.metadata().as_ref().and_then(|entries| entries.get(ABOUT));
+        let about = about.ok_or_else(|| damaged(ABOUT, "is missing from the metadata"))?;
+        let about = serde_json::from_str(about);
+        let about = about.map_err(|error| damaged(ABOUT, &format!("is no JSON: {error}")))?;
+        let checked = Self { file, about };
+        checked.same("arithmetic", &ARITHMETIC.to_string())?;
+        checked.same("run", identity.run)?;
+        checked.same("data", identity.data)?;
+        let mut entries = ENTRIES.map(str::to_owned);
+        for (name, entry) in ENTRIES.into_iter().zip(&mut entries) {
+            *entry = checked.entry(name)?;
+        }
+        let tensors: BTreeMap<_, _> = checked.file.tensors().into_iter().collect();
+        let views = tensors.iter().map(|(name, t)| (&**name, t.dtype(), t.shape(), t.data()));
+        checked.same("content", &content(views, &entries))?;
+        Ok(checked)
+    }
+
+    /// An entry of the metadata.
+    fn entry(&self, what: &'static str) -> Result<String, CheckpointError> {
+        let found = self.about.get(what).cloned();
+        Ok(found.ok_or_else(|| damaged(what, "is missing from the metadata"))?)
+    }
+
+    fn same(&self, what: &'static str, wanted: &str) -> Result<(), CheckpointError> {
+        match self.entry(what)? {
+            found if found == wanted => Ok(()),
+            found => Err(CheckpointError::Other { what, found, wanted: wanted.into() }),
+        }
+    }
+
+    fn bytes(&self, name: &str, dtype: Dtype, shape: &[usize]) -> Result<&[u8], StateError> {
+        let tensor = self.file.tensor(name).map_err(|_| damaged(name, "is missing"))?;
+        if tensor.dtype() != dtype || tensor.shape() != shape {
+            let (kind, found) = (tensor.dtype(), tensor.shape());
+            let found = format!("is {kind:?} {found:?}, but should be {dtype:?} {shape:?}");
+            return Err(damaged(name, &found));
+        }
+        Ok(tensor.data())
+    }
+
+    fn halves(&self, name: &str, shape: &[usize]) -> Result<Vec<u16>, StateError> {
+        let bytes = self.bytes(name, Dtype::U16, shape)?;
+        Ok(bytes.as_chunks::<2>().0.iter().map(|pair| u16::from_le_bytes(*pair)).collect())
+    }
+
+    fn numbers(&self, name: &str, shape: &[usize]) -> Result<Vec<i64>, StateError> {
+        let bytes = self.bytes(name, Dtype::I64, shape)?;
+        Ok(bytes.as_chunks::<8>().0.iter().map(|number| i64::from_le_bytes(*number)).collect())
+    }
+}
+
+fn damaged(name: &str, found: &str) -> StateError {
+    StateError { name: name.into(), found: found.into() }
+}
+
+/// Hands back what a checkpoint holds.
+struct Reader<'a> {
+    file: &'a Checked<'a>,
+    read: Vec<String>,
+}
+
+impl Reader<'_> {
+    fn within(
+        &mut self,
+        piece: &Piece<'_>,
+        mut values: impl Iterator<Item = i64>,
+    ) -> Result<(), StateError> {
+        self.read.push(piece.name.to_owned());
+        match values.find(|value| !piece.within.contains(value)) {
+            None => Ok(()),
+            Some(value) => {
+                let (least, most) = (piece.within.start(), piece.within.end());
+                let found = format!("holds {value}, but should lie in {least}..={most}");
+                Err(damaged(piece.name, &found))
+            }
+        }
+    }
+}
+
+impl Visitor for Reader<'_> {
+    fn halves(
+        &mut self,
+        piece: &Piece<'_>,
+        shape: [usize; 2],
+        _: &dyn Fn() -> Vec<u16>,
+    ) -> Seen<Vec<u16>> {
+        let values = self.file.halves(piece.name, &shape)?;
+        self.within(piece, values.iter().map(|&value| i64::from(value)))?;
+        Ok(Some(values))
+    }
+
+    fn bits(
+        &mut self,
+        piece: &Piece<'_>,
+        shape: [usize; 2],
+        _: &dyn Fn() -> BitVec<u8, Lsb0>,
+    ) -> Seen<BitVec<u8, Lsb0>> {
+        let bytes = self.file.bytes(piece.name, Dtype::U8, &shape)?;
+        self.within(piece, bytes.iter().map(|&byte| i64::from(byte)))?;
+        Ok(Some(bytes.iter().map(|&byte| byte == 1).collect()))
+    }
+
+    fn numbers(&mut self, piece: &Piece<'_>, values: &[i64]) -> Seen<Vec<i64>> {
+        let values = self.file.numbers(piece.name, &[values.len()])?;
+        self.within(piece, values.iter().copied())?;
+        Ok(Some(values))
+    }
+
+    fn rows(
+        &mut self,
+        piece: &Piece<'_>,
+        width: usize,
+        _: &dyn Fn() -> Vec<i64>,
+    ) -> Seen<Vec<i64>> {
+        let tensor = self.file.file.tensor(piece.name);
+        let tensor = tensor.map_err(|_| damaged(piece.name, "is missing"))?;
+        let rows = tensor.shape().first().copied().unwrap_or(0);
+        let values = self.file.numbers(piece.name, &[rows, width])?;
+        self.within(piece, values.iter().copied())?;
+        Ok(Some(values))
+    }
+}
+
+/// Puts the state in `bytes` into `state`, which was built from the same configuration.
 ///
 /// # Errors
-/// When the file is damaged or belongs to another run. `trainer` may then hold part of it.
+/// When the file is damaged or belongs to another run. `state` may then hold part of it.
 pub fn read(
     bytes: &[u8],
-    trainer: &mut Trainer,
+    state: &mut dyn State,
     identity: Identity<'_>,
 ) -> Result<(), CheckpointError> {
-    let (_, header) = SafeTensors::read_metadata(bytes)?;
-    let file = SafeTensors::deserialize(bytes)?;
-    same(&header, "arithmetic", &ARITHMETIC.to_string())?;
-    same(&header, "config_hash", identity.config)?;
-    same(&header, "data_hash", identity.data)?;
-    let whole = |what: &'static str| -> Result<u64, CheckpointError> {
-        entry(&header, what)?.parse().map_err(|_| CheckpointError::Tensor {
-            name: what.into(),
-            found: "is not a whole number".into(),
-        })
-    };
-    let (epoch, updates) = (whole("epoch")?, whole("updates")?);
-    let epoch = u32::try_from(epoch)
-        .ok()
-        .filter(|&epoch| epoch <= trainer.experiment().epochs)
-        .ok_or_else(|| damaged("epoch", "is beyond the last epoch"))?;
-
-    let window = trainer.experiment().hardware.cell.window;
-    let residual_bits = trainer.experiment().hardware.write.residual_bits.get();
-    for layer in trainer.driver_mut().engine_mut().layers_mut() {
-        let shape = [layer.layout.rows, layer.layout.columns];
-        let prefix = format!("layer{}", layer.index);
-        for (array, pathway) in layer.arrays.iter_mut().zip(layer.spec.wiring.pathways()) {
-            let name = |what: &str| format!("{prefix}.{}.{what}", pathway.name);
-            let levels = read_halves(&file, &name("levels"), &shape)?;
-            let inside = |level: &u16| (window.floor()..=window.ceiling()).contains(level);
-            if !levels.iter().all(inside) {
-                return Err(damaged(&name("levels"), "holds a level outside the window"));
-            }
-            for (row, levels) in levels.chunks(shape[1]).enumerate() {
-                array.load_row(row, levels);
-            }
-            if array.residuals().is_some() {
-                let residuals = read_halves(&file, &name("residuals"), &shape)?;
-                if residuals.iter().any(|&r| u32::from(r) >> residual_bits != 0) {
-                    return Err(damaged(&name("residuals"), "holds a remainder above its width"));
-                }
-                array.load_residuals(&residuals);
-            }
-            if array.pruned().is_some() {
-                let bytes = bytes_of(&file, &name("pruned"), Dtype::U8, &shape)?;
-                if bytes.iter().any(|&byte| byte > 1) {
-                    return Err(damaged(&name("pruned"), "holds something other than 0 and 1"));
-                }
-                let bits: BitVec<u8, Lsb0> = bytes.iter().map(|&byte| byte == 1).collect();
-                array.load_pruned(&bits);
-            }
-        }
-        let name = format!("{prefix}.writes");
-        for (writes, number) in
-            layer.writes.iter_mut().zip(read_numbers(&file, &name, layer.arrays.len())?)
-        {
-            *writes = positive(&name, number)?;
-        }
-        let name = format!("{prefix}.adc_shifts");
-        let numbers = read_numbers(&file, &name, layer.adc_shifts.iter().flatten().count())?;
-        for (shift, number) in layer.adc_shifts.iter_mut().flatten().zip(numbers) {
-            *shift = u32::try_from(number)
-                .ok()
-                .filter(|&shift| shift < 63)
-                .ok_or_else(|| damaged(&name, "holds an impossible shift"))?;
-        }
+    let checked = Checked::new(bytes, identity)?;
+    let mut reader = Reader { file: &checked, read: vec![] };
+    state.visit(&mut reader)?;
+    let known = reader.read;
+    if let Some(name) =
+        checked.file.names().into_iter().find(|name| !known.iter().any(|k| k == name))
+    {
+        return Err(damaged(name, "is no part of this run's state").into());
     }
-    let means = trainer.driver().unit().means().len();
-    let means = read_numbers(&file, "means", means)?;
-    trainer.driver_mut().unit_mut().load_means(&means);
-    for phase in Phase::ALL {
-        let name = format!("ledger.{}", phase.name());
-        let ledger = trainer.driver_mut().engine_mut().ledger_mut(phase);
-        let layers = ledger.layers();
-        let total = layers * PATHWAYS * During::ALL.len() * Event::ALL.len();
-        let mut numbers = read_numbers(&file, &name, total)?.into_iter();
-        let mut fresh = Ledger::new(layers);
-        if let Some(cycles) = ledger.cycles() {
-            let name = format!("cycles.{}", phase.name());
-            let stored = read_numbers(&file, &name, cycles.numbers().len())?;
-            let stored = stored.into_iter().map(|number| positive(&name, number));
-            let stored = Cycles::from_numbers(layers, &stored.collect::<Result<Vec<_>, _>>()?);
-            fresh = Ledger::with_cycles(layers);
-            *fresh.cycles_mut().expect("made with them") = stored.expect("as many as there are");
-        }
-        for layer in 0..layers {
-            for pathway in 0..PATHWAYS {
-                let code = u8::try_from(pathway).expect("few pathways");
-                for during in During::ALL {
-                    for event in Event::ALL {
-                        let number = numbers.next().expect("counted above");
-                        fresh.add(layer, code, during, event, positive(&name, number)?);
-                    }
-                }
-            }
-        }
-        *ledger = fresh;
-    }
-    trainer.driver_mut().set_updates(updates);
-    trainer.set_epoch(epoch);
-    same(&header, "state_hash", &hash::state(trainer.driver()))
+    checked.same("state_hash", &hash::state(state))
 }
 
 /// Levels of arrays in a checkpoint, without building the network; an array is a layer, the name of its pathway and
@@ -268,76 +341,37 @@ pub fn levels(
     state_hash: &str,
     arrays: &[(usize, &str, [usize; 2])],
 ) -> Result<Vec<Vec<u16>>, CheckpointError> {
-    let (_, header) = SafeTensors::read_metadata(bytes)?;
-    let file = SafeTensors::deserialize(bytes)?;
-    let wanted = [
-        ("config_hash", identity.config),
-        ("data_hash", identity.data),
-        ("state_hash", state_hash),
-    ];
-    for (what, wanted) in wanted {
-        same(&header, what, wanted)?;
-    }
+    let checked = Checked::new(bytes, identity)?;
+    checked.same("state_hash", state_hash)?;
     let of = |&(layer, pathway, ref shape): &(usize, &str, [usize; 2])| {
-        read_halves(&file, &format!("layer{layer}.{pathway}.levels"), shape)
+        Ok(checked.halves(&Layer::levels_name(layer, pathway), shape)?)
     };
     arrays.iter().map(of).collect()
 }
 
-/// An entry of the metadata.
-fn entry(header: &Metadata, what: &'static str) -> Result<String, CheckpointError> {
-    let found = header.metadata().as_ref().and_then(|map| map.get(what)).cloned();
-    found.ok_or_else(|| damaged(what, "is missing from the metadata"))
-}
-
-fn same(header: &Metadata, what: &'static str, wanted: &str) -> Result<(), CheckpointError> {
-    match entry(header, what)? {
-        found if found == wanted => Ok(()),
-        found => Err(CheckpointError::Other { what, found, wanted: wanted.into() }),
+/// The first place where two checkpoints hold different state: tensor, number of the value, both values.
+#[must_use]
+pub fn first_difference(kept: &[u8], found: &[u8]) -> Option<String> {
+    let [kept, found] = [kept, found].map(|bytes| SafeTensors::deserialize(bytes).ok());
+    let (kept, found) = (kept?, found?);
+    let tensors: BTreeMap<_, _> = kept.tensors().into_iter().collect();
+    for (name, kept) in &tensors {
+        let Ok(found) = found.tensor(name) else {
+            return Some(format!("tensor `{name}` belongs to no such run"));
+        };
+        if (kept.dtype(), kept.shape()) != (found.dtype(), found.shape()) {
+            return Some(format!("tensor `{name}` has another shape"));
+        }
+        let width = kept.dtype().bitsize() / 8;
+        let pairs = kept.data().chunks(width).zip(found.data().chunks(width));
+        if let Some((at, (kept, found))) = pairs.enumerate().find(|(_, (a, b))| a != b) {
+            let number = |bytes: &[u8]| {
+                bytes.iter().rev().fold(0u64, |number, &byte| number << 8 | u64::from(byte))
+            };
+            let (kept, found) = (number(kept).cast_signed(), number(found).cast_signed());
+            return Some(format!("tensor `{name}`, value {at}: {kept} there, {found} here"));
+        }
     }
-}
-
-fn damaged(name: &str, found: &str) -> CheckpointError {
-    CheckpointError::Tensor { name: name.into(), found: found.into() }
-}
-
-fn positive(name: &str, number: i64) -> Result<u64, CheckpointError> {
-    u64::try_from(number).map_err(|_| damaged(name, "holds a negative count"))
-}
-
-fn bytes_of<'a>(
-    file: &SafeTensors<'a>,
-    name: &str,
-    dtype: Dtype,
-    shape: &[usize],
-) -> Result<&'a [u8], CheckpointError> {
-    let tensor = file.tensor(name).map_err(|_| damaged(name, "is missing"))?;
-    if tensor.dtype() != dtype || tensor.shape() != shape {
-        let found = format!(
-            "is {:?} {:?}, but should be {dtype:?} {shape:?}",
-            tensor.dtype(),
-            tensor.shape()
-        );
-        return Err(damaged(name, &found));
-    }
-    Ok(tensor.data())
-}
-
-fn read_halves(
-    file: &SafeTensors<'_>,
-    name: &str,
-    shape: &[usize],
-) -> Result<Vec<u16>, CheckpointError> {
-    let bytes = bytes_of(file, name, Dtype::U16, shape)?;
-    Ok(bytes.chunks_exact(2).map(|pair| u16::from_le_bytes([pair[0], pair[1]])).collect())
-}
-
-fn read_numbers(
-    file: &SafeTensors<'_>,
-    name: &str,
-    len: usize,
-) -> Result<Vec<i64>, CheckpointError> {
-    let bytes = bytes_of(file, name, Dtype::I64, &[len])?;
-    let number = |b: &[u8]| i64::from_le_bytes(b.try_into().expect("eight bytes"));
-    Ok(bytes.chunks_exact(8).map(number).collect())
+    let missing = found.names().into_iter().find(|name| !tensors.contains_key(*name));
+    missing.map(|name| format!("tensor `{name}` is missing"))
 }

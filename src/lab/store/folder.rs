@@ -5,7 +5,7 @@ use std::fs::{self, File};
 use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
 
-use super::record::{EpochRecord, Receipt};
+use super::record::{EpochRecord, Receipt, TimingRecord};
 
 /// Greatest size of a text file that is read back.
 const TEXT_MAX: u64 = 256 << 20;
@@ -72,6 +72,8 @@ pub mod names {
     pub const LEDGER: &str = "ledger.json";
     /// State after the last finished epoch.
     pub const CHECKPOINT: &str = "checkpoint.safetensors";
+    /// Seconds and machine; the only file that a run which is done again does not give.
+    pub const TIMING: &str = "timing.json";
     /// Hashes.
     pub const RECEIPT: &str = "receipt.json";
     /// For people.
@@ -148,12 +150,7 @@ impl RunFolder {
     /// # Panics
     /// Never: records have a JSON form.
     pub fn write_metrics(&self, records: &[EpochRecord]) -> Result<(), FolderError> {
-        let mut text = String::new();
-        for record in records {
-            text.push_str(&serde_json::to_string(record).expect("records have a JSON form"));
-            text.push('\n');
-        }
-        self.write(names::METRICS, text.as_bytes())
+        self.write(names::METRICS, metrics_text(records).as_bytes())
     }
 
     /// Writes the receipt.
@@ -164,9 +161,20 @@ impl RunFolder {
     /// # Panics
     /// Never: receipts have a JSON form.
     pub fn write_receipt(&self, receipt: &Receipt) -> Result<(), FolderError> {
-        let mut text = serde_json::to_string_pretty(receipt).expect("receipts have a JSON form");
+        self.write(names::RECEIPT, receipt_text(receipt).as_bytes())
+    }
+
+    /// Writes what depends on machine and time.
+    ///
+    /// # Errors
+    /// When the system refuses.
+    ///
+    /// # Panics
+    /// Never: such a record has a JSON form.
+    pub fn write_timing(&self, timing: &TimingRecord) -> Result<(), FolderError> {
+        let mut text = serde_json::to_string_pretty(timing).expect("it has a JSON form");
         text.push('\n');
-        self.write(names::RECEIPT, text.as_bytes())
+        self.write(names::TIMING, text.as_bytes())
     }
 
     /// Name of the file of the best state, reached in `epoch`.
@@ -196,6 +204,31 @@ impl RunFolder {
             }
         }
     }
+}
+
+/// The text of `metrics.jsonl`: a line an epoch.
+///
+/// # Panics
+/// Never: records have a JSON form.
+#[must_use]
+pub fn metrics_text(records: &[EpochRecord]) -> String {
+    let mut text = String::new();
+    for record in records {
+        text.push_str(&serde_json::to_string(record).expect("records have a JSON form"));
+        text.push('\n');
+    }
+    text
+}
+
+/// The text of `receipt.json`.
+///
+/// # Panics
+/// Never: receipts have a JSON form.
+#[must_use]
+pub fn receipt_text(receipt: &Receipt) -> String {
+    let mut text = serde_json::to_string_pretty(receipt).expect("receipts have a JSON form");
+    text.push('\n');
+    text
 }
 
 /// Writes a file whole: beside its place, flushed, then moved into it.
@@ -290,6 +323,13 @@ pub fn read_receipt(folder: &Path) -> Result<Receipt, FolderError> {
     let text = read_text(folder, names::RECEIPT)?;
     parse_receipt(&text)
         .map_err(|found| FolderError::Content { path: folder.join(names::RECEIPT), found })
+}
+
+/// Reads what depends on machine and time; nothing of it when the file is missing or damaged, as no result needs it.
+#[must_use]
+pub fn read_timing(folder: &Path) -> TimingRecord {
+    let text = read_text(folder, names::TIMING).ok();
+    text.and_then(|text| serde_json::from_str(&text).ok()).unwrap_or_default()
 }
 
 /// Reads the records of a run.

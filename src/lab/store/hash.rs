@@ -1,59 +1,86 @@
-//! The state hash: one number for everything that decides what comes next.
+//! The state hash: one number for everything that decides what comes next; and hashes of bytes.
 //!
-//! ```text
-//! BLAKE3 over  arithmetic version (u32 LE)
-//!              each layer and existing pathway in code order: rows, columns (u32 LE), levels row-major u16 LE,
-//!                  pruned bits row-major LSB first (absorbing floor only), residuals u16 LE (F > 0 only)
-//!              then as i64 LE: running centres; converter shifts (layer, stream, slice); write counts (layer, pathway);
-//!                  ledger totals (training, calibration, evaluation) in the order of the ledger's table, without those
-//!                  that follow from how arrays are cut into tiles
-//! ```
-//!
-//! Logical order, unpadded; what a run does not have is left out. Re-tiling with ideal converters is no other run, so
-//! DAC slices, holds, conversions and shift-adds, which the plan tells, are not part of it.
+//! What is hashed is what [`State::visit`] shows, section by section ([`crate::chip::state`]). Order is logical and
+//! unpadded; what a run does not have is no section, and never written as 0.
+
+use std::collections::BTreeMap;
+
+use bitvec::prelude::*;
 
 use super::ARITHMETIC;
-use crate::chip::engine::Phase;
-use crate::chip::ledger::Event;
+use crate::chip::state::{Piece, Section, Seen, State, Visitor};
 use crate::learn::driver::Driver;
 
-/// Hash of the state, in hexadecimal.
-#[must_use]
-pub fn state(driver: &Driver) -> String {
-    let engine = driver.engine();
-    let mut hash = blake3::Hasher::new();
-    hash.update(&ARITHMETIC.to_le_bytes());
-    let side = |n: usize| u32::try_from(n).expect("checked by the plan").to_le_bytes();
-    for layer in engine.layers() {
-        for array in &layer.arrays {
-            let layout = array.layout();
-            hash.update(&side(layout.rows)).update(&side(layout.columns));
-            let levels: Vec<u8> = array.levels().flat_map(u16::to_le_bytes).collect();
-            hash.update(&levels);
-            if let Some(mut bits) = array.pruned() {
-                bits.set_uninitialized(false);
-                hash.update(bits.as_raw_slice());
-            }
-            if let Some(residuals) = array.residuals() {
-                let bytes: Vec<u8> = residuals.into_iter().flat_map(u16::to_le_bytes).collect();
-                hash.update(&bytes);
-            }
+/// Content by section.
+#[derive(Debug, Default)]
+struct Sections(BTreeMap<Section, Vec<u8>>);
+
+impl Sections {
+    fn extend(&mut self, piece: &Piece<'_>, bytes: impl Iterator<Item = u8>) {
+        if let Some(section) = piece.section {
+            self.0.entry(section).or_default().extend(bytes);
         }
     }
-    let mut number = |n: i64| {
-        hash.update(&n.to_le_bytes());
-    };
-    let count = |n: u64| i64::try_from(n).expect("a run has fewer than 2^63 events");
-    driver.unit().means().iter().copied().for_each(&mut number);
-    for layer in engine.layers() {
-        layer.adc_shifts.iter().flatten().for_each(|&shift| number(i64::from(shift)));
+}
+
+impl Visitor for Sections {
+    fn halves(
+        &mut self,
+        piece: &Piece<'_>,
+        _: [usize; 2],
+        values: &dyn Fn() -> Vec<u16>,
+    ) -> Seen<Vec<u16>> {
+        self.extend(piece, values().into_iter().flat_map(u16::to_le_bytes));
+        Ok(None)
     }
-    for layer in engine.layers() {
-        layer.writes.iter().for_each(|&writes| number(count(writes)));
+
+    fn bits(
+        &mut self,
+        piece: &Piece<'_>,
+        _: [usize; 2],
+        values: &dyn Fn() -> BitVec<u8, Lsb0>,
+    ) -> Seen<BitVec<u8, Lsb0>> {
+        let mut bits = values();
+        bits.set_uninitialized(false);
+        self.extend(piece, bits.as_raw_slice().iter().copied());
+        Ok(None)
     }
-    for phase in Phase::ALL {
-        let events = Event::ALL.into_iter().filter(|event| event.is_state());
-        events.for_each(|event| number(count(engine.ledger(phase).total(event))));
+
+    fn numbers(&mut self, piece: &Piece<'_>, values: &[i64]) -> Seen<Vec<i64>> {
+        self.extend(piece, values.iter().flat_map(|number| number.to_le_bytes()));
+        Ok(None)
+    }
+
+    fn rows(
+        &mut self,
+        piece: &Piece<'_>,
+        _: usize,
+        values: &dyn Fn() -> Vec<i64>,
+    ) -> Seen<Vec<i64>> {
+        if piece.section.is_some() {
+            self.extend(piece, values().into_iter().flat_map(i64::to_le_bytes));
+        }
+        Ok(None)
+    }
+
+    fn derived(&mut self, section: Section, bytes: &dyn Fn() -> Vec<u8>) {
+        self.0.entry(section).or_default().extend(bytes());
+    }
+}
+
+/// Hash of a state, in hexadecimal.
+///
+/// # Panics
+/// Never: looking at a state replaces nothing.
+#[must_use]
+pub fn state(state: &mut dyn State) -> String {
+    let mut sections = Sections::default();
+    state.visit(&mut sections).expect("nothing is replaced");
+    let mut hash = blake3::Hasher::new();
+    hash.update(&ARITHMETIC.to_le_bytes());
+    for (section, content) in sections.0.iter().filter(|(_, content)| !content.is_empty()) {
+        hash.update(&(*section as u32).to_le_bytes());
+        hash.update(&(content.len() as u64).to_le_bytes()).update(content);
     }
     hash.finalize().to_hex().to_string()
 }
@@ -69,8 +96,37 @@ pub fn tables(driver: &Driver) -> String {
     hash.finalize().to_hex().to_string()
 }
 
-/// Hash of a text.
+/// Hash of the bytes of a file.
 #[must_use]
-pub fn text(text: &str) -> String {
-    blake3::hash(text.as_bytes()).to_hex().to_string()
+pub fn bytes(bytes: impl AsRef<[u8]>) -> String {
+    blake3::hash(bytes.as_ref()).to_hex().to_string()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::chip::state::StateError;
+
+    struct Some;
+
+    impl State for Some {
+        fn visit(&mut self, visitor: &mut dyn Visitor) -> Result<(), StateError> {
+            let piece = |name, section| Piece { name, section, within: 0..=9 };
+            visitor.numbers(&piece("late", Option::Some(Section::Progress)), &[7])?;
+            visitor.halves(&piece("first", Option::Some(Section::Arrays)), [1, 2], &|| {
+                vec![1, 0x203]
+            })?;
+            visitor.rows(&piece("kept", None), 1, &|| vec![9])?;
+            visitor.derived(Section::Ledger, &Vec::new);
+            Ok(())
+        }
+    }
+
+    #[test]
+    fn sections_rise_and_empty_ones_do_not_exist() {
+        let mut wanted = ARITHMETIC.to_le_bytes().to_vec();
+        wanted.extend([1, 0, 0, 0, 4, 0, 0, 0, 0, 0, 0, 0, 1, 0, 3, 2]);
+        wanted.extend([9, 0, 0, 0, 8, 0, 0, 0, 0, 0, 0, 0, 7, 0, 0, 0, 0, 0, 0, 0]);
+        assert_eq!(state(&mut Some), blake3::hash(&wanted).to_hex().to_string());
+    }
 }

@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! STORE/runs/ab/abcd...   a run folder, named by its key (see `address`)
-//! STORE/index.sqlite      run: key, row     sweep: name, text     point: sweep, number, seed, values, key
+//! STORE/index.sqlite      run: key, row     sweep: name, text     point: sweep, number, seed, values, key [, row]
 //! ```
 //!
 //! The folders are the truth. A row is what `lab::sweep` reads off a finished folder, kept so that ten thousand of
@@ -18,7 +18,7 @@ use rusqlite::{Connection, OptionalExtension, params};
 use super::address;
 
 /// Version of the tables below.
-const LAYOUT: i64 = 1;
+const LAYOUT: i64 = 2;
 /// Name of the index.
 pub const INDEX: &str = "index.sqlite";
 /// How long to wait for another process that writes.
@@ -28,7 +28,7 @@ const TABLES: &str = "
 CREATE TABLE run (key TEXT PRIMARY KEY, row TEXT NOT NULL, seconds REAL NOT NULL) WITHOUT ROWID;
 CREATE TABLE sweep (name TEXT PRIMARY KEY, text TEXT NOT NULL, experiment TEXT NOT NULL) WITHOUT ROWID;
 CREATE TABLE point (sweep TEXT NOT NULL, number INTEGER NOT NULL, seed INTEGER, axes TEXT NOT NULL,
-    key TEXT, refused TEXT, PRIMARY KEY (sweep, number)) WITHOUT ROWID;
+    key TEXT, refused TEXT, row TEXT, PRIMARY KEY (sweep, number)) WITHOUT ROWID;
 ";
 
 /// Why a store cannot be used.
@@ -245,6 +245,23 @@ impl Store {
         change.commit().map_err(fail)
     }
 
+    /// Keeps rows of points whose run was priced with other constants than theirs.
+    ///
+    /// # Errors
+    /// When the index refuses; then none is kept.
+    pub fn price(&mut self, sweep: &str, rows: &[(u32, String)]) -> Result<(), StoreError> {
+        let fail = self.fail();
+        let change = self.index.transaction().map_err(&fail)?;
+        {
+            let text = "UPDATE point SET row = ?3 WHERE sweep = ?1 AND number = ?2";
+            let mut update = change.prepare_cached(text).map_err(&fail)?;
+            for (number, row) in rows {
+                update.execute(params![sweep, number, row]).map_err(&fail)?;
+            }
+        }
+        change.commit().map_err(fail)
+    }
+
     /// Notes why a run cannot be finished, at every point that needs it.
     ///
     /// # Errors
@@ -273,7 +290,8 @@ impl Store {
     /// # Errors
     /// When the index refuses.
     pub fn points(&self, sweep: &str) -> Result<Vec<(PointRecord, Option<String>)>, StoreError> {
-        let text = "SELECT number, seed, axes, point.key, refused, row FROM point LEFT JOIN run ON run.key = point.key \
+        let text = "SELECT number, seed, axes, point.key, refused, COALESCE(point.row, run.row) FROM point \
+                    LEFT JOIN run ON run.key = point.key \
                     WHERE sweep = ?1 ORDER BY number";
         let mut query = self.index.prepare(text).map_err(self.fail())?;
         let rows = query.query_map([sweep], |row| {

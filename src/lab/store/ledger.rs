@@ -13,8 +13,8 @@ use crate::chip::ledger::{Cycles, During, Event, Interval, Ledger, Part};
 pub struct LedgerRecord {
     /// What happened, in the order of the ledger; counts of 0 are left out.
     pub counts: Vec<CountRecord>,
-    /// How long it took, by phase; absent when the hardware model has no timing.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    /// How long it took, by phase; `null` when the hardware model has no timing.
+    #[serde(deserialize_with = "Option::deserialize")]
     pub cycles: Option<BTreeMap<String, CyclesRecord>>,
 }
 
@@ -110,11 +110,7 @@ impl LedgerRecord {
         let Some(cycles) = ledger.cycles() else { return };
         let passed = match before.and_then(Ledger::cycles) {
             None => cycles.clone(),
-            Some(before) => {
-                let pairs = cycles.numbers().into_iter().zip(before.numbers());
-                let numbers: Vec<u64> = pairs.map(|(now, then)| now - then).collect();
-                Cycles::from_numbers(cycles.layers(), &numbers).expect("as many as there were")
-            }
+            Some(before) => cycles.since(before),
         };
         self.cycles.get_or_insert_default().insert(phase.name().into(), (&passed).into());
     }

@@ -1,9 +1,16 @@
 //! What a run writes down: one record an epoch, and a receipt at the end. Plain numbers; `null` where there is
-//! nothing to count. Counts are integers; the only floats are wall-clock seconds and derived accuracies.
+//! nothing to count. Counts are integers; wall-clock seconds stand in a record of their own.
+//!
+//! A field that is added has `#[serde(default)]`, so that runs of earlier programs are read; every other field has to be
+//! there, also where it is `null`.
 
 use std::collections::BTreeMap;
+use std::fmt;
 
 use serde::{Deserialize, Serialize};
+
+use crate::lab::data::Loaded;
+use crate::task::classify::Split;
 
 /// Right answers out of how many.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -82,8 +89,10 @@ pub struct EpochRecord {
     /// Updates done.
     pub updates: u64,
     /// Answers given while learning; `null` before the first epoch.
+    #[serde(deserialize_with = "Option::deserialize")]
     pub train: Option<Score>,
     /// Validation score.
+    #[serde(deserialize_with = "Option::deserialize")]
     pub validation: Option<Score>,
     /// BLAKE3 of state and counters.
     pub state_hash: String,
@@ -93,11 +102,13 @@ pub struct EpochRecord {
     pub pathways: Vec<PathwayRecord>,
     /// Ledger totals so far by phase (`training`, `calibration`, `evaluation`) and event.
     pub events: BTreeMap<String, BTreeMap<String, u64>>,
-    /// Cycles so far by phase; absent when the hardware model has no timing.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    /// Cycles so far by phase; `null` when the hardware model has no timing.
+    #[serde(deserialize_with = "Option::deserialize")]
     pub cycles: Option<BTreeMap<String, u64>>,
-    /// Wall-clock seconds of learning in this epoch: for people, never compared.
-    pub train_seconds: f64,
+    /// What a later program counts.
+    #[cfg(feature = "grown")]
+    #[serde(default)]
+    pub grown: u64,
 }
 
 /// The final reading of the test set, once.
@@ -114,9 +125,7 @@ pub struct TestRecord {
     pub confusion: Vec<Vec<u64>>,
     /// Wrong answers with the greatest margin, at most 24: example number, true class, predicted class.
     pub mistakes: Vec<[u64; 3]>,
-    /// Wrong answers of the most frequent confusions, those with the greatest margin: at most 4 of each of 6. Receipts
-    /// of earlier programs list none.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    /// Wrong answers of the most frequent confusions, those with the greatest margin: at most 4 of each of 6.
     pub confused: Vec<[u64; 3]>,
 }
 
@@ -134,34 +143,159 @@ impl TestRecord {
     }
 }
 
-/// Proof of a run: what went in, what came out, enough to do it again.
+/// What was learnt from, as far as numbers tell.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct DataRecord {
+    /// BLAKE3 of its content.
+    pub hash: String,
+    /// Training, validation and test examples.
+    pub examples: [usize; 3],
+    /// Values of an example.
+    pub features: usize,
+    /// Greatest value.
+    pub full_scale: u8,
+    /// Classes.
+    pub classes: usize,
+    /// Height, width and channels, where examples are pictures.
+    #[serde(deserialize_with = "Option::deserialize")]
+    pub image: Option<[usize; 3]>,
+}
+
+impl DataRecord {
+    /// What was loaded.
+    #[must_use]
+    pub fn of(data: &Loaded) -> Self {
+        let Split { train, validation, test } = &data.split;
+        Self {
+            hash: data.hash.clone(),
+            examples: [train.len(), validation.len(), test.len()],
+            features: train.features(),
+            full_scale: train.full_scale(),
+            classes: train.classes(),
+            image: data.image.map(|shape| [shape.height, shape.width, shape.channels]),
+        }
+    }
+}
+
+impl fmt::Display for DataRecord {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { examples: [train, validation, test], features, full_scale, classes, .. } = self;
+        write!(
+            f,
+            "{train} training, {validation} validation, {test} test examples of {features} values 0 to {full_scale}, \
+             {classes} classes"
+        )
+    }
+}
+
+/// Something a run showed that its user should know: numbers, put into words where they are shown.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(tag = "note", rename_all = "snake_case", deny_unknown_fields)]
+#[non_exhaustive]
+pub enum Note {
+    /// Converters of a layer use few codes on the first training examples.
+    LowCodes {
+        /// Which layer.
+        layer: usize,
+        /// Greatest code.
+        code_max: i64,
+    },
+    /// Many conversions saturated while learning.
+    Saturated {
+        /// Epochs by then.
+        epoch: u32,
+        /// Conversions that did.
+        saturated: u64,
+        /// Of so many.
+        conversions: u64,
+    },
+}
+
+impl fmt::Display for Note {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::LowCodes { layer, code_max } => write!(
+                f,
+                "layer {layer}: on the first training examples the converters use codes 0 to {code_max} only; currents \
+                 grow while learning, but if accuracy stays low, give them more hw.adc.bits or a smaller range"
+            ),
+            Self::Saturated { epoch, saturated, conversions } => write!(
+                f,
+                "{} % of the conversions up to epoch {epoch} saturated; converter ranges come from a net that has not \
+                 learnt yet. Raise hw.adc.headroom (4 or 5 trained MNIST)",
+                u128::from(*saturated) * 100 / u128::from(*conversions).max(1)
+            ),
+        }
+    }
+}
+
+/// A state other than the last one that is kept.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct BestRecord {
+    /// After which epoch.
+    pub epoch: u32,
+    /// BLAKE3 of the bytes of its checkpoint.
+    pub checkpoint: String,
+}
+
+/// Proof of a run: what went in, what came out, enough to do it again. Nothing in it depends on machine or time; a run
+/// that is done again gives the same bytes.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Receipt {
-    /// Version of this program.
-    pub version: String,
     /// Version of the arithmetic; `verify` refuses another.
     pub arithmetic: u32,
-    /// BLAKE3 of the resolved configuration file.
-    pub config_hash: String,
-    /// Which data set.
-    pub data: String,
-    /// BLAKE3 of its content.
-    pub data_hash: String,
-    /// BLAKE3 of all activation tables.
-    pub tables_hash: String,
-    /// State hash after each epoch, epoch 0 first.
-    pub epoch_hashes: Vec<String>,
     /// `finished`, or `running` while it is not.
     pub status: String,
+    /// Address: what decides the result.
+    pub run: String,
+    /// BLAKE3 of the bytes of `config.toml`.
+    pub config: String,
+    /// What was learnt from.
+    pub data: DataRecord,
+    /// BLAKE3 of all activation tables.
+    pub tables: String,
+    /// BLAKE3 of the bytes of `metrics.jsonl` up to the last epoch below.
+    pub metrics: String,
+    /// BLAKE3 of the bytes of `ledger.json`, when finished.
+    #[serde(deserialize_with = "Option::deserialize")]
+    pub ledger: Option<String>,
+    /// BLAKE3 of the bytes of the checkpoint after the last epoch below.
+    pub checkpoint: String,
+    /// The state with the best validation score, where that is chosen.
+    #[serde(deserialize_with = "Option::deserialize")]
+    pub best: Option<BestRecord>,
+    /// Whether checkpoints stay when the run is finished.
+    pub states: bool,
+    /// State hash after each epoch, epoch 0 first.
+    pub epoch_hashes: Vec<String>,
     /// The final test, when finished.
+    #[serde(deserialize_with = "Option::deserialize")]
     pub test: Option<TestRecord>,
-    /// Kernel back end that ran (informational: all give the same bits).
+    /// What the run showed.
+    pub notes: Vec<Note>,
+}
+
+/// What depends on machine and time: shown to people, marked as such, and part of no hash.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TimingRecord {
+    /// Version of this program.
+    pub version: String,
+    /// Kernel back end that ran: all give the same bits.
     pub kernel: String,
-    /// Threads that ran (informational).
+    /// Threads that ran.
     pub threads: usize,
-    /// Wall-clock seconds of learning (informational).
-    pub train_seconds: f64,
-    /// Notes and warnings shown to the user.
-    pub warnings: Vec<String>,
+    /// Wall-clock seconds of learning, an epoch each, epoch 0 first.
+    pub epoch_seconds: Vec<f64>,
+}
+
+impl TimingRecord {
+    /// Wall-clock seconds of learning.
+    #[must_use]
+    pub fn train_seconds(&self) -> f64 {
+        self.epoch_seconds.iter().sum()
+    }
 }

@@ -10,13 +10,13 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Mutex, MutexGuard};
 use std::time::Duration;
 
-use super::row::row;
+use super::row::{row, row_as};
 use super::{Plan, Row, Shard, SweepError, Task};
 use crate::chip::crossbar::kernel::Backend;
-use crate::lab::run::{self, Keeping, Machine, RunError};
+use crate::lab::run::{self, Keeping, Machine, Prices, RunError};
+use crate::lab::store::ARITHMETIC;
 use crate::lab::store::folder::{self, FolderError, RunFolder};
 use crate::lab::store::index::Store;
-use crate::lab::store::{ARITHMETIC, hash};
 
 /// Pause before asking again for what another process holds.
 const PAUSE: Duration = Duration::from_millis(200);
@@ -154,9 +154,25 @@ pub fn carry_out(
     if let Some(error) = lock(&crew.broken).take() {
         return Err(error);
     }
+    price_points(plan, &mut lock(&crew.store))?;
     let of = |count: &AtomicUsize| count.load(Ordering::SeqCst);
     let (finished, failed) = (of(&crew.finished), of(&crew.failed));
     Ok(Carried { runs: tasks.len(), finished, failed })
+}
+
+/// Gives points whose run was priced with other constants than theirs rows of their own.
+fn price_points(plan: &Plan, store: &mut Store) -> Result<(), SweepError> {
+    let mut own = Vec::new();
+    for planned in &plan.points {
+        let (Ok(key), Some(prices)) = (&planned.key, &planned.prices) else { continue };
+        let Some(kept) = store.row(key)? else { continue };
+        let kept: Option<Row> = serde_json::from_str(&kept).ok();
+        if kept.is_none_or(|kept| kept.priced_with != prices.fingerprint()) {
+            let (row, _) = row_as(&store.folder(key), Some(Prices::clone(prices)))?;
+            own.push((planned.point.number, row.to_json()));
+        }
+    }
+    Ok(store.price(&plan.sweep.name, &own)?)
 }
 
 /// A run that panicked left nothing half done behind these locks.
@@ -228,7 +244,7 @@ impl<'a> Crew<'a> {
         };
         let data = &self.plan.data[task.data];
         // a finished run that cannot be read, as a power cut may leave it, is done again
-        if is_finished(&path, task, &data.hash)
+        if is_finished(&path, task)
             && let Ok((row, seconds)) = row(&path)
         {
             self.index(task, &row, seconds)?;
@@ -286,11 +302,8 @@ impl Trouble {
 }
 
 /// Whether a folder holds the finished run of this task.
-fn is_finished(path: &Path, task: &Task, data: &str) -> bool {
+fn is_finished(path: &Path, task: &Task) -> bool {
     folder::read_receipt(path).is_ok_and(|receipt| {
-        receipt.status == "finished"
-            && receipt.arithmetic == ARITHMETIC
-            && receipt.data_hash == data
-            && receipt.config_hash == hash::text(&task.config.to_toml())
+        receipt.status == "finished" && receipt.arithmetic == ARITHMETIC && receipt.run == task.key
     })
 }

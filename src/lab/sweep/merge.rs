@@ -6,10 +6,10 @@ use std::path::Path;
 
 use super::row::row;
 use super::{Row, SweepError};
-use crate::lab::run::RunError;
+use crate::lab::run::{self, RunError};
+use crate::lab::store::ARITHMETIC;
 use crate::lab::store::folder::{self, FolderError, RunFolder, names};
 use crate::lab::store::index::{Store, StoreError};
-use crate::lab::store::{ARITHMETIC, address};
 
 /// Rows written to an index at a time.
 const BATCH: usize = 256;
@@ -31,13 +31,12 @@ pub struct Merged {
 
 /// The key a finished run should have, from what is in its folder.
 pub(super) fn address_of(path: &Path) -> Result<String, SweepError> {
-    let config = folder::read_text(path, names::CONFIG).map_err(RunError::from)?;
     let receipt = folder::read_receipt(path).map_err(RunError::from)?;
     if receipt.arithmetic != ARITHMETIC {
         let (found, wanted) = (receipt.arithmetic, ARITHMETIC);
         return Err(RunError::Arithmetic { found, wanted }.into());
     }
-    Ok(address::key(&config, &receipt.data_hash))
+    run::address_of(path, &receipt.data).map_err(SweepError::from)
 }
 
 /// Brings the finished runs and the sweeps of `from` into `into`.
@@ -65,7 +64,7 @@ pub fn merge(
         if let Some(here) = into.row(key)? {
             let here: Row = serde_json::from_str(&here)
                 .map_err(|error| RunError::from(damaged(&format!("has a row that {error}"))))?;
-            if here != row {
+            if here.disagreement(&row, false).is_some() {
                 return Err(SweepError::Contradiction {
                     key: key.clone(),
                     store: into.path().into(),

@@ -1,15 +1,18 @@
 //! From points to runs: every point resolved and checked before the first one runs.
 #![expect(clippy::disallowed_types, reason = "an estimate of time asks the clock")]
 
+use std::collections::BTreeMap;
 use std::str::FromStr;
+use std::sync::Arc;
 use std::time::Instant;
 
 use super::{Point, Sweep, SweepError};
 use crate::lab::config::{self, Config, Overlay, Sources};
 use crate::lab::data::{self, DataRoot, Loaded};
-use crate::lab::run::{Machine, RunError, Session};
-use crate::lab::store::address;
+use crate::lab::run::{Machine, Prices, RunError, Session};
 use crate::lab::store::index::{PointRecord, SweepRecord};
+use crate::lab::store::record::DataRecord;
+use crate::lab::store::{address, given};
 
 /// Runs whose speed is measured for an estimate.
 const PROBES: usize = 8;
@@ -45,12 +48,14 @@ impl Shard {
 }
 
 /// A point and the run it needs.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone)]
 pub struct Planned {
     /// The point.
     pub point: Point,
     /// Key of its run, or why there can be none.
     pub key: Result<String, String>,
+    /// What its run is priced with: constants are no part of a run, so points that share one may differ in them.
+    pub prices: Option<Arc<Prices>>,
 }
 
 /// One run; several points may need it.
@@ -92,7 +97,8 @@ pub fn plan(sweep: Sweep, settings: &[String], root: &DataRoot) -> Result<Plan, 
     let mut plan = Plan { points: vec![], before, tasks: vec![], data: vec![], sweep };
     let mut sources: Vec<String> = Vec::new();
     let mut first_error = None;
-    let mut known = std::collections::BTreeMap::new();
+    let mut known = BTreeMap::new();
+    let mut chips: BTreeMap<String, Arc<Prices>> = BTreeMap::new();
     let settings_tables =
         settings.iter().map(|text| config::setting_table(text)).collect::<Result<Vec<_>, _>>()?;
     for point in points {
@@ -109,12 +115,15 @@ pub fn plan(sweep: Sweep, settings: &[String], root: &DataRoot) -> Result<Plan, 
                         sources.len() - 1
                     }
                 };
-                let work = check(&config, &plan.data[at])?;
-                Ok((config, at, work))
+                let (key, work) = check(&config, &plan.data[at])?;
+                Ok((config, at, key, work))
             });
+        let mut prices = None;
         let key = match resolved {
-            Ok((config, data, work)) => {
-                let key = address::key(&config.to_toml(), &plan.data[data].hash);
+            Ok((config, data, key, work)) => {
+                let own = Prices::of(&config);
+                let shared = chips.entry(own.fingerprint()).or_insert_with(|| Arc::new(own));
+                prices = Some(Arc::clone(shared));
                 if known.insert(key.clone(), ()).is_none() {
                     let task =
                         Task { key: key.clone(), config, data, point: plan.points.len(), work };
@@ -129,7 +138,7 @@ pub fn plan(sweep: Sweep, settings: &[String], root: &DataRoot) -> Result<Plan, 
                 Err(text)
             }
         };
-        plan.points.push(Planned { point, key });
+        plan.points.push(Planned { point, key, prices });
     }
     if let (Some(error), true) = (first_error, plan.tasks.is_empty()) {
         return Err(error);
@@ -162,19 +171,20 @@ fn resolve(
     config::load(&Sources { experiment, overlays: &overlays, seed, ..Sources::default() })
 }
 
-/// Checks that a configuration fits data and chip, and says how much work it is.
-fn check(config: &Config, data: &Loaded) -> Result<f64, RunError> {
+/// Checks that a configuration fits data and chip; the address of its run, and how much work it is.
+fn check(config: &Config, data: &Loaded) -> Result<(String, f64), RunError> {
     let train = &data.split.train;
-    let image = data.image.map(|shape| [shape.height, shape.width, shape.channels]);
-    let experiment = config.experiment(train.features(), train.classes(), image)?;
+    let record = DataRecord::of(data);
+    let experiment = config.experiment(record.features, record.classes, record.image)?;
     experiment.check()?;
+    let key = address::key(given::given(&experiment, config.train_on, config.select), &record.hash);
     let cells = |layer: &crate::chip::layer::LayerSpec| {
         layer.wiring.pathways().len() as f64 * layer.inputs as f64 * layer.units as f64
     };
     // levels of more than a byte take about twice the time
     let planes = if config.hardware.cell.level_bits.get() > 8 { 2.0 } else { 1.0 };
     let samples = train.len() as f64 * f64::from(config.epochs);
-    Ok(experiment.layers.iter().map(cells).sum::<f64>() * planes * samples)
+    Ok((key, experiment.layers.iter().map(cells).sum::<f64>() * planes * samples))
 }
 
 impl Plan {

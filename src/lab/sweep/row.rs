@@ -7,10 +7,21 @@ use serde_json::{Map, Number, Value};
 
 use super::SweepError;
 use crate::lab::price::Cost;
-use crate::lab::run::{RunError, reprice};
+use crate::lab::run::{self, Prices, RunError, reprice_as};
 use crate::lab::store::folder;
 use crate::lab::store::record::{EpochRecord, Receipt, Score};
 use crate::lab::table::Unit;
+
+/// What the numbers of a column are made of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ResultKind {
+    /// Counts of the run: whole numbers.
+    Whole,
+    /// Quotients of such counts.
+    Quotient,
+    /// Counts and the constants of a chip, which are no part of a run.
+    Priced,
+}
 
 /// A column of results.
 #[derive(Debug, Clone, Copy)]
@@ -21,8 +32,8 @@ pub struct ResultColumn {
     pub label: &'static str,
     /// What it is measured in.
     pub unit: Unit,
-    /// Whether its numbers are whole.
-    pub whole: bool,
+    /// What its numbers are made of.
+    pub kind: ResultKind,
     of: fn(&Facts<'_>) -> Option<Number>,
 }
 
@@ -65,35 +76,36 @@ fn share(score: Option<Score>) -> Option<Number> {
 }
 
 macro_rules! results {
-    ($($name:literal, $label:literal, $unit:ident, $whole:literal, $of:expr;)*) => {
-        [$(ResultColumn { name: $name, label: $label, unit: Unit::$unit, whole: $whole, of: $of },)*]
+    ($($(#[cfg($cfg:meta)])? $name:literal, $label:literal, $unit:ident, $kind:ident, $of:expr;)*) => {
+        &[$($(#[cfg($cfg)])? ResultColumn { name: $name, label: $label, unit: Unit::$unit, kind: ResultKind::$kind, of: $of },)*]
     };
 }
 
 /// All results, in the order of the table.
 #[rustfmt::skip]
-pub const RESULTS: [ResultColumn; 20] = results![
-    "test_accuracy", "test accuracy", Fraction, false, |f| share(f.receipt.test.as_ref().map(|test| test.score));
-    "validation_accuracy", "validation accuracy", Fraction, false, |f| share(f.read.validation);
-    "train_accuracy", "accuracy while learning", Fraction, false, |f| share(f.last.train);
-    "test_epoch", "epoch of the state that was tested", Plain, true, |f| f.receipt.test.as_ref().map(|test| test.epoch.into());
-    "epochs", "epochs", Plain, true, |f| Some(f.last.epoch.into());
-    "updates", "updates", Count, true, |f| Some(f.last.updates.into());
-    "cells", "cells", Count, true, |f| Some(f.pathways(|p| p.cells).into());
-    "floor_fraction", "cells at the floor", Fraction, false, |f| over(f.pathways(|p| p.floor), f.pathways(|p| p.cells));
-    "pruned_fraction", "cells pruned for good", Fraction, false, |f| over(f.pathways(|p| p.pruned), f.pathways(|p| p.cells));
-    "ei_ratio", "E/I of stored levels", Plain, false, |f| over(f.levels(0), f.levels(1));
-    "pulses_attempted", "pulses given", Count, true, |f| Some(f.event("pulses_attempted").into());
-    "pulses_effective", "pulses that moved a cell", Count, true, |f| Some(f.event("pulses_effective").into());
-    "bounded_fraction", "writes cut by the bound", Fraction, false, |f| over(f.event("bounded"), f.event("requested"));
-    "saturated_fraction", "conversions that saturated", Fraction, false, |f| over(f.event("saturated_conversions"), f.event("conversions"));
-    "cycles", "cycles on the chip", Cycles, true, |f| f.cost.cycles.map(Number::from);
-    "chip_seconds", "time on the chip", Seconds, false, |f| f.cost.seconds.and_then(Number::from_f64);
-    "joules", "energy on the chip", Joules, false, |f| f.joules(1);
-    "joules_low", "energy on the chip, low", Joules, false, |f| f.joules(0);
-    "joules_high", "energy on the chip, high", Joules, false, |f| f.joules(2);
-    "joules_assumed", "share of energy that leans on assumed constants", Fraction, false,
+pub const RESULTS: &[ResultColumn] = results![
+    "test_accuracy", "test accuracy", Fraction, Quotient, |f| share(f.receipt.test.as_ref().map(|test| test.score));
+    "validation_accuracy", "validation accuracy", Fraction, Quotient, |f| share(f.read.validation);
+    "train_accuracy", "accuracy while learning", Fraction, Quotient, |f| share(f.last.train);
+    "test_epoch", "epoch of the state that was tested", Plain, Whole, |f| f.receipt.test.as_ref().map(|test| test.epoch.into());
+    "epochs", "epochs", Plain, Whole, |f| Some(f.last.epoch.into());
+    "updates", "updates", Count, Whole, |f| Some(f.last.updates.into());
+    "cells", "cells", Count, Whole, |f| Some(f.pathways(|p| p.cells).into());
+    "floor_fraction", "cells at the floor", Fraction, Quotient, |f| over(f.pathways(|p| p.floor), f.pathways(|p| p.cells));
+    "pruned_fraction", "cells pruned for good", Fraction, Quotient, |f| over(f.pathways(|p| p.pruned), f.pathways(|p| p.cells));
+    "ei_ratio", "E/I of stored levels", Plain, Quotient, |f| over(f.levels(0), f.levels(1));
+    "pulses_attempted", "pulses given", Count, Whole, |f| Some(f.event("pulses_attempted").into());
+    "pulses_effective", "pulses that moved a cell", Count, Whole, |f| Some(f.event("pulses_effective").into());
+    "bounded_fraction", "writes cut by the bound", Fraction, Quotient, |f| over(f.event("bounded"), f.event("requested"));
+    "saturated_fraction", "conversions that saturated", Fraction, Quotient, |f| over(f.event("saturated_conversions"), f.event("conversions"));
+    "cycles", "cycles on the chip", Cycles, Whole, |f| f.cost.cycles.map(Number::from);
+    "chip_seconds", "time on the chip", Seconds, Priced, |f| f.cost.seconds.and_then(Number::from_f64);
+    "joules", "energy on the chip", Joules, Priced, |f| f.joules(1);
+    "joules_low", "energy on the chip, low", Joules, Priced, |f| f.joules(0);
+    "joules_high", "energy on the chip, high", Joules, Priced, |f| f.joules(2);
+    "joules_assumed", "share of energy that leans on assumed constants", Fraction, Priced,
         |f| f.cost.joules.and_then(|_| Number::from_f64(f.cost.assumed_share));
+    #[cfg(feature = "grown")] "grown", "what a later program shows", Count, Whole, |f| Some(f.last.grown.into());
 ];
 
 /// One finished run. Nothing in it depends on the machine or the time.
@@ -110,9 +122,31 @@ pub struct Row {
     pub hardware: String,
     /// What it leaves out: `key = text`.
     pub not_simulated: Vec<String>,
+    /// [`Prices::fingerprint`] of the constants that its prices were made with.
+    #[serde(default)]
+    pub priced_with: String,
 }
 
 impl Row {
+    /// The first thing that one run cannot have in two ways: state, data, or a number that both rows have. A column that
+    /// one program does not know says nothing. Prices follow from constants, which are no part of a run: they count
+    /// where both rows come from one folder.
+    #[must_use]
+    pub fn disagreement(&self, other: &Self, one_folder: bool) -> Option<&'static str> {
+        if self.state_hash != other.state_hash {
+            return Some("state_hash");
+        }
+        if self.data_hash != other.data_hash {
+            return Some("data_hash");
+        }
+        let counts = |column: &&ResultColumn| one_folder || column.kind != ResultKind::Priced;
+        let differs = |column: &&ResultColumn| {
+            let both = self.results.get(column.name).zip(other.results.get(column.name));
+            both.is_some_and(|(mine, theirs)| mine != theirs)
+        };
+        RESULTS.iter().filter(counts).find(differs).map(|column| column.name)
+    }
+
     /// As an index keeps it.
     pub(super) fn to_json(&self) -> String {
         serde_json::to_string(self).expect("rows have a JSON form")
@@ -124,9 +158,17 @@ impl Row {
 /// # Errors
 /// When it is not finished or damaged.
 pub fn row(path: &Path) -> Result<(Row, f64), SweepError> {
+    row_as(path, None)
+}
+
+/// The same, with the constants of another chip that would have done the same.
+///
+/// # Errors
+/// As [`row`].
+pub fn row_as(path: &Path, prices: Option<Prices>) -> Result<(Row, f64), SweepError> {
     let receipt = folder::read_receipt(path).map_err(RunError::from)?;
-    let records = folder::read_metrics(path).map_err(RunError::from)?;
-    let priced = reprice(path, None)?;
+    let records = run::records(path, &receipt)?;
+    let priced = reprice_as(path, prices)?;
     let damaged = |found: &str| {
         let found = found.into();
         RunError::from(folder::FolderError::Content { path: path.into(), found })
@@ -146,9 +188,10 @@ pub fn row(path: &Path) -> Result<(Row, f64), SweepError> {
     let row = Row {
         results: results.collect(),
         state_hash: last.state_hash.clone(),
-        data_hash: receipt.data_hash.clone(),
-        hardware: priced.made_on.clone(),
+        data_hash: receipt.data.hash.clone(),
+        hardware: priced.priced_as.clone(),
         not_simulated: not_simulated.collect(),
+        priced_with: priced.fingerprint.clone(),
     };
-    Ok((row, receipt.train_seconds))
+    Ok((row, folder::read_timing(path).train_seconds()))
 }

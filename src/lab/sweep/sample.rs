@@ -51,8 +51,11 @@ pub fn sample(
         let verdict = if address != *key {
             let what = format!("the key of {}", path.display());
             Verdict::Different { what, wanted: key.clone(), found: address }
-        } else if kept.as_ref() != Some(&found) {
-            let what = format!("the row of run {key} in the index");
+        } else if let Some(place) = kept
+            .as_ref()
+            .map_or(Some("which cannot be read"), |kept| kept.disagreement(&found, true))
+        {
+            let what = format!("the row of run {key} in the index, {place},");
             Verdict::Different { what, wanted: text.clone(), found: found.to_json() }
         } else {
             run::verify(&path, root, machine, None, on_batch)?

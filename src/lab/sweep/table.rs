@@ -1,7 +1,7 @@
 //! The results of a sweep as a table.
 
 use super::axis::Value;
-use super::row::{RESULTS, Row};
+use super::row::{RESULTS, ResultKind, Row};
 use super::{Sweep, SweepError};
 use crate::lab::report::sweep::{Axis, Figures, Refused};
 use crate::lab::store::index::{Store, SweepRecord};
@@ -179,7 +179,7 @@ fn result_columns(rows: &[Option<Row>]) -> impl Iterator<Item = Column> {
     RESULTS.iter().map(move |column| {
         let cells =
             rows.iter().map(|row| row.as_ref().and_then(|row| row.results.get(column.name)));
-        let values = if column.whole {
+        let values = if column.kind == ResultKind::Whole {
             Values::Whole(cells.map(|cell| cell.and_then(serde_json::Value::as_i64)).collect())
         } else {
             Values::Real(cells.map(|cell| cell.and_then(serde_json::Value::as_f64)).collect())

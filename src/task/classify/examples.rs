@@ -7,6 +7,9 @@
 //! See docs/MODEL.md, 1.
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
+use std::ops::Range;
+use std::sync::Arc;
+
 use crate::num::fixed::DriveBits;
 
 /// Why values and labels do not make a set of examples.
@@ -44,15 +47,28 @@ pub enum ExamplesError {
     },
 }
 
-/// Labelled examples. Every value is at most `full_scale`, every label below `classes`.
-#[derive(Debug, Clone, PartialEq, Eq)]
+/// Labelled examples. Every value is at most `full_scale`, every label below `classes`. Copies and parts share their
+/// storage.
+#[derive(Debug, Clone)]
 pub struct Examples {
-    values: Vec<u8>,
-    labels: Vec<u8>,
+    values: Arc<[u8]>,
+    labels: Arc<[u8]>,
+    /// Which of the stored examples these are.
+    range: Range<usize>,
     features: usize,
     full_scale: u8,
     classes: usize,
 }
+
+impl PartialEq for Examples {
+    fn eq(&self, other: &Self) -> bool {
+        let of = |e: &Self| (e.features, e.full_scale, e.classes);
+        let same = self.all_values() == other.all_values() && self.labels() == other.labels();
+        same && of(self) == of(other)
+    }
+}
+
+impl Eq for Examples {}
 
 impl Examples {
     /// Checks and keeps `values` (example after example, `features` each) and `labels`.
@@ -82,37 +98,39 @@ impl Examples {
         if let Some(example) = labels.iter().position(|&label| usize::from(label) >= classes) {
             return Err(ExamplesError::Label { example, found: labels[example], classes });
         }
-        Ok(Self { values, labels, features, full_scale, classes })
+        let range = 0..labels.len();
+        let (values, labels) = (values.into(), labels.into());
+        Ok(Self { values, labels, range, features, full_scale, classes })
     }
 
     /// Number of examples.
     #[must_use]
     pub fn len(&self) -> usize {
-        self.labels.len()
+        self.range.len()
     }
 
     /// Whether there is no example.
     #[must_use]
     pub fn is_empty(&self) -> bool {
-        self.labels.is_empty()
+        self.range.is_empty()
     }
 
     /// Values of one example, row-major.
     #[must_use]
     pub fn values(&self, example: usize) -> &[u8] {
-        &self.values[example * self.features..][..self.features]
+        &self.all_values()[example * self.features..][..self.features]
     }
 
     /// Values of all examples.
     #[must_use]
     pub fn all_values(&self) -> &[u8] {
-        &self.values
+        &self.values[self.range.start * self.features..self.range.end * self.features]
     }
 
     /// Labels of all examples.
     #[must_use]
     pub fn labels(&self) -> &[u8] {
-        &self.labels
+        &self.labels[self.range.clone()]
     }
 
     /// Values an example has.
@@ -138,11 +156,11 @@ impl Examples {
     /// # Panics
     /// When `at` is beyond the end.
     #[must_use]
-    pub fn split_at(mut self, at: usize) -> (Self, Self) {
-        let values = self.values.split_off(at * self.features);
-        let labels = self.labels.split_off(at);
-        let rest = Self { values, labels, ..self };
-        (self, rest)
+    pub fn split_at(self, at: usize) -> (Self, Self) {
+        assert!(at <= self.len(), "a cut lies inside");
+        let Range { start, end } = self.range;
+        let rest = Self { range: start + at..end, ..self.clone() };
+        (Self { range: start..start + at, ..self }, rest)
     }
 
     /// The examples of `self`, then those of `other`.
@@ -150,12 +168,12 @@ impl Examples {
     /// # Panics
     /// When the two differ in features, full scale or classes.
     #[must_use]
-    pub fn joined(mut self, other: &Self) -> Self {
+    pub fn joined(self, other: &Self) -> Self {
         let shape = |e: &Self| (e.features, e.full_scale, e.classes);
         assert_eq!(shape(&self), shape(other), "only sets of one kind are joined");
-        self.values.extend_from_slice(&other.values);
-        self.labels.extend_from_slice(&other.labels);
-        self
+        let values = [self.all_values(), other.all_values()].concat().into();
+        let labels: Arc<[u8]> = [self.labels(), other.labels()].concat().into();
+        Self { values, range: 0..labels.len(), labels, ..self }
     }
 
     /// The drive code of every possible value.

@@ -4,6 +4,7 @@
 use super::examples::Examples;
 use super::experiment::{Augment, Experiment, Seeded};
 use crate::chip::engine::{Calibration, Currents, Engine, Phase};
+use crate::chip::state::{Piece, Section, State, StateError, Visitor};
 use crate::learn::driver::Driver;
 use crate::learn::error;
 use crate::learn::statistics::{self, FloorMap, PathwayStatistics};
@@ -80,11 +81,6 @@ impl Trainer {
     #[must_use]
     pub const fn epoch(&self) -> u32 {
         self.epoch
-    }
-
-    /// Restores the number of epochs finished.
-    pub const fn set_epoch(&mut self, epoch: u32) {
-        self.epoch = epoch;
     }
 
     /// Statistics of every pathway now.
@@ -188,6 +184,17 @@ impl Trainer {
         let currents = self.driver.engine_mut().take_currents();
         self.driver.engine_mut().set_phase(phase);
         Evaluation { predictions, margins, correct, currents }
+    }
+}
+
+impl State for Trainer {
+    fn visit(&mut self, visitor: &mut dyn Visitor) -> Result<(), StateError> {
+        let within = 0..=i64::from(self.experiment.epochs);
+        let piece = Piece { name: "epoch", section: Some(Section::Progress), within };
+        if let Some(epoch) = visitor.numbers(&piece, &[i64::from(self.epoch)])? {
+            self.epoch = u32::try_from(epoch[0]).expect("a visitor keeps to the range");
+        }
+        self.driver.visit(visitor)
     }
 }
 

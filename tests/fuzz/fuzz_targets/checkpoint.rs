@@ -23,7 +23,7 @@ fn session() -> Session {
 
 thread_local! {
     static SESSION: RefCell<(Session, Vec<u8>)> = {
-        let session = session();
+        let mut session = session();
         let checkpoint = session.checkpoint();
         RefCell::new((session, checkpoint))
     };

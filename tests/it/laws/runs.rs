@@ -125,7 +125,7 @@ fn run() -> impl Strategy<Value = Run> {
     })
 }
 
-const IDENTITY: Identity<'_> = Identity { config: "config", data: "data" };
+const IDENTITY: Identity<'_> = Identity { run: "run", data: "data" };
 
 fn fresh(run: &Run, backend: Backend) -> Trainer {
     let seeded = run.experiment.build(backend, run.data.len()).unwrap();
@@ -136,7 +136,7 @@ fn fresh(run: &Run, backend: Backend) -> Trainer {
 
 /// Trains up to an epoch; the state after each.
 fn go_on(run: &Run, trainer: &mut Trainer, until: u32) -> Vec<String> {
-    let mut hashes = vec![hash::state(trainer.driver())];
+    let mut hashes = vec![hash::state(trainer)];
     let again = matches!(
         run.experiment.hardware.adc,
         Adc::Finite { range: AdcRange::Calibrated { every_epoch: true, .. }, .. }
@@ -147,7 +147,7 @@ fn go_on(run: &Run, trainer: &mut Trainer, until: u32) -> Vec<String> {
         }
         trainer.learn(&run.data, &mut |_| true).unwrap();
         trainer.evaluate(&run.data);
-        hashes.push(hash::state(trainer.driver()));
+        hashes.push(hash::state(trainer));
     }
     hashes
 }
@@ -162,7 +162,7 @@ fn whole(run: &Run, backend: Backend, threads: usize) -> Vec<String> {
 fn interrupted(run: &Run) -> String {
     let mut first = fresh(run, Backend::best());
     go_on(run, &mut first, run.stop);
-    let bytes = checkpoint::write(&first, IDENTITY);
+    let bytes = checkpoint::write(&mut first, IDENTITY);
     if first.epoch() < run.experiment.epochs {
         let _ = first.learn(&run.data, &mut |_| false);
     }

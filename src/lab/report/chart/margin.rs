@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use super::Chart;
+use super::{Chart, track};
 use crate::lab::report::number::{escape, place};
 use crate::lab::report::scale::Axis;
 
@@ -76,16 +76,9 @@ impl Chart {
 
     /// A line through the margin: value, then place on the vertical axis.
     pub(in crate::lab::report) fn margin_line(&mut self, axis: &Axis, points: &[(f64, f64)]) {
-        let mut path = String::new();
-        for &(value, y) in points {
-            let pen = if path.is_empty() { 'M' } else { 'L' };
-            let _ = write!(path, "{pen}{} {}", place(self.across(axis, value)), place(self.y(y)));
-        }
-        if !path.is_empty() {
-            let _ = write!(
-                self.body,
-                "<path class=\"line thin\" style=\"stroke:var(--ink)\" d=\"{path}\"/>"
-            );
+        let d = track(points.iter().map(|&(value, y)| (self.across(axis, value), self.y(y))));
+        if !d.is_empty() {
+            self.path("line thin", "var(--ink)", 0, &d);
         }
     }
 

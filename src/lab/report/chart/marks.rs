@@ -1,17 +1,9 @@
-//! What figures of many runs draw besides lines: bands, error bars, markers, cells, panels, keys.
+//! Marks of points and their spread: bands, whiskers, markers, keys.
 
 use std::fmt::Write as _;
 
-use super::Chart;
-use crate::lab::report::number::{escape, place};
-
-/// Strokes that tell lines apart without colour.
-const DASHES: [&str; 8] = ["", "6 3", "2 3", "9 3 2 3", "12 4", "5 2", "2 2", "9 3 2 3 2 3"];
-
-/// The dashes of the line of that number.
-pub(in crate::lab::report) fn dashes(number: usize) -> &'static str {
-    DASHES[number % DASHES.len()]
-}
+use super::{Chart, track};
+use crate::lab::report::number::{place, size};
 
 /// The outline of the marker of that number: circle, square, diamond, triangles, cross, saltire, pentagon.
 fn outline(number: usize, x: f64, y: f64, r: f64) -> String {
@@ -61,108 +53,41 @@ fn outline(number: usize, x: f64, y: f64, r: f64) -> String {
 impl Chart {
     /// The area between two lines over the same abscissas: `(x, low, high)`.
     pub(in crate::lab::report) fn band(&mut self, points: &[(f64, f64, f64)], colour: &str) {
-        if points.len() < 2 {
-            return;
-        }
         let there = points.iter().map(|&(x, _, high)| (x, high));
         let back = points.iter().rev().map(|&(x, low, _)| (x, low));
-        let corner = |(x, y)| format!("{} {}", place(self.x(x)), place(self.y(y)));
-        let path = there.chain(back).map(corner).collect::<Vec<_>>().join("L");
-        let _ = write!(self.body, "<path fill=\"{colour}\" fill-opacity=\"0.16\" d=\"M{path}z\"/>");
+        let d = track(there.chain(back).map(|(x, y)| (self.x(x), self.y(y))));
+        let _ = write!(self.body, "<path class=\"band\" style=\"fill:{colour}\" d=\"{d}z\"/>");
     }
 
-    /// A line with the dashes of a number.
-    pub(in crate::lab::report) fn stroke(
+    /// A bar with ends, from one point to another along one of the axes.
+    pub(in crate::lab::report) fn whisker(
         &mut self,
-        points: &[(f64, f64)],
+        from: (f64, f64),
+        to: (f64, f64),
         colour: &str,
-        dash: usize,
     ) {
-        let path =
-            points.iter().map(|&(x, y)| format!("{} {}", place(self.x(x)), place(self.y(y))));
-        let path = path.collect::<Vec<_>>().join("L");
-        let _ = write!(
-            self.body,
-            "<path fill=\"none\" stroke=\"{colour}\" stroke-width=\"1.8\" stroke-linejoin=\"round\" \
-             stroke-dasharray=\"{}\" d=\"M{path}\"/>",
-            if dashes(dash).is_empty() { "none" } else { dashes(dash) }
-        );
+        let [a, b] = [from, to].map(|(x, y)| (self.x(x), self.y(y)));
+        let (dx, dy) = if from.0 == to.0 { (3.0, 0.0) } else { (0.0, 3.0) };
+        let end = |(x, y): (f64, f64)| track([(x - dx, y - dy), (x + dx, y + dy)]);
+        let d = format!("{}{}{}", track([a, b]), end(a), end(b));
+        self.path("whisker", colour, 0, &d);
     }
 
-    /// From point to point by way of corners: along the abscissa first.
-    pub(in crate::lab::report) fn steps(&mut self, points: &[(f64, f64)], colour: &str) {
-        let mut corners: Vec<(f64, f64)> = Vec::new();
-        for &(x, y) in points {
-            if let Some(&(_, before)) = corners.last() {
-                corners.push((x, before));
-            }
-            corners.push((x, y));
-        }
-        self.stroke(&corners, colour, 0);
-    }
-
-    /// A bar with ends, from `low` to `high` along the ordinate.
-    pub(in crate::lab::report) fn error_y(&mut self, x: f64, low: f64, high: f64, colour: &str) {
-        let (x, low, high) = (self.x(x), self.y(low), self.y(high));
-        let at = |x: f64, y: f64| format!("{} {}", place(x), place(y));
-        let path = format!(
-            "M{}L{}M{}L{}M{}L{}",
-            at(x, low),
-            at(x, high),
-            at(x - 3.0, low),
-            at(x + 3.0, low),
-            at(x - 3.0, high),
-            at(x + 3.0, high)
-        );
-        self.thin(&path, colour);
-    }
-
-    /// The same along the abscissa.
-    pub(in crate::lab::report) fn error_x(&mut self, y: f64, low: f64, high: f64, colour: &str) {
-        let (y, low, high) = (self.y(y), self.x(low), self.x(high));
-        let at = |x: f64, y: f64| format!("{} {}", place(x), place(y));
-        let path = format!(
-            "M{}L{}M{}L{}M{}L{}",
-            at(low, y),
-            at(high, y),
-            at(low, y - 3.0),
-            at(low, y + 3.0),
-            at(high, y - 3.0),
-            at(high, y + 3.0)
-        );
-        self.thin(&path, colour);
-    }
-
-    fn thin(&mut self, path: &str, colour: &str) {
-        let _ = write!(
-            self.body,
-            "<path fill=\"none\" stroke=\"{colour}\" stroke-opacity=\"0.6\" stroke-width=\"1\" d=\"{path}\"/>"
-        );
-    }
-
-    /// The marker of a number at a point; pale ones have no outline.
+    /// The marker of a number at a point.
     pub(in crate::lab::report) fn marker(
         &mut self,
         at: (f64, f64),
         number: usize,
+        radius: f64,
         colour: &str,
-        pale: bool,
+        class: &str,
     ) {
-        let (x, y) = (self.x(at.0), self.y(at.1));
-        let shape = outline(number, x, y, if pale { 2.8 } else { 3.6 });
-        let how =
-            if pale { "fill-opacity=\"0.35\"" } else { "stroke=\"#fff\" stroke-width=\"0.7\"" };
-        let _ = write!(self.body, "{shape} fill=\"{colour}\" {how}/>");
+        self.marker_at(self.x(at.0), self.y(at.1), number, radius, colour, class);
     }
 
-    /// Words at a point, in a colour, in the middle of it.
-    pub(in crate::lab::report) fn words(&mut self, at: (f64, f64), colour: &str, text: &str) {
-        let [x, y] = [self.x(at.0), self.y(at.1) + 4.0].map(place);
-        let text = escape(text);
-        let _ = write!(
-            self.body,
-            "<text class=\"middle\" style=\"fill:{colour}\" x=\"{x}\" y=\"{y}\">{text}</text>"
-        );
+    fn marker_at(&mut self, x: f64, y: f64, number: usize, r: f64, colour: &str, class: &str) {
+        let shape = outline(number, x, y, r);
+        let _ = write!(self.body, "{shape} class=\"{class}\" style=\"fill:{colour}\"/>");
     }
 
     /// Words above the left end of the frame.
@@ -170,45 +95,24 @@ impl Chart {
         self.text("heading", self.left, self.top - 8.0, text);
     }
 
-    /// Width of the frame inside the axes.
-    pub(in crate::lab::report) fn inside(&self) -> (f64, f64) {
-        (self.width - self.left - self.right, self.base() - self.top)
-    }
-
-    /// Words over a key, right of the frame.
-    pub(in crate::lab::report) fn key_title(&mut self, text: &str) {
-        self.text("note", self.width - self.right + 14.0, self.top + 14.0, text);
-    }
-
-    /// One entry of a key; `entry` counts from 1 on top. With a line through the marker, or without.
-    pub(in crate::lab::report) fn key(
+    /// A key right of the frame: its name, then number, colour and name of each entry; with lines through the markers,
+    /// or without.
+    pub(in crate::lab::report) fn key<'a>(
         &mut self,
-        entry: usize,
-        number: usize,
-        colour: &str,
-        text: &str,
+        title: &str,
+        entries: impl Iterator<Item = (usize, &'a str, String)>,
         lined: bool,
     ) {
-        let x = self.width - self.right + 14.0;
-        let y = self.top + 10.0 + 19.0 * crate::lab::report::number::size(entry);
-        let middle = if lined { x + 15.0 } else { x + 5.0 };
-        if lined {
-            let [left, right, middle] = [x, x + 30.0, y].map(place);
-            let dash = if dashes(number).is_empty() { "none" } else { dashes(number) };
-            let _ = write!(
-                self.body,
-                "<path fill=\"none\" stroke=\"{colour}\" stroke-width=\"1.8\" stroke-dasharray=\"{dash}\" \
-                 d=\"M{left} {middle}L{right} {middle}\"/>"
-            );
+        let left = self.width - self.right + 14.0;
+        self.text("note", left, self.top + 14.0, title);
+        for (entry, (number, colour, text)) in (1..).zip(entries) {
+            let y = self.top + 10.0 + 19.0 * size(entry);
+            let middle = if lined { left + 15.0 } else { left + 5.0 };
+            if lined {
+                self.path("line", colour, number, &track([(left, y), (left + 30.0, y)]));
+            }
+            self.marker_at(middle, y, number, 3.6, colour, "mark");
+            self.text("tick", middle + if lined { 22.0 } else { 11.0 }, y + 4.0, &text);
         }
-        let shape = outline(number, middle, y, 3.6);
-        let _ =
-            write!(self.body, "{shape} fill=\"{colour}\" stroke=\"#fff\" stroke-width=\"0.7\"/>");
-        self.text("tick", middle + if lined { 22.0 } else { 11.0 }, y + 4.0, text);
-    }
-
-    /// What has been drawn, moved to a place, as part of a larger picture.
-    pub(in crate::lab::report) fn part(self, x: f64, y: f64) -> String {
-        format!("<g transform=\"translate({} {})\">{}</g>", place(x), place(y), self.body)
     }
 }

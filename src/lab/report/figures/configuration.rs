@@ -7,13 +7,14 @@ use crate::lab::report::number::{count, escape};
 pub(super) fn draw(view: &RunView<'_>) -> Option<Figure> {
     let receipt = view.receipt;
     let rows = [
-        ("program", format!("dalean {}, arithmetic {}", receipt.version, receipt.arithmetic)),
-        ("data", receipt.data.clone()),
-        ("data hash", receipt.data_hash.clone()),
-        ("configuration hash", receipt.config_hash.clone()),
-        ("activation tables", receipt.tables_hash.clone()),
+        ("program", format!("dalean {}, arithmetic {}", view.timing.version, receipt.arithmetic)),
+        ("data", view.data.clone()),
+        ("data hash", receipt.data.hash.clone()),
+        ("address", receipt.run.clone()),
+        ("configuration hash", receipt.config.clone()),
+        ("activation tables", receipt.tables.clone()),
         ("state hashes", format!("{}, one an epoch", count(receipt.epoch_hashes.len() as u64))),
-        ("kernel, threads", format!("{}, {}", receipt.kernel, receipt.threads)),
+        ("kernel, threads", format!("{}, {}", view.timing.kernel, view.timing.threads)),
         ("status", receipt.status.clone()),
     ];
     let rows = rows.map(|(name, value)| {

@@ -1,10 +1,10 @@
 //! Confusion matrix: numbers for few classes, an image for many.
 
-use std::fmt::Write as _;
-
 use super::Figure;
+use crate::lab::report::chart::Chart;
 use crate::lab::report::image::indexed;
-use crate::lab::report::number::{count, escape, percent_of, place, quotient, size};
+use crate::lab::report::number::{count, escape, percent_of, quotient, size};
+use crate::lab::report::scale::Axis;
 use crate::lab::report::{RunView, colour};
 
 /// Above this many classes the counts no longer fit into their squares.
@@ -63,86 +63,47 @@ pub(super) fn pair(view: &RunView<'_>, truth: u64, guess: u64) -> String {
 fn squares(view: &RunView<'_>, matrix: &[Vec<u64>]) -> String {
     const SIDE: f64 = 490.0;
     let classes = matrix.len();
-    let names: Vec<String> =
-        (0..classes).map(|class| short_name(&view.class(class as u64))).collect();
-    let longest = names.iter().map(|name| name.chars().count()).max().unwrap_or(1);
-    let upright = longest <= 4 || classes <= 4;
-    let left = 32.0 + 7.0 * size(longest);
-    let bottom = if upright { 42.0 } else { 30.0 + 5.6 * size(longest) };
-    let right = 52.0;
-    let cell = ((SIDE - left - right) / size(classes)).min(96.0);
-    let top = 22.0;
-    let (wide, high) = (left + right + cell * size(classes), top + bottom + cell * size(classes));
+    let name = |class: usize| short_name(&view.class(class as u64));
+    // the first class lies on top
+    let down = |class: usize| size(classes - 1 - class);
+    let frame = |side: [f64; 2]| {
+        let x = (0..classes).map(|class| (size(class), name(class))).collect();
+        let y = (0..classes).map(|class| (down(class), name(class))).collect();
+        let axes = [(x, "answer"), (y, "true class")]
+            .map(|(names, label)| Axis::cells(classes, names, label));
+        let [x, y] = axes;
+        Chart::framed(side, [22.0, 62.0], x, y)
+    };
+    let (wide, high) = frame([SIDE; 2]).inside();
+    let cell = (wide / size(classes)).min(96.0);
+    let grown = |inside: f64| SIDE - inside + cell * size(classes);
+    let mut chart = frame([grown(wide), grown(high)]);
     let font = (cell * 0.36).clamp(7.5, 15.0);
-    let at = |class: usize, start: f64| start + cell * (size(class) + 0.5);
+    let reach = 0.5 - 1.0 / cell;
     let shades = shades(matrix);
-    let mut out = String::new();
     for (truth, row) in matrix.iter().enumerate() {
         let of_class: u64 = row.iter().sum();
         for (guess, &n) in row.iter().enumerate() {
-            let hue = if truth == guess { "var(--pp)" } else { "var(--np)" };
-            let shade = shades[truth][guess];
-            let (x, y) = (left + cell * size(guess), top + cell * size(truth));
+            let (x, y, shade) = (size(guess), down(truth), shades[truth][guess]);
             let tip = format!(
                 "true {}\nanswered {}\n{n} of {of_class} ({})",
                 view.class(truth as u64),
                 view.class(guess as u64),
                 percent_of(n, of_class, 1)
             );
-            let _ = write!(
-                out,
-                "<rect class=\"square\" x=\"{}\" y=\"{}\" width=\"{}\" height=\"{}\" \
-                 style=\"fill:{hue};fill-opacity:{shade:.3}\" data-tip=\"{}\"/>",
-                place(x + 1.0),
-                place(y + 1.0),
-                place(cell - 2.0),
-                place(cell - 2.0),
-                escape(&tip).replace('\n', "&#10;")
-            );
+            let hue = if truth == guess { "var(--pp)" } else { "var(--np)" };
+            chart.bar((x - reach, x + reach), (y - reach, y + reach), (hue, shade), &tip);
             if n > 0 {
-                let class = if truth == guess && shade > 0.55 { "on" } else { "off" };
-                let _ = write!(
-                    out,
-                    "<text class=\"count middle {class}\" style=\"font-size:{font:.1}px\" x=\"{}\" \
-                     y=\"{}\">{n}</text>",
-                    place(at(guess, left)),
-                    place(at(truth, top) + font * 0.36)
-                );
+                let ink = if truth == guess && shade > 0.55 { "#fff" } else { "var(--ink)" };
+                chart.words((x, y), ink, font, &n.to_string());
             }
         }
-        let (x, y) = (place(left - 8.0), place(at(truth, top) + 4.0));
-        let _ = write!(
-            out,
-            "<text class=\"tick end\" x=\"{x}\" y=\"{y}\">{}</text><text class=\"tick\" x=\"{}\" \
-             y=\"{y}\">{}</text>",
-            escape(&names[truth]),
-            place(wide - right + 6.0),
-            percent_of(row[truth], of_class, 1)
-        );
-        let (x, y) = (at(truth, left), top + cell * size(classes) + 17.0);
-        let name = escape(&names[truth]);
-        let _ = if upright {
-            let (x, y) = (place(x), place(y));
-            write!(out, "<text class=\"tick middle\" x=\"{x}\" y=\"{y}\">{name}</text>")
-        } else {
-            let (x, y) = (place(x + 4.0), place(y - 4.0));
-            let turn = format!("translate({x} {y}) rotate(-45)");
-            write!(out, "<text class=\"tick end\" transform=\"{turn}\">{name}</text>")
-        };
     }
-    let middle = place(top + cell * size(classes) / 2.0);
-    format!(
-        "<svg class=\"chart\" viewBox=\"0 0 {} {}\" style=\"max-width:{}px\" role=\"img\" \
-         aria-label=\"Confusion matrix\">{out}<text class=\"label middle\" x=\"{}\" y=\"{}\">answer</text>\
-         <text class=\"label middle\" transform=\"translate(12 {middle}) rotate(-90)\">true class</text>\
-         <text class=\"label end\" x=\"{}\" y=\"14\">recall</text></svg>",
-        place(wide),
-        place(high),
-        place(wide * 1.15),
-        place(left + cell * size(classes) / 2.0),
-        place(high - 4.0),
-        place(wide - 4.0)
-    )
+    let recall = |(truth, row): (usize, &Vec<u64>)| {
+        (down(truth), percent_of(row[truth], row.iter().sum(), 1))
+    };
+    chart.beside("recall", matrix.iter().enumerate().map(recall));
+    chart.finish("Confusion matrix")
 }
 
 /// How strongly each square is coloured, 0 to 1: right answers by the share of their class, wrong ones on a

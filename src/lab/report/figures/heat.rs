@@ -1,8 +1,9 @@
 //! Heat maps: every cell of every pathway, target streams down, source streams across.
 
 use super::{Figure, layer_heading, of_layer};
+use crate::lab::report::chart::Chart;
 use crate::lab::report::image::{Grid, indexed, pool};
-use crate::lab::report::number::{escape, percent_of, place, ratio, size};
+use crate::lab::report::number::{escape, percent_of, ratio, size};
 use crate::lab::report::{Heat, RunView, colour};
 
 /// Longest side of an embedded map; shorter where many are embedded.
@@ -99,23 +100,10 @@ fn tile(view: &RunView<'_>, heat: &Heat, grid: &Grid, top: f64) -> String {
 
 /// The colour scale, with values at the places the square root gives them.
 fn bar(top: f64) -> String {
-    const WIDTH: f64 = 420.0;
-    let ramp: Vec<u8> = (0..=255).collect();
-    let Some(uri) = indexed(256, 1, &ramp, &colour::levels()) else {
-        return String::new();
-    };
-    let ticks = [0.0, 0.05, 0.2, 0.5, 1.0].map(|part| {
+    let ticks = [0.0, 0.05, 0.2, 0.5, 1.0].map(|part: f64| {
         let value = part * top;
         let text = if top < 10.0 { ratio(Some(value)) } else { format!("{value:.0}") };
-        let x = place(10.0 + (WIDTH - 20.0) * part.sqrt());
-        format!("<text class=\"tick middle\" x=\"{x}\" y=\"30\">{text}</text>")
+        (part.sqrt(), text)
     });
-    format!(
-        "<svg class=\"chart bar\" viewBox=\"0 0 {WIDTH} 48\" role=\"img\" aria-label=\"Colour scale of \
-         levels\"><image x=\"10\" y=\"2\" width=\"{}\" height=\"12\" preserveAspectRatio=\"none\" \
-         href=\"{uri}\"/>{}<text class=\"label middle\" x=\"{}\" y=\"45\">level</text></svg>",
-        WIDTH - 20.0,
-        ticks.concat(),
-        WIDTH / 2.0
-    )
+    Chart::scale(&ticks, "level")
 }

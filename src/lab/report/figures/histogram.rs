@@ -3,7 +3,7 @@
 use super::{Figure, drawn_percent, hue, layer_heading, of_layer, same, swatch};
 use crate::lab::report::chart::Chart;
 use crate::lab::report::image::indexed;
-use crate::lab::report::number::{escape, percent_of, place, quotient, ratio, size};
+use crate::lab::report::number::{escape, percent_of, quotient, ratio, size};
 use crate::lab::report::scale::{Axis, Curve, Scale};
 use crate::lab::report::{RunView, colour};
 use crate::lab::store::record::{EpochRecord, PathwayRecord};
@@ -103,8 +103,8 @@ fn chart(view: &RunView<'_>, now: &PathwayRecord, scale: &LevelScale, high: f64)
             Some((f64::from(record.epoch), quotient(one.levels, one.cells)? + 0.5))
         })
         .collect();
-    chart.line(&means, "var(--card)", "line casing");
-    chart.line(&means, "var(--ink)", "line thin");
+    chart.line(&means, "var(--card)", "line casing", 0);
+    chart.line(&means, "var(--ink)", "line thin", 0);
     chart.tips(&tips(&arrays));
     margin(&mut chart, view, now, scale, high);
     let alt =
@@ -183,20 +183,7 @@ fn margin(
 
 /// The colour scale of shares.
 fn bar() -> String {
-    const WIDTH: f64 = 420.0;
-    let ramp: Vec<u8> = (1..=255).collect();
-    let Some(uri) = indexed(255, 1, &ramp, &colour::shares()) else { return String::new() };
-    let ticks = ["0.01", "0.1", "1", "10", "100"];
-    let ticks = ticks.into_iter().enumerate().map(|(at, text)| {
-        let x = place(10.0 + (WIDTH - 20.0) * size(at) / 4.0);
-        format!("<text class=\"tick middle\" x=\"{x}\" y=\"30\">{text}\u{202f}%</text>")
-    });
-    format!(
-        "<svg class=\"chart bar\" viewBox=\"0 0 {WIDTH} 48\" role=\"img\" aria-label=\"Colour scale of shares\">\
-         <image x=\"10\" y=\"2\" width=\"{}\" height=\"12\" preserveAspectRatio=\"none\" href=\"{uri}\"/>{}\
-         <text class=\"label middle\" x=\"{}\" y=\"45\">share of the pathway's cells, empty where none</text></svg>",
-        WIDTH - 20.0,
-        ticks.collect::<String>(),
-        WIDTH / 2.0
-    )
+    let ticks = ["0.01", "0.1", "1", "10", "100"].into_iter().enumerate();
+    let ticks = ticks.map(|(at, text)| (size(at) / 4.0, format!("{text}\u{202f}%")));
+    Chart::scale(&ticks.collect::<Vec<_>>(), "share of the pathway's cells, empty where none")
 }

@@ -40,9 +40,9 @@ pub(super) fn charts(view: &RunView<'_>) -> Vec<Option<String>> {
                 let ends = |from: u64, more: u64| {
                     (drawn_percent(from, cells), drawn_percent(from + more, cells))
                 };
-                chart.bar(across, ends(above, one.births), hue(one), 0.95);
+                chart.bar(across, ends(above, one.births), (hue(one), 0.95), "");
                 let (from, to) = ends(below, one.deaths);
-                chart.bar(across, (-from, -to), hue(one), 0.55);
+                chart.bar(across, (-from, -to), (hue(one), 0.55), "");
                 above += one.births;
                 below += one.deaths;
             }
@@ -60,11 +60,15 @@ pub(super) fn charts(view: &RunView<'_>) -> Vec<Option<String>> {
         }
         chart.rule(0.0, "");
         let end = sums(layer).next_back().into_iter();
-        chart.beside(end.flat_map(|(_, births, deaths, cells)| {
-            let half = |count: u64| drawn_percent(count, cells) / 2.0;
-            [(half(births), "births", births), (-half(deaths), "deaths", deaths)]
-                .map(|(at, name, count)| (at, format!("{name} {}", percent_of(count, cells, 1))))
-        }));
+        chart.beside(
+            "",
+            end.flat_map(|(_, births, deaths, cells)| {
+                let half = |count: u64| drawn_percent(count, cells) / 2.0;
+                [(half(births), "births", births), (-half(deaths), "deaths", deaths)].map(
+                    |(at, name, count)| (at, format!("{name} {}", percent_of(count, cells, 1))),
+                )
+            }),
+        );
         chart.tips(&tips);
         Some(chart.finish(&format!("Births and deaths in layer {layer} over epochs")))
     });

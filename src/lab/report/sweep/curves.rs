@@ -1,9 +1,12 @@
 //! Mean of a result against an axis: a line and a band for each value of one axis, a panel for each of another.
 
-use super::paper::{COLUMN, Drawn, hue, marks, sheet, short, wide};
+use std::collections::BTreeSet;
+
+use super::paper::{COLUMN, marks, sheet, short};
 use super::settings::{Levels, Settings};
 use super::statistics::Summary;
-use crate::lab::report::chart::Chart;
+use crate::lab::report::chart::{Chart, wide};
+use crate::lab::report::colour::hue;
 use crate::lab::report::number::size;
 use crate::lab::report::scale::Axis;
 use crate::lab::table::Unit;
@@ -53,12 +56,11 @@ pub(super) fn draw(settings: &Settings<'_>) -> Option<String> {
         return None;
     }
     let fraction = measure.column.unit == Unit::Fraction;
-    let scale = Drawn::new(measure.column.unit, greatest(&all));
     let framed = |at: Option<usize>| {
         range(all.iter().filter(|line| at.is_none_or(|at| line.panel == at)), pooled, fraction)
     };
     let whole = framed(None);
-    let title = scale.title(&measure.column.label);
+    let title = measure.title();
     let panels: Vec<usize> = {
         let mut panels: Vec<usize> = all.iter().map(|line| line.panel).collect();
         panels.dedup();
@@ -81,7 +83,8 @@ pub(super) fn draw(settings: &Settings<'_>) -> Option<String> {
         let (first, last) = (number % across == 0, number + 1 == across.min(panels.len()));
         let right = if last { key } else { 10.0 };
         let (low, high) = if own_scale { framed(Some(panel_at)) } else { whole };
-        let y_axis = Axis::round(low * scale.by, high * scale.by, if first { &title } else { "" });
+        let y_axis =
+            Axis::round(low * measure.by, high * measure.by, if first { &title } else { "" });
         let abscissa = abscissa(x, each - 70.0);
         let size_each = [if last { each + key } else { each }, high_each];
         let mut chart = Chart::framed(
@@ -94,14 +97,11 @@ pub(super) fn draw(settings: &Settings<'_>) -> Option<String> {
             chart.heading(&format!("{} {}", panel.axis.label, short(&panel.texts[panel_at])));
         }
         let own: Vec<&Line> = all.iter().filter(|line| line.panel == panel_at).collect();
-        lines(&mut chart, &own, x, pooled, scale.by);
+        lines(&mut chart, &own, x, pooled, measure.by);
         if let (Some(series), true) = (series, last) {
-            chart.key_title(&short(&series.axis.label));
-            let kinds: std::collections::BTreeSet<usize> =
-                all.iter().map(|line| line.series).collect();
-            for (entry, &kind) in kinds.iter().enumerate() {
-                chart.key(entry + 1, kind, hue(kind), &short(&series.texts[kind]), true);
-            }
+            let kinds: BTreeSet<usize> = all.iter().map(|line| line.series).collect();
+            let entry = |kind: usize| (kind, hue(kind), short(&series.texts[kind]));
+            chart.key(&short(&series.axis.label), kinds.into_iter().map(entry), true);
         }
         body += &chart.part(size(number % across) * each, size(number / across) * high_each);
     }
@@ -137,11 +137,6 @@ pub(super) fn held_words(held: &[(&Levels<'_>, Option<usize>)], pooled: bool) ->
         }
     }
     words
-}
-
-fn greatest(all: &[Line]) -> f64 {
-    let highs = all.iter().flat_map(|line| &line.points).map(|(_, point)| point.high.abs());
-    highs.fold(0.0, f64::max)
 }
 
 /// Ends of the ordinate: those of the means, stretched by intervals by no more than 0.6 of it.
@@ -200,7 +195,9 @@ fn lines(chart: &mut Chart, own: &[&Line], x: &Levels<'_>, pooled: bool, by: f64
             if x.numbers.is_some() && run.len() > 1 {
                 chart.band(&run, colour);
             } else {
-                run.iter().for_each(|&(at, low, high)| chart.error_y(at, low, high, colour));
+                for (at, low, high) in run {
+                    chart.whisker((at, low), (at, high), colour);
+                }
             }
         }
     }
@@ -208,8 +205,10 @@ fn lines(chart: &mut Chart, own: &[&Line], x: &Levels<'_>, pooled: bool, by: f64
         let points: Vec<_> =
             line.points.iter().map(|(at, point)| (place(number, *at), point.mean * by)).collect();
         if x.numbers.is_some() && points.len() > 1 {
-            chart.stroke(&points, hue(line.series), line.series);
+            chart.line(&points, hue(line.series), "line", line.series);
         }
-        points.iter().for_each(|&at| chart.marker(at, line.series, hue(line.series), false));
+        for at in points {
+            chart.marker(at, line.series, 3.6, hue(line.series), "mark");
+        }
     }
 }

@@ -1,13 +1,23 @@
-// The table: columns, distinct values, numbers in their units, means and intervals.
+// The table as the program wrote it: columns, axes, settings. Means, intervals, fronts and the order of values come with
+// it: src/lab/report/sweep/statistics.rs and settings.rs are their only home. What a reader pools is put together here.
 performance.mark("library read");
 const sweep = JSON.parse(document.getElementById("sweep").textContent);
-const rowCount = sweep.rows;
+const rowCount = sweep.setting.length;
 const gap = "\u202f";
+const [six, four] = [6, 4].map((digits) => new Intl.NumberFormat("en", { maximumSignificantDigits: digits, useGrouping: "min2" }));
 
+/** Six significant digits at most, in groups of three. */
+const plain = (value, digits = six) => digits.format(value).replaceAll(",", gap).replace("-", "−");
+const short = (text, most) => (text.length > most ? text.slice(0, most - 1) + "…" : text);
+const listed = (list) => (list.length < 2 ? list.join("") : `${list.slice(0, -1).join(", ")} and ${list.at(-1)}`);
+/** Words that Plotly would read as markup. */
+const escapeText = (text) => text.replace(/&/g, "&amp;").replace(/</g, "&lt;").replace(/>/g, "&gt;");
+const extent = (values) => values.reduce(([low, high], value) => [Math.min(low, value), Math.max(high, value)], [Infinity, -Infinity]);
+
+/** `by` and `sign` say how figures draw it, `title` is its label with that sign. */
 class Column {
   constructor(raw) {
     Object.assign(this, raw);
-    this.words = raw.words ?? null;
   }
   /** The cell as a number, or null. */
   number(row) {
@@ -15,204 +25,87 @@ class Column {
   }
   /** The cell as exported, empty where missing. */
   text(row) {
-    const value = this.words ? this.words[this.codes[row]] : this.values[row];
-    return value === null || value === undefined ? "" : String(value);
+    return String((this.words ? this.words[this.codes[row]] : this.values[row]) ?? "");
   }
   /** The cell as people read it. */
   show(row) {
-    if (this.words) return this.text(row) || "–";
-    return show(this.values[row], this.unit, this.role === "result");
+    return this.words ? this.text(row) || "–" : this.print(this.values[row]);
   }
-  /** What it is measured in, after its label. */
-  get title() {
-    return this.label;
+  /** A value in its unit. */
+  print(value) {
+    if (value === null) return "–";
+    if (this.unit === "fraction") return `${(100 * value).toFixed(2).replace("-", "−")}${gap}%`;
+    return this.unit === "seconds" || this.unit === "joules" ? `${plain(value * this.by, four)}${gap}${this.sign}` : plain(value);
+  }
+  /** What the runs of a setting say: how many, their mean, half its interval. */
+  of(setting) {
+    if (!this.mean) return { n: 1, mean: this.number(rowsOf[setting][0]), half: null };
+    return { n: this.n[setting], mean: this.mean[setting], half: this.half[setting] };
   }
 }
 
 const columns = sweep.columns.map((raw) => new Column(raw));
 const columnOf = new Map(columns.map((column) => [column.name, column]));
-const results = columns.filter((column) => column.role === "result" && !column.words);
 const outcomes = columns.filter((column) => column.role === "result");
+const results = outcomes.filter((column) => !column.words);
+const resultOf = new Map(results.map((column) => [column.name, column]));
 const isDone = (row) => outcomes.some((column) => column.text(row) !== "");
 
-/** Distinct values of an axis in order; `codes` says which one a row has, -1 for none. */
-class Axis {
-  constructor(raw) {
-    Object.assign(this, raw);
-    this.column = columnOf.get(raw.name);
-    this.numeric = !this.column.words;
-    const seen = new Map();
-    for (let row = 0; row < rowCount; row++) {
-      const text = this.column.text(row);
-      if (text !== "" && !seen.has(text)) seen.set(text, this.column.number(row));
-    }
-    const texts = [...seen.keys()];
-    const place = new Map(raw.order.map((text, at) => [text, at]));
-    const key = (text) => place.get(text) ?? raw.order.length;
-    if (this.numeric) texts.sort((a, b) => seen.get(a) - seen.get(b));
-    else texts.sort((a, b) => key(a) - key(b) || (a < b ? -1 : 1));
-    this.texts = texts;
-    this.numbers = this.numeric ? texts.map((text) => seen.get(text)) : null;
-    const index = new Map(texts.map((text, at) => [text, at]));
-    this.codes = new Int32Array(rowCount);
-    for (let row = 0; row < rowCount; row++) this.codes[row] = index.get(this.column.text(row)) ?? -1;
-    this.log = this.log && this.numeric && this.numbers.every((number) => number > 0);
-  }
-  get varies() {
-    return this.texts.length > 1;
-  }
-  /** Texts short enough for ticks and keys. */
-  get shorts() {
-    return this.texts.map((text) => short(text, 24));
-  }
-}
-
-const axes = sweep.axes.map((raw) => new Axis(raw));
+/** `codes` says which of its `texts` a setting has, -1 for none; of many values, which range of them. */
+const axes = sweep.axes.map((raw) => ({ ...raw, column: columnOf.get(raw.name), varies: raw.texts.length > 1 }));
 const axisOf = new Map(axes.map((axis) => [axis.name, axis]));
+const varied = axes.filter((axis) => axis.varies);
 
-/** Rows that differ in the seed alone share a number. */
-const settingOf = new Int32Array(rowCount);
-const settings = [];
-{
-  const known = new Map();
-  for (let row = 0; row < rowCount; row++) {
-    const key = axes.map((axis) => axis.codes[row]).join(",");
-    if (!known.has(key)) {
-      known.set(key, settings.length);
-      settings.push([]);
-    }
-    settingOf[row] = known.get(key);
-    settings[settingOf[row]].push(row);
-  }
+/** Runs of a setting: they differ in the seed alone. */
+const rowsOf = [];
+sweep.setting.forEach((setting, row) => (rowsOf[setting] ??= []).push(row));
+
+/** Axes that are not `shown`: held at a value or pooled, and what a caption says of that. */
+function others(shown) {
+  const rest = varied.filter((axis) => !shown.includes(axis));
+  const held = rest.filter((axis) => state.hold[axis.name] !== undefined);
+  const words = held.map((axis) => `${axis.label} = ${axis.texts[state.hold[axis.name]]}`);
+  return { held, pooled: rest.filter((axis) => !held.includes(axis)), text: words.length ? ` Held: ${words.join(", ")}.` : "" };
 }
 
-// --- numbers ---
-
-function short(text, most) {
-  return text.length > most ? text.slice(0, most - 1) + "…" : text;
+/** Runs of several settings together. Settings are no repetitions, so they have a range and no interval. */
+function pool(column, settings) {
+  const values = settings.flatMap((setting) => rowsOf[setting].map((row) => column.number(row))).filter((value) => value !== null);
+  const [low, high] = extent(values);
+  return { n: values.length, mean: values.length ? values.reduce((sum, value) => sum + value, 0) / values.length : null, low, high };
 }
 
-/** Words that Plotly would read as markup. */
-function escapeText(text) {
-  return text.replace(/&/g, "&amp;").replace(/</g, "&lt;").replace(/>/g, "&gt;");
-}
-
-/** Six significant digits at most, no zeros behind them. */
-function plain(value) {
-  if (value === 0) return "0";
-  const size = Math.abs(value);
-  if (size >= 1e15 || size < 1e-5) return Number(value.toPrecision(4)).toExponential().replace("-", "−").replace("+", "");
-  const text = Number.isInteger(value) ? String(value) : String(Number(value.toPrecision(6)));
-  const [whole, part] = text.replace("-", "−").split(".");
-  const grouped = whole.length > 4 ? whole.replace(/\B(?=(\d{3})+$)/g, gap) : whole;
-  return part ? `${grouped}.${part}` : grouped;
-}
-
-const prefixes = ["a", "f", "p", "n", "µ", "m", "", "k", "M", "G", "T", "P"];
-const signs = { seconds: "s", joules: "J", cycles: "cycles" };
-
-/** Three to four digits and a prefix: `12.3 nJ`. */
-function prefixed(value, unit, digits = 4) {
-  if (value === 0) return `0${gap}${unit}`;
-  const power = Math.floor(Math.log10(Math.abs(value)) / 3 + 1e-12);
-  const at = Math.max(0, Math.min(prefixes.length - 1, power + 6));
-  const number = value / 1000 ** (at - 6);
-  const text = Math.abs(number) >= 1000 ? String(Math.round(number)) : number.toPrecision(digits);
-  return `${text.replace("-", "−")}${gap}${prefixes[at]}${unit}`;
-}
-
-/** A value in its unit. Axis values are shown as they were written. */
-function show(value, unit, measured = true) {
-  if (value === null || value === undefined || !Number.isFinite(value)) return "–";
-  if (!measured) return plain(value);
-  if (unit === "fraction") return `${(100 * value).toFixed(2).replace("-", "−")}${gap}%`;
-  if (unit in signs) return prefixed(value, signs[unit]);
-  return plain(value);
-}
-
-/** How to draw values of a unit: all multiplied by `by`; `sign` goes to the title. */
-function drawn(unit, values) {
-  if (unit === "fraction") return { by: 100, sign: "%" };
-  let most = 0;
-  for (const value of values) most = Math.max(most, Math.abs(value));
-  if (most === 0 || unit === "plain") return { by: 1, sign: unit in signs ? signs[unit] : "" };
-  const power = Math.floor(Math.log10(most) / 3 + 1e-12) * 3;
-  if (unit === "seconds" || unit === "joules") {
-    const at = Math.max(-18, Math.min(15, power));
-    return { by: 10 ** -at, sign: prefixes[at / 3 + 6] + signs[unit] };
-  }
-  const at = most < 1e5 ? 0 : power;
-  const times = at === 0 ? "" : `10${[...String(at)].map((digit) => "⁰¹²³⁴⁵⁶⁷⁸⁹"[digit]).join("")}`;
-  return { by: 10 ** -at, sign: [times, unit === "cycles" ? "cycles" : ""].filter(Boolean).join(" ") };
-}
-
-/** About `parts` round steps (1, 2 or 5 times a power of ten) inside a range. */
-function roundTicks(low, high, parts) {
-  const raw = (high - low) / parts || 1;
-  const power = 10 ** Math.floor(Math.log10(raw));
-  const step = power * [1, 2, 5, 10].find((lead) => raw / power <= lead * 1.0001);
-  const ticks = [];
-  for (let at = Math.ceil(low / step - 1e-9); at * step <= high + 1e-9 * step; at++) ticks.push(Number((at * step).toPrecision(12)));
-  return ticks;
-}
-
-const titled = (label, sign) => (sign ? `${label} (${sign})` : label);
-
-// --- statistics: src/lab/report/sweep/statistics.rs is the law ---
-
-function student(degrees) {
-  if (degrees <= sweep.student.length) return sweep.student[degrees - 1];
-  const z = 1.959963984540054;
-  const first = (z ** 3 + z) / (4 * degrees);
-  const second = (5 * z ** 5 + 16 * z ** 3 + 3 * z) / (96 * degrees ** 2);
-  const third = (3 * z ** 7 + 19 * z ** 5 + 17 * z ** 3 - 15 * z) / (384 * degrees ** 3);
-  return z + first + second + third;
-}
-
-/** Count, mean, half the 95 % interval (null for one), least and greatest. */
-function summary(values) {
-  const n = values.length;
-  if (n === 0) return null;
-  let sum = 0;
-  let low = Infinity;
-  let high = -Infinity;
-  for (const value of values) {
-    sum += value;
-    low = Math.min(low, value);
-    high = Math.max(high, value);
-  }
-  const mean = sum / n;
-  let squares = 0;
-  for (const value of values) squares += (value - mean) ** 2;
-  const half = n > 1 ? student(n - 1) * Math.sqrt(squares / (n - 1) / n) : null;
-  return { n, mean, half, low, high };
-}
-
-/** Which points no other beats: less cost and more value (less, where `less`). In order of cost. */
-function front(costs, values, less) {
-  const worth = (at) => (less ? -values[at] : values[at]);
-  const order = costs.map((_, at) => at);
-  order.sort((a, b) => costs[a] - costs[b] || worth(b) - worth(a) || a - b);
-  let best = -Infinity;
-  return order.filter((at) => {
-    const better = worth(at) > best;
-    best = Math.max(best, worth(at));
-    return better;
-  });
-}
-
-/** Rows by key, each with the values of a column; rows without a value are left out. */
-function gather(rows, column, keyOf) {
+/** The points of a figure: settings gathered by their values `at` the axes `shown`, where the others are held. */
+function pointsOf(column, shown, { held }, pooled, alone = false) {
   const groups = new Map();
-  for (const row of rows) {
-    const value = column.number(row);
-    if (value === null) continue;
-    const key = keyOf(row);
-    if (key === null) continue;
-    let group = groups.get(key);
-    if (!group) groups.set(key, (group = { values: [], rows: [] }));
-    group.values.push(value);
-    group.rows.push(row);
+  for (let setting = 0; setting < rowsOf.length; setting++) {
+    if (held.some((axis) => axis.codes[setting] !== state.hold[axis.name])) continue;
+    const at = shown.map((axis) => (axis ? axis.codes[setting] : 0));
+    if (at.includes(-1)) continue;
+    const key = alone ? setting : at.join(",");
+    if (!groups.has(key)) groups.set(key, { at, settings: [] });
+    groups.get(key).settings.push(setting);
   }
-  return groups;
+  const points = [...groups.values()].map((group) => ({ ...group, ...(pooled ? pool(column, group.settings) : column.of(group.settings[0])) }));
+  return points.filter((point) => point.mean !== null);
+}
+
+/** The ends of a point's interval, or of its range where settings are pooled; null for one run. */
+function ends({ n, mean, half, low, high }) {
+  if (half === undefined) return n > 1 ? [low, high] : null;
+  return half === null ? null : [mean - half, mean + half];
+}
+
+function countWords(points) {
+  const [low, high] = extent(points.map((point) => point.n));
+  return low === high ? `n = ${low}` : `n = ${low} to ${high}`;
+}
+
+/** What the pointer is told of a point. */
+function hover(point, column, where) {
+  const between = ends(point)?.map((end) => column.print(end)).join(" to ");
+  const lines = [`<b>${column.print(point.mean)}</b> ${escapeText(column.label)}`];
+  if (between) lines.push(point.half === undefined ? `from ${between}` : `95${gap}%: ${between}`);
+  lines.push(`n = ${point.n}${point.half === undefined ? " (pooled)" : ""}`, ...where.filter(Boolean).map(escapeText));
+  return lines.join("<br>");
 }

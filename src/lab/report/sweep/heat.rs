@@ -1,11 +1,11 @@
 //! Mean of a result over two axes, as coloured cells with their values.
 
 use super::curves::{held_words, runs};
-use super::paper::{COLUMN, Drawn, marks, sheet, short, wide};
+use super::paper::{COLUMN, marks, sheet, short};
 use super::settings::{Levels, Settings, lies};
-use crate::lab::report::chart::Chart;
+use crate::lab::report::chart::{Chart, ramp, wide};
 use crate::lab::report::colour;
-use crate::lab::report::number::{place, size};
+use crate::lab::report::number::size;
 use crate::lab::report::scale::Axis;
 
 /// Cells along an axis at most.
@@ -32,7 +32,6 @@ pub(super) fn draw(settings: &Settings<'_>) -> Option<String> {
     let means: Vec<Option<f64>> = cells.iter().map(|cell| Some(cell.as_ref()?.mean)).collect();
     let low = means.iter().flatten().copied().reduce(f64::min)?;
     let high = means.iter().flatten().copied().reduce(f64::max)?;
-    let scale = Drawn::new(measure.column.unit, low.abs().max(high.abs()));
     let part = |value: f64| if high > low { (value - low) / (high - low) } else { 0.5 };
 
     let width = if across > 8 { 2.0 * COLUMN } else { COLUMN };
@@ -51,41 +50,35 @@ pub(super) fn draw(settings: &Settings<'_>) -> Option<String> {
         });
         known.collect::<Vec<_>>()
     };
+    // of what rises evenly, every name has room
+    const ALL: f64 = 1e9;
     let room = width - names - 130.0;
-    let plain = |levels: &Levels<'_>| Axis::marked(vec![], (0.0, 1.0), false, &levels.axis.label);
-    let (mut x_axis, mut y_axis) = (plain(x), plain(y));
-    x_axis.ticks = on_axis(x, &|at| at, if x.log() { f64::INFINITY } else { room });
-    y_axis.ticks = on_axis(y, &lies, f64::INFINITY);
-    for (axis, many) in [(&mut x_axis, across), (&mut y_axis, down)] {
-        (axis.scale.from, axis.scale.to) = (-0.5, size(many) - 0.5);
-    }
+    let x_ticks = on_axis(x, &|at| at, if x.log() { ALL } else { room });
+    let x_axis = Axis::cells(across, x_ticks, &x.axis.label);
+    let y_axis = Axis::cells(down, on_axis(y, &lies, ALL), &y.axis.label);
     let mut chart = Chart::framed([width, height], [12.0, 96.0], x_axis, y_axis);
     let (inner, _) = chart.inside();
     let palette = colour::levels();
-    let digits = digits(low.abs().max(high.abs()) * scale.by);
+    let digits = digits(low.abs().max(high.abs()) * measure.by);
     for (at, mean) in means.iter().enumerate() {
         let Some(mean) = *mean else { continue };
         let [i, j] = [size(at % across), size(lies(at / across))];
         let [red, green, blue, _] = palette[usize::from(colour::byte(255.0 * part(mean)))];
         let fill = format!("rgb({red},{green},{blue})");
-        chart.bar((i - 0.49, i + 0.49), (j - 0.48, j + 0.48), &fill, 1.0);
-        let text = format!("{:.digits$}", mean * scale.by).replace('-', "\u{2212}");
+        chart.bar((i - 0.49, i + 0.49), (j - 0.48, j + 0.48), (&fill, 1.0), "");
+        let text = format!("{:.digits$}", mean * measure.by).replace('-', "\u{2212}");
         if wide(&text) + 4.0 < inner / size(across) {
             let light = 0.3 * f64::from(red) + 0.59 * f64::from(green) + 0.11 * f64::from(blue);
-            chart.words((i, j), if light > 120.0 { "#131a22" } else { "#ffffff" }, &text);
+            let ink = if light > 120.0 { "var(--ink)" } else { "#ffffff" };
+            chart.words((i, j), ink, 13.0, &text);
         }
     }
     let (_, inside) = chart.inside();
     let pooled = held.iter().any(|(_, value)| value.is_none());
     let mut body = chart.part(0.0, 0.0);
-    body += &bar(
-        width - 84.0,
-        12.0,
-        inside,
-        [low * scale.by, high * scale.by],
-        &scale.title(&measure.column.label),
-        digits,
-    );
+    let tick = |(part, value): (f64, f64)| (part, format!("{:.digits$}", value * measure.by));
+    let ticks = [(0.0, low), (0.5, 0.5 * (low + high)), (1.0, high)].map(tick);
+    body += &ramp([width - 84.0, 12.0], [14.0, inside], &ticks, &measure.title());
     let says = format!(
         "{} by {} and {}, means of {}{}",
         measure.column.label,
@@ -103,32 +96,4 @@ fn digits(greatest: f64) -> usize {
         value if value >= 10.0 => 1,
         _ => 2,
     }
-}
-
-/// The colours and what they mean, upright.
-fn bar(x: f64, y: f64, high: f64, [low, top]: [f64; 2], title: &str, digits: usize) -> String {
-    const STEPS: usize = 64;
-    let palette = colour::levels();
-    let mut out = String::new();
-    for step in 0..STEPS {
-        let [red, green, blue, _] = palette[step * 255 / (STEPS - 1)];
-        let each = high / size(STEPS);
-        // A little taller than a step, so that no seam shows.
-        out += &format!(
-            "<rect x=\"{}\" y=\"{:.2}\" width=\"14\" height=\"{:.2}\" fill=\"rgb({red},{green},{blue})\"/>",
-            place(x),
-            y + high - each * size(step + 1),
-            each + if step > 0 { 0.4 } else { 0.0 }
-        );
-    }
-    for (part, value) in [(0.0, low), (0.5, 0.5 * (low + top)), (1.0, top)] {
-        let at = place(y + high * (1.0 - part) + 4.0);
-        out += &format!("<text x=\"{}\" y=\"{at}\">{value:.digits$}</text>", place(x + 19.0));
-    }
-    let middle = format!("translate({} {}) rotate(-90)", place(x + 72.0), place(y + 0.5 * high));
-    out += &format!(
-        "<text class=\"label middle\" transform=\"{middle}\">{}</text>",
-        crate::lab::report::number::escape(title)
-    );
-    out
 }

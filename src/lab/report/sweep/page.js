@@ -1,24 +1,15 @@
 // Choices of the reader: kept in the address, offered by selects, and the figures that follow them.
-const varied = axes.filter((axis) => axis.varies);
-const nameOf = (axis) => axis?.name ?? "";
-const costWords = ["joules", "seconds", "cycles", "pulses"];
-
+/** What the sweep's file asks for; axes that no figure shows are held at the best setting, so that a curve compares one thing. */
 function firstState() {
-  const wanted = sweep.figures;
-  const axisNamed = (name) => (axisOf.has(name) ? name : "");
-  const y = results.find((column) => column.name === wanted.y) ?? results[0];
-  const x = axisNamed(wanted.x) || nameOf(varied.find((axis) => axis.numeric) ?? varied[0] ?? axes[0]);
-  const heatAxes = (wanted.heat ?? []).filter((name) => axisOf.has(name));
-  const others = varied.filter((axis) => axis.name !== x);
-  const [hx, hy] = heatAxes.length === 2 ? heatAxes : [x, nameOf(others[0])];
-  const guess = costWords.map((word) => results.find((column) => column.name.startsWith(word) && !/_(low|high)$/.test(column.name))).find(Boolean);
-  const cost = results.find((column) => column.name === wanted.cost) ?? guess ?? results.find((column) => column.less && column !== y);
+  const { x, y, series, panel, heat, cost } = sweep.figures;
+  const known = (of, name, instead = "") => (of.has(name) ? name : instead);
+  const first = known(axisOf, x, (varied[0] ?? axes[0])?.name);
+  const [hx, hy] = heat ?? [first, varied.find((axis) => axis.name !== first)?.name];
   const hold = {};
-  // Held at the best setting, so that a curve compares one thing; values drawn from a range meet too few runs for that.
-  if (sweep.best !== null) {
-    for (const axis of varied) if (!axis.drawn && axis.codes[sweep.best] >= 0) hold[axis.name] = axis.codes[sweep.best];
-  }
-  return { x, y: y?.name ?? "", series: axisNamed(wanted.series), panel: axisNamed(wanted.panel), hx, hy, cost: cost?.name ?? "", hold, find: "", sort: "", down: false, page: 0 };
+  // Values drawn from a range meet too few runs for that.
+  if (sweep.best !== null) for (const axis of varied) if (!axis.binned && axis.codes[sweep.best] >= 0) hold[axis.name] = axis.codes[sweep.best];
+  return { x: first ?? "", y: known(resultOf, y, results[0]?.name) ?? "", series: known(axisOf, series), panel: known(axisOf, panel), hx: hx ?? "", hy: hy ?? "",
+    cost: known(resultOf, cost, results.find((column) => column.less && column.name !== y)?.name) ?? "", hold, find: "", sort: "", down: false, page: 0 };
 }
 
 const initial = firstState();
@@ -27,7 +18,7 @@ const state = { ...initial, hold: { ...initial.hold } };
 /** Reads the address; what it names and the table has not is left as it was. */
 function recall() {
   const given = new URLSearchParams(location.hash.slice(1));
-  const fits = { x: axisOf, series: axisOf, panel: axisOf, hx: axisOf, hy: axisOf, y: columnOf, cost: columnOf, sort: columnOf };
+  const fits = { x: axisOf, series: axisOf, panel: axisOf, hx: axisOf, hy: axisOf, y: resultOf, cost: resultOf, sort: columnOf };
   for (const [key, value] of given) {
     if (key in fits && (fits[key].has(value) || (value === "" && ["series", "panel"].includes(key)))) state[key] = value;
     if (key === "find") state.find = value;
@@ -57,7 +48,7 @@ function remember() {
 
 function fill(select, options, value) {
   select.replaceChildren(...options.map(([key, text]) => {
-    const one = cell("option", text);
+    const one = element("option", text);
     one.value = key;
     one.selected = key === value;
     return one;
@@ -99,8 +90,8 @@ function wireChoices() {
   choose("cost", list(results), ["pareto", "parallel"]);
   const holds = document.getElementById("holds");
   for (const axis of varied) {
-    // One axis is always shown; a range of drawn values is always pooled.
-    if (varied.length < 2 || (axis.numeric && axis.texts.length > 60)) continue;
+    // One axis is always shown; a range of values is always pooled.
+    if (varied.length < 2 || axis.binned) continue;
     const label = document.createElement("label");
     label.className = "choice";
     const select = document.createElement("select");
@@ -112,10 +103,10 @@ function wireChoices() {
       else state.hold[axis.name] = Number(select.value);
       changed(["curves", "heat"]);
     });
-    label.append(cell("span", axis.label), select);
+    label.append(element("span", axis.label), select);
     holds.append(label);
   }
-  if (holds.children.length) holds.prepend(cell("p", "Where a figure does not show an axis, it holds it at", "note"));
+  if (holds.children.length) holds.prepend(element("p", "Where a figure does not show an axis, it holds it at", "note"));
   for (const key of ["series", "panel"]) document.getElementById(`choose-${key}`).closest("label").hidden = varied.length < 2;
   document.getElementById("shared").hidden = results.length < 2 && holds.children.length === 0;
 }

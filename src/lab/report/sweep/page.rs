@@ -1,6 +1,7 @@
 //! The page around the figures: what was asked, the best setting, choices, empty frames that the script fills, notes.
 
-use super::settings::{Measure, Settings};
+use super::measure::Measure;
+use super::settings::Settings;
 use super::statistics::Summary;
 use super::{SweepView, json, library, paper};
 use crate::lab::price::prefixed;

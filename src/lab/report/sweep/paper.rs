@@ -1,23 +1,21 @@
 //! Figures for papers: what the page shows at first, as stand-alone SVG on white, a column (90 mm) or a page (180 mm) wide.
 
-use super::settings::Settings;
+use super::settings::{Levels, Settings};
 use super::{SweepView, curves, heat, pareto};
-use crate::lab::report::number::{escape, place, significant};
-use crate::lab::table::Unit;
+use crate::lab::report::chart::wide;
+use crate::lab::report::colour::on_white;
+use crate::lab::report::number::{escape, place, significant, size};
 
 /// Units of drawing across a column of a paper, and millimetres.
 pub(super) const COLUMN: f64 = 480.0;
 const COLUMN_MM: f64 = 90.0;
 
-/// Dark enough on white, and apart for every kind of colour vision (Okabe and Ito).
-const HUES: [&str; 8] =
-    ["#0072b2", "#d55e00", "#009e73", "#b5508b", "#56b4e9", "#b88a00", "#5d6b7a", "#131a22"];
-pub(super) const INK: &str = "#131a22";
-
-const STYLE: &str = "svg.paper text{font-family:sans-serif;font-size:13px;fill:#3a4450}\
-    svg.paper .label{fill:#131a22;font-size:14px}svg.paper .heading{fill:#131a22;font-weight:bold}\
-    svg.paper .middle{text-anchor:middle}svg.paper .end{text-anchor:end}\
-    svg.paper .grid{stroke:#e4e8ec;stroke-width:1}svg.paper .axis{stroke:#56616f;stroke-width:1}";
+/// What paper has of its own: letters that any system has, and names that stand out.
+const STYLE: &str = concat!(
+    include_str!("../chart.css"),
+    "svg text{font-family:sans-serif;font-size:13px}svg .label{font-size:14px;fill:var(--ink)}\
+     .heading{fill:var(--ink);font-weight:bold}"
+);
 
 /// A figure as a file.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -47,22 +45,12 @@ pub(super) fn sheet([width, height]: [f64; 2], says: &str, body: &str) -> String
     let width = width + 10.0;
     let [wide, high] = [width, height].map(|units| place(units / COLUMN * COLUMN_MM));
     let [width, height] = [width, height].map(place);
-    format!(
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" class=\"paper\" width=\"{wide}mm\" height=\"{high}mm\" \
+    on_white(&format!(
+        "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{wide}mm\" height=\"{high}mm\" \
          viewBox=\"-6 0 {width} {height}\" role=\"img\" aria-label=\"{}\"><style>{STYLE}</style>\
          <rect x=\"-6\" width=\"{width}\" height=\"{height}\" fill=\"#fff\"/>{body}</svg>\n",
         escape(says)
-    )
-}
-
-/// The colour of a curve.
-pub(super) fn hue(number: usize) -> &'static str {
-    HUES[number % HUES.len()]
-}
-
-/// Units that text of class `tick` takes, about.
-pub(super) fn wide(text: &str) -> f64 {
-    7.0 * crate::lab::report::number::size(text.chars().count())
+    ))
 }
 
 /// The head of a text that is too long for a key.
@@ -77,55 +65,14 @@ fn cut(text: &str, most: usize) -> String {
     text.chars().take(most.saturating_sub(1)).chain(['…']).collect()
 }
 
-/// How numbers are drawn: times `by`, in units of `sign`.
-#[derive(Debug, Clone, PartialEq)]
-pub(super) struct Drawn {
-    pub by: f64,
-    pub sign: String,
-}
-
-impl Drawn {
-    /// Such that the greatest has few digits.
-    pub(super) fn new(unit: Unit, greatest: f64) -> Self {
-        const PREFIXES: [&str; 12] = ["a", "f", "p", "n", "µ", "m", "", "k", "M", "G", "T", "P"];
-        let same = Self { by: 1.0, sign: unit.sign().into() };
-        let thousands = (greatest.abs().log10() / 3.0 + 1e-12).floor();
-        match unit {
-            Unit::Plain => same,
-            Unit::Fraction => Self { by: 100.0, ..same },
-            _ if !thousands.is_finite() => same,
-            Unit::Seconds | Unit::Joules => {
-                let thousands = thousands.clamp(-6.0, 5.0);
-                let prefix = PREFIXES[(thousands + 6.0) as usize];
-                Self { by: 1000f64.powf(-thousands), sign: format!("{prefix}{}", unit.sign()) }
-            }
-            _ if greatest.abs() < 1e5 => same,
-            Unit::Count | Unit::Cycles => {
-                let name = match thousands as u8 {
-                    0 | 1 => "thousands",
-                    2 => "millions",
-                    3 => "billions",
-                    _ => return same,
-                };
-                Self { by: 1000f64.powf(-thousands), sign: name.into() }
-            }
-        }
-    }
-
-    /// A label with its unit.
-    pub(super) fn title(&self, label: &str) -> String {
-        if self.sign.is_empty() { label.into() } else { format!("{label} ({})", self.sign) }
-    }
-}
-
 /// Marks of an axis at its values, as many as there is room for in `room` units.
-pub(super) fn marks(levels: &super::settings::Levels<'_>, room: f64) -> Vec<(f64, String)> {
+pub(super) fn marks(levels: &Levels<'_>, room: f64) -> Vec<(f64, String)> {
     let Some(numbers) = &levels.numbers else {
         // A cast saturates: without a limit of room, the head of the text.
-        let each = room / crate::lab::report::number::size(levels.texts.len().max(1));
+        let each = room / size(levels.texts.len().max(1));
         let most = ((each / wide(" ")) as usize).clamp(4, 22);
         let texts = levels.texts.iter().map(|text| cut(text, most));
-        return (0..).map(crate::lab::report::number::size).zip(texts).collect();
+        return (0..).map(size).zip(texts).collect();
     };
     let bend = |value: f64| if levels.log() { value.log10() } else { value };
     let (Some(&first), Some(&last)) = (numbers.first(), numbers.last()) else { return Vec::new() };

@@ -1,17 +1,16 @@
 //! A result against what it costs: every setting a point, and the front that none beats.
 
-use super::paper::{COLUMN, Drawn, INK, hue, sheet, short, wide};
-use super::settings::Settings;
-use super::statistics::front;
-use crate::lab::report::chart::Chart;
+use super::measure::Measure;
+use super::paper::{COLUMN, sheet, short};
+use super::settings::{Settings, front_of};
+use crate::lab::report::chart::{Chart, wide};
+use crate::lab::report::colour::hue;
 use crate::lab::report::scale::Axis;
-use crate::lab::table::{Column, Unit};
+use crate::lab::table::Unit;
 
 /// Pale points drawn at most, and kinds of points told apart.
 const POINTS_MAX: usize = 1500;
 const KINDS_MAX: usize = 8;
-/// A cost that spans more than this goes on a log axis.
-const LOG_FROM: f64 = 20.0;
 
 /// A setting: its cost and value, bounds of the cost, and its kind.
 struct Point {
@@ -28,70 +27,42 @@ pub(super) fn draw(settings: &Settings<'_>) -> Option<String> {
     let cost = settings.measure(wanted.cost.as_ref()?)?;
     let series = wanted.series.as_ref().and_then(|name| settings.axis(name));
     let series = series.filter(|axis| axis.texts.len() <= KINDS_MAX);
-    let end = |name: &str| settings.view.table.column(&format!("{}_{name}", cost.column.name));
-    let ends: Option<[&Column; 2]> = end("low").zip(end("high")).map(<[_; 2]>::from);
-    let point = |rows: &Vec<usize>| {
-        let both = |row: &&usize| {
-            value.column.values.number(**row).is_some()
-                && cost.column.values.number(**row).is_some()
-        };
-        let rows: Vec<usize> = rows.iter().filter(both).copied().collect();
-        let of = |measure| settings.summary(measure, &rows);
-        let mean = |column: &Column| {
-            let numbers: Option<Vec<f64>> =
-                rows.iter().map(|&row| column.values.number(row)).collect();
-            Some(super::statistics::summary(&numbers?)?.mean)
-        };
-        let bounds = ends.and_then(|[low, high]| Some([mean(low)?, mean(high)?]));
-        let kind = series.and_then(|axis| axis.codes[*rows.first()?]).unwrap_or(0);
-        let (cost, value) = (of(cost)?, of(value)?);
-        Some(Point { cost: cost.mean, value: value.mean, bounds, kind })
+    let means = |measure: Measure<'_>| settings.means(measure);
+    let end = |name: &str| settings.measure(&format!("{}_{name}", cost.column.name)).map(means);
+    let (costs, values, ends) = (means(cost), means(value), [end("low"), end("high")]);
+    let best = front_of((cost, &costs), (value, &values));
+    let point = |at: usize| {
+        let [low, high] = ends.each_ref().map(|end| end.as_ref().and_then(|end| end[at]));
+        let kind = series.and_then(|axis| axis.codes[*settings.groups[at].first()?]).unwrap_or(0);
+        let bounds = low.zip(high).map(<[_; 2]>::from);
+        Some(Point { cost: costs[at]?, value: values[at]?, bounds, kind })
     };
-    let mut points: Vec<Point> = settings.groups.iter().filter_map(point).collect();
-    // A log axis has no place for 0, and a linear one would press the rest flat.
-    let paid = || points.iter().map(|point| point.cost).filter(|&cost| cost > 0.0);
-    let spread = paid().reduce(f64::max).zip(paid().reduce(f64::min));
-    if spread.is_some_and(|(most, least)| most / least > LOG_FROM) {
-        points.retain(|point| point.cost > 0.0);
-    }
-    let pairs: Vec<(f64, f64)> = points.iter().map(|point| (point.cost, point.value)).collect();
-    let best = front(&pairs, value.less);
+    let points: Vec<Point> = (0..settings.groups.len()).filter_map(point).collect();
+    let points: Vec<Point> =
+        points.into_iter().filter(|point| point.cost > 0.0 || !cost.log).collect();
+    let best: Vec<Point> = best.into_iter().filter_map(point).collect();
     let few = best.len() <= 24;
 
-    let shown = points.iter().enumerate().filter(|(at, _)| few && best.contains(at));
-    let bounds = shown.filter_map(|(_, point)| point.bounds).flatten();
-    let costs = || pairs.iter().map(|pair| pair.0);
-    let low = costs().chain(bounds.clone()).reduce(f64::min)?;
-    let high = costs().chain(bounds).reduce(f64::max)?;
-    let log = low > 0.0 && high / low > LOG_FROM;
-    let counted = matches!(cost.column.unit, Unit::Count | Unit::Cycles);
-    let x_scale = match (log, counted) {
-        // powers of ten are named one by one
-        (true, true) => Drawn { by: 1.0, sign: String::new() },
-        (true, false) => Drawn::new(cost.column.unit, (low * high).sqrt()),
-        (false, _) => Drawn::new(cost.column.unit, high),
-    };
-    let x_title = x_scale.title(&cost.column.label);
-    let (low, high) = (low * x_scale.by, high * x_scale.by);
-    let x_axis = if log {
-        Axis::powers(low * 0.85, high * 1.18, &format!("{x_title}, log scale"))
+    let bounds = best.iter().filter(|_| few).filter_map(|point| point.bounds).flatten();
+    let reach = points.iter().map(|point| point.cost).chain(bounds);
+    let reach = reach.filter(|&cost_of| cost_of > 0.0 || !cost.log);
+    let (low, high) = (reach.clone().reduce(f64::min)?, reach.reduce(f64::max)?);
+    let (low, high) = (low * cost.by, high * cost.by);
+    let x_axis = if cost.log {
+        Axis::powers(low * 0.85, high * 1.18, &format!("{}, log scale", cost.title()))
     } else {
-        Axis::round(
-            (low - 0.04 * (high - low)).max(if low >= 0.0 { 0.0 } else { f64::MIN }),
-            high + 0.04 * (high - low),
-            &x_title,
-        )
+        let room = 0.04 * (high - low);
+        let from = if low >= 0.0 { (low - room).max(0.0) } else { low - room };
+        Axis::round(from, high + room, &cost.title())
     };
-    let y_top = pairs.iter().map(|pair| pair.1).reduce(f64::max)?;
-    let y_low = pairs.iter().map(|pair| pair.1).reduce(f64::min)?;
-    let y_scale = Drawn::new(value.column.unit, y_top.abs().max(y_low.abs()));
+    let drawn = || points.iter().map(|point| point.value);
+    let (y_low, y_top) = (drawn().reduce(f64::min)?, drawn().reduce(f64::max)?);
     let room = 0.05 * (y_top - y_low);
     let (mut from, mut to) = (y_low - room, y_top + room);
     if value.column.unit == Unit::Fraction {
         (from, to) = (from.max(0.0), to.min(1.0));
     }
-    let y_axis =
-        Axis::round(from * y_scale.by, to * y_scale.by, &y_scale.title(&value.column.label));
+    let y_axis = Axis::round(from * value.by, to * value.by, &value.title());
 
     let key = series.map_or(12.0, |axis| {
         let texts = axis.texts.iter().map(|text| wide(&short(text)));
@@ -99,31 +70,25 @@ pub(super) fn draw(settings: &Settings<'_>) -> Option<String> {
     });
     let width = COLUMN + if series.is_some() { key - 12.0 } else { 0.0 };
     let mut chart = Chart::framed([width, 320.0], [12.0, key], x_axis, y_axis);
-    let at = |point: &Point| (point.cost * x_scale.by, point.value * y_scale.by);
+    let at = |point: &Point| (point.cost * cost.by, point.value * value.by);
     let stride = points.len().div_ceil(POINTS_MAX).max(1);
     for point in points.iter().step_by(stride) {
-        chart.marker(at(point), point.kind, hue(point.kind), true);
+        chart.marker(at(point), point.kind, 2.8, hue(point.kind), "pale");
     }
-    for point in best.iter().map(|&at| &points[at]).filter(|_| few) {
-        if let Some([low, high]) = point.bounds {
-            chart.error_x(
-                point.value * y_scale.by,
-                low * x_scale.by,
-                high * x_scale.by,
-                hue(point.kind),
-            );
+    for point in best.iter().filter(|_| few) {
+        if let Some(bounds) = point.bounds {
+            let [from, to] = bounds.map(|end| (end * cost.by, point.value * value.by));
+            chart.whisker(from, to, hue(point.kind));
         }
     }
-    let corners: Vec<_> = best.iter().map(|&one| at(&points[one])).collect();
-    chart.steps(&corners, INK);
-    for &one in &best {
-        chart.marker(at(&points[one]), points[one].kind, hue(points[one].kind), false);
+    chart.steps(&best.iter().map(at).collect::<Vec<_>>(), "var(--ink)");
+    for point in &best {
+        chart.marker(at(point), point.kind, 3.6, hue(point.kind), "mark");
     }
     if let Some(series) = series {
-        chart.key_title(&short(&series.axis.label));
-        for (kind, text) in series.texts.iter().enumerate() {
-            chart.key(kind + 1, kind, hue(kind), &short(text), false);
-        }
+        let entries = series.texts.iter().enumerate();
+        let entries = entries.map(|(kind, text)| (kind, hue(kind), short(text)));
+        chart.key(&short(&series.axis.label), entries, false);
     }
     let says = format!(
         "{} against {}: {} settings, {} of them on the Pareto front",

@@ -25,7 +25,7 @@ function sorted(rows, column, down) {
   if (!column) return rows;
   const way = down ? -1 : 1;
   const axis = axisOf.get(column.name);
-  const key = (row) => (axis && !axis.numeric ? (axis.codes[row] < 0 ? null : axis.codes[row]) : column.words ? column.text(row) || null : column.number(row));
+  const key = (row) => (axis && !axis.numeric ? (axis.codes[sweep.setting[row]] < 0 ? null : axis.codes[sweep.setting[row]]) : column.words ? column.text(row) || null : column.number(row));
   return rows.map((row) => [key(row), row]).sort(([a, i], [b, j]) => {
     if (a === null || b === null) return (a === null) - (b === null) || i - j;
     return (a < b ? -way : a > b ? way : 0) || i - j;
@@ -42,13 +42,12 @@ function csv(rows) {
 function drawHead() {
   const head = document.querySelector("#table thead");
   const line = document.createElement("tr");
-  line.append(cell("th", "run"));
+  line.append(element("th", "run"));
   for (const column of listedColumns) {
-    const one = document.createElement("th");
-    const button = cell("button", column.label);
+    const button = element("button", column.label);
+    const one = element("th", button, column.words ? "word" : "");
     button.type = "button";
     button.title = column.name;
-    one.className = column.words ? "word" : "";
     const own = state.sort === column.name;
     one.setAttribute("aria-sort", own ? (state.down ? "descending" : "ascending") : "none");
     button.addEventListener("click", () => {
@@ -60,7 +59,6 @@ function drawHead() {
       drawRows();
       remember();
     });
-    one.append(button);
     line.append(one);
   }
   head.replaceChildren(line);
@@ -75,14 +73,10 @@ function drawRows() {
   for (const row of found.slice(state.page * pageRows, (state.page + 1) * pageRows)) {
     const line = body.insertRow();
     line.dataset.row = row;
-    const first = cell("td", "");
-    first.append(isDone(row) ? runLink(row) : cell("span", `${row + 1}, no result`, "note"));
-    line.append(first);
+    line.append(element("td", isDone(row) ? runLink(row) : element("span", `${row + 1}, no result`, "note")));
     for (const column of listedColumns) {
-      const text = column.show(row);
-      const one = cell("td", column.words ? short(text, 20) : text, column.words ? "word" : "");
-      if (column.words && text.length > 20) one.title = text;
-      else if (!column.words) one.title = column.text(row);
+      const one = element("td", column.show(row), column.words ? "word" : "");
+      one.title = column.text(row);
       line.append(one);
     }
   }
@@ -90,7 +84,7 @@ function drawRows() {
   document.getElementById("found").textContent = found.length === rowCount ? `${plain(rowCount)} rows` : `${plain(found.length)} of ${plain(rowCount)} rows`;
   const pager = document.getElementById("pager");
   const go = (text, to, label) => {
-    const button = cell("button", text);
+    const button = element("button", text);
     button.type = "button";
     button.setAttribute("aria-label", label);
     button.disabled = to < 0 || to >= pages || to === state.page;
@@ -98,7 +92,7 @@ function drawRows() {
     return button;
   };
   pager.hidden = pages === 1;
-  pager.replaceChildren(go("first", 0, "first page"), go("back", state.page - 1, "page before"), cell("span", `page ${state.page + 1} of ${pages}`),
+  pager.replaceChildren(go("first", 0, "first page"), go("back", state.page - 1, "page before"), element("span", `page ${state.page + 1} of ${pages}`),
     go("next", state.page + 1, "next page"), go("last", pages - 1, "last page"));
 }
 

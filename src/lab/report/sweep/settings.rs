@@ -2,9 +2,16 @@
 
 use std::collections::BTreeMap;
 
-use super::statistics::{Summary, summary};
+use super::measure::Measure;
+use super::statistics::{Summary, front, summary};
 use super::{Axis, SweepView};
-use crate::lab::table::{Column, Role, Unit};
+use crate::lab::report::number::{significant, size};
+use crate::lab::table::{Column, Role};
+
+/// Values told apart at most; of more, ranges.
+const VALUES_MAX: usize = 40;
+/// Ranges of the values of such an axis.
+const RANGES: usize = 16;
 
 /// One axis: its distinct values in order, and which of them each row has.
 #[derive(Debug, Clone)]
@@ -61,13 +68,30 @@ impl<'a> Levels<'a> {
     pub(super) fn drawn(&self) -> bool {
         self.numbers.is_some() && self.axis.order.is_empty() && self.texts.len() > 12
     }
-}
 
-/// A result that figures can show: its column, and whether less of it is better.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Measure<'a> {
-    pub column: &'a Column,
-    pub less: bool,
+    /// Whether its values are too many to be told apart, so that figures gather them by [`Levels::ranges`].
+    pub(super) fn binned(&self) -> bool {
+        self.drawn() || (self.numbers.is_some() && self.texts.len() > VALUES_MAX)
+    }
+
+    /// Ranges of equal width, by their ends; and which of them each value lies in.
+    pub(super) fn ranges(&self) -> (Vec<[String; 2]>, Vec<usize>) {
+        let numbers = self.numbers.as_deref().unwrap_or_default();
+        let bend = |value: f64| if self.log() { value.ln() } else { value };
+        let (Some(&low), Some(&high)) = (numbers.first(), numbers.last()) else {
+            return (vec![], vec![]);
+        };
+        let (low, each) = (bend(low), (bend(high) - bend(low)) / size(RANGES));
+        let edge = |at: usize| {
+            let value = low + each * size(at);
+            let value = if self.log() { value.exp() } else { value };
+            significant(format!("{value:.2e}").parse().unwrap_or(value))
+        };
+        let texts = (0..RANGES).map(|at| [edge(at), edge(at + 1)]).collect();
+        // A cast saturates, and sends what nothing divides to 0.
+        let place = |value: &f64| (((bend(*value) - low) / each) as usize).min(RANGES - 1);
+        (texts, numbers.iter().map(place).collect())
+    }
 }
 
 /// The table of a sweep, sorted out.
@@ -78,12 +102,6 @@ pub(super) struct Settings<'a> {
     pub axes: Vec<Levels<'a>>,
     /// Rows of each setting, in the order of the table.
     pub groups: Vec<Vec<usize>>,
-}
-
-/// Whether less of a result is better: costs, losses and errors.
-pub(super) fn less_is_better(column: &Column) -> bool {
-    let lossy = ["loss", "error"].iter().any(|word| column.name.contains(word));
-    lossy || !matches!(column.unit, Unit::Plain | Unit::Fraction)
 }
 
 impl<'a> Settings<'a> {
@@ -112,9 +130,18 @@ impl<'a> Settings<'a> {
 
     /// A result by name, if it has numbers.
     pub(super) fn measure(&self, name: &str) -> Option<Measure<'a>> {
-        let column = self.view.table.column(name)?;
-        let less = less_is_better(column);
-        (!column.values.is_text()).then_some(Measure { column, less })
+        Measure::new(self.view.table.column(name)?)
+    }
+
+    /// Every result that has numbers.
+    pub(super) fn measures(&self) -> Vec<Measure<'a>> {
+        self.view.table.with_role(Role::Result).filter_map(Measure::new).collect()
+    }
+
+    /// The mean of each setting.
+    pub(super) fn means(&self, measure: Measure<'_>) -> Vec<Option<f64>> {
+        let mean = |rows: &Vec<usize>| Some(self.summary(measure, rows)?.mean);
+        self.groups.iter().map(mean).collect()
     }
 
     /// Rows that have a result.
@@ -182,4 +209,16 @@ pub(super) type Held<'l, 'a> = (&'l Levels<'a>, Option<usize>);
 /// Whether a row lies where axes are held.
 pub(super) fn lies(held: &[Held<'_, '_>], row: usize) -> bool {
     held.iter().all(|(axis, value)| value.is_none() || axis.codes[row] == *value)
+}
+
+/// The settings that no other beats, by their means: less cost, and more value, or less where that is better. In order
+/// of cost. A log axis has no place for a cost of 0, and a linear one would press the rest flat.
+pub(super) fn front_of(
+    (cost, costs): (Measure<'_>, &[Option<f64>]),
+    (value, values): (Measure<'_>, &[Option<f64>]),
+) -> Vec<usize> {
+    let pair = |at: usize| Some((costs[at].filter(|&one| one > 0.0 || !cost.log)?, values[at]?));
+    let there: Vec<usize> = (0..costs.len()).filter(|&at| pair(at).is_some()).collect();
+    let points: Vec<(f64, f64)> = there.iter().filter_map(|&at| pair(at)).collect();
+    front(&points, value.less).into_iter().map(|at| there[at]).collect()
 }

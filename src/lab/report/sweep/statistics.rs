@@ -1,4 +1,5 @@
-//! What figures say about several runs: mean, its confidence interval, the Pareto front.
+//! What figures say about several runs: mean, its confidence interval, the Pareto front. For terminal, paper and page:
+//! the page's script gets them ready made.
 //!
 //! ```text
 //! mean = sum(x) / n      s^2 = sum((x - mean)^2) / (n - 1)      half = t(n - 1) * s / sqrt(n)
@@ -7,10 +8,11 @@
 //! `t(d)` is the 97.5 % point of Student's distribution with `d` degrees of freedom, so `mean - half ..= mean + half`
 //! holds the true mean in 95 % of repetitions, if runs are independent and about normal. One run has no interval.
 
-use crate::lab::report::number::size;
+use std::sync::LazyLock;
 
-/// Degrees of freedom up to which [`student`] solves for its value; beyond, a series is as exact as a float shows.
-pub(super) const SOLVED: usize = 40;
+use statrs::distribution::{ContinuousCDF, StudentsT};
+
+use crate::lab::report::number::size;
 
 /// Some numbers in short.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -44,41 +46,15 @@ pub(super) fn summary(values: &[f64]) -> Option<Summary> {
 }
 
 /// The 97.5 % point of Student's distribution, for 1 degree of freedom and more.
-pub(super) fn student(degrees: usize) -> f64 {
-    assert!(degrees > 0, "one number has no interval");
-    if degrees > SOLVED {
-        // Cornish and Fisher's expansion around the normal distribution's 97.5 % point.
-        let (z, d) = (1.959_963_984_540_054_f64, size(degrees));
-        let first = (z.powi(3) + z) / (4.0 * d);
-        let second = (5.0 * z.powi(5) + 16.0 * z.powi(3) + 3.0 * z) / (96.0 * d * d);
-        let third = (3.0 * z.powi(7) + 19.0 * z.powi(5) + 17.0 * z.powi(3) - 15.0 * z)
-            / (384.0 * d.powi(3));
-        return z + first + second + third;
-    }
-    let (mut low, mut high) = (1.0, 13.0);
-    for _ in 0..80 {
-        let middle = 0.5 * (low + high);
-        if inside(middle, degrees) < 0.95 { low = middle } else { high = middle }
-    }
-    0.5 * (low + high)
+fn student(degrees: usize) -> f64 {
+    /// Those that a sweep asks for once a setting and result.
+    static USUAL: LazyLock<[f64; 64]> = LazyLock::new(|| std::array::from_fn(|at| solve(at + 1)));
+    USUAL.get(degrees - 1).copied().unwrap_or_else(|| solve(degrees))
 }
 
-/// The chance of `-t ..= t`: finite sums of powers of cosines (Abramowitz and Stegun, 26.7.3 and 26.7.4).
-fn inside(t: f64, degrees: usize) -> f64 {
-    let angle = (t / size(degrees).sqrt()).atan();
-    let square = angle.cos().powi(2);
-    let odd = degrees % 2;
-    let mut term = if odd == 1 { angle.cos() } else { 1.0 };
-    let mut sum = if degrees > 1 { term } else { 0.0 };
-    for power in (2 + odd..degrees.saturating_sub(1)).step_by(2) {
-        term *= square * size(power - 1) / size(power);
-        sum += term;
-    }
-    if odd == 1 {
-        2.0 / std::f64::consts::PI * (angle + angle.sin() * sum)
-    } else {
-        angle.sin() * sum
-    }
+fn solve(degrees: usize) -> f64 {
+    let distribution = StudentsT::new(0.0, 1.0, size(degrees));
+    distribution.expect("one number has no interval").inverse_cdf(0.975)
 }
 
 /// Which points `(cost, value)` no other beats in both: less cost, and more value (less, where `less`). In order of
@@ -123,6 +99,15 @@ mod tests {
             assert!((found - wanted).abs() < 2e-6, "{degrees}: {found} is not {wanted}");
         }
         assert!((1..100).all(|degrees| student(degrees) > student(degrees + 1)));
+    }
+
+    #[test]
+    fn the_point_is_where_the_distribution_reaches_97_5_percent() {
+        for degrees in (1..300).chain([1000, 9999]) {
+            let distribution = StudentsT::new(0.0, 1.0, size(degrees)).unwrap();
+            let reached = distribution.cdf(student(degrees));
+            assert!((reached - 0.975).abs() < 1e-9, "{degrees}: {reached}");
+        }
     }
 
     #[test]

@@ -138,6 +138,58 @@ fn numbers_beyond_a_scripts_are_words_and_missing_cells_are_null() {
 }
 
 #[test]
+fn the_page_is_given_what_it_would_have_to_compute() {
+    let sample = Sample::new();
+    let view = sample.view();
+    let data: serde_json::Value = serde_json::from_str(&json::data(&Settings::new(&view))).unwrap();
+    assert_eq!(data["setting"], serde_json::json!([0, 0, 1, 1, 2, 2, 3, 3, 4, 4, 5, 5]));
+    let score = &data["columns"][3];
+    assert_eq!(score["n"], serde_json::json!([2, 2, 2, 2, 2, 1]));
+    assert_eq!((&score["mean"][0], &score["mean"][5]), (&0.605.into(), &0.9.into()));
+    // t is 12.706 and s / sqrt(2) is 0.005; one run has no interval
+    assert!((score["half"][0].as_f64().unwrap() - 0.063_531).abs() < 1e-6);
+    assert!(score["half"][5].is_null());
+    assert_eq!((&score["title"], &score["by"]), (&"score (%)".into(), &100.0.into()));
+    assert_eq!(
+        data["columns"][0]["marks"],
+        serde_json::json!([[1.0, "1"], [2.0, "2"], [4.0, "4"]])
+    );
+    assert_eq!(data["axes"][1]["codes"], serde_json::json!([0, 1, 0, 1, 0, 1]));
+    assert_eq!(data["best"], 4);
+    // joules rise with the score: of each two settings with one score the first is on the front
+    assert_eq!(data["fronts"]["joules"]["score"], serde_json::json!([0, 2, 5, 4]));
+    assert_eq!(data["fronts"]["score"]["joules"], serde_json::json!([0]));
+}
+
+#[test]
+fn values_too_many_to_tell_apart_go_into_ranges() {
+    let mut sample = Sample::new();
+    let rates: Vec<f64> = (0..100).map(|at| 10f64.powf(f64::from(at) / 33.0)).collect();
+    sample.table.columns = vec![
+        column(
+            "rate",
+            Unit::Plain,
+            Role::Axis,
+            Values::Real(rates.into_iter().map(Some).collect()),
+        ),
+        column("score", Unit::Fraction, Role::Result, Values::Real(vec![Some(0.5); 100])),
+    ];
+    sample.axes = vec![Axis { log: true, ..axis("rate", true, &[]) }];
+    let view = sample.view();
+    let settings = Settings::new(&view);
+    let (ranges, places) = settings.axes[0].ranges();
+    assert_eq!((ranges.len(), places[0], places[99]), (16, 0, 15));
+    assert!(places.windows(2).all(|pair| pair[0] <= pair[1]), "in order");
+    assert_eq!((&ranges[0][0], &ranges[15][1]), (&"1".to_owned(), &"1000".to_owned()));
+    let data: serde_json::Value = serde_json::from_str(&json::data(&settings)).unwrap();
+    assert_eq!(
+        (&data["axes"][0]["binned"], &data["axes"][0]["numbers"]),
+        (&true.into(), &serde_json::Value::Null)
+    );
+    assert!(data["columns"][1]["mean"].is_null(), "of one run each, the cells say it");
+}
+
+#[test]
 fn figures_for_papers_stand_alone() {
     let sample = Sample::new();
     let drawn = figures(&sample.view());
@@ -146,7 +198,7 @@ fn figures_for_papers_stand_alone() {
     for figure in &drawn {
         let svg = &figure.svg;
         assert!(svg.starts_with("<svg xmlns=") && svg.contains("fill=\"#fff\"/>"));
-        for bad in ["NaN", "inf", "var(", "http:", "</script", "url("] {
+        for bad in ["NaN", "inf", "var(", "http:", "</script", "url(h", "url(\""] {
             assert!(
                 !svg.replace("xmlns=\"http://www.w3.org/2000/svg\"", "").contains(bad),
                 "{bad}"
@@ -160,6 +212,9 @@ fn figures_for_papers_stand_alone() {
         assert_eq!(picture, png(svg), "the same bytes again");
     }
     assert!(drawn[0].svg.contains("n = 1 to 2 runs"));
+    let bits =
+        |svg: &str| ["1", "2", "4"].iter().all(|bit| svg.contains(&format!(">{bit}</text>")));
+    assert!(bits(&drawn[0].svg) && bits(&drawn[1].svg), "every value has its mark");
     assert!(figures(&Sample::hollow().view()).is_empty());
     assert!(png("no svg").is_empty());
 }

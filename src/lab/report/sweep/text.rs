@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use super::SweepView;
 use super::curves::{held_words, runs};
-use super::paper::{Drawn, short};
+use super::paper::short;
 use super::settings::{Levels, Settings};
 use super::statistics::Summary;
 
@@ -35,11 +35,11 @@ pub fn text(view: &SweepView<'_>) -> Option<String> {
         .map(|at| columns.iter().take(COLUMNS_MAX).map(|&column| cell(at, column)).collect())
         .collect();
     let all = || lines.iter().flatten().flatten();
-    let scale = Drawn::new(measure.column.unit, all().map(|one| one.high.abs()).reduce(f64::max)?);
+    all().next()?;
     let pooled = held.iter().any(|(_, value)| value.is_none());
     let mut out = format!(
         "{} against {}, mean of {}{}\n",
-        scale.title(&measure.column.label),
+        measure.title(),
         x.axis.label,
         runs(all().map(|one| one.n)),
         held_words(&held, pooled)
@@ -61,8 +61,8 @@ pub fn text(view: &SweepView<'_>) -> Option<String> {
         for (one, head) in line.iter().zip(&heads) {
             let text = one.as_ref().map_or("-".into(), |one| {
                 let half = one.half.filter(|_| !pooled);
-                let half = half.map(|half| format!(" ±{:.2}", half * scale.by));
-                format!("{:.2}{}", one.mean * scale.by, half.unwrap_or_default())
+                let half = half.map(|half| format!(" ±{:.2}", half * measure.by));
+                format!("{:.2}{}", one.mean * measure.by, half.unwrap_or_default())
             });
             let _ = write!(out, "  {text:>width$}", width = wide(head));
         }

@@ -1,0 +1,19 @@
+//! What an engine keeps: its layers, its error unit and its ledgers. Registers are none of it: a batch begins by loading them.
+#![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
+
+use super::{Engine, Phase};
+use crate::chip::state::{State, StateError, Visitor};
+
+impl State for Engine {
+    fn visit(&mut self, visitor: &mut dyn Visitor) -> Result<(), StateError> {
+        let residual_bits = self.hardware.write.residual_bits.get();
+        for layer in self.layers_mut() {
+            layer.visit(residual_bits, visitor)?;
+        }
+        self.unit.visit(visitor)?;
+        for (code, phase) in (0..).zip(Phase::ALL) {
+            self.ledger_mut(phase).visit(code, phase.name(), visitor)?;
+        }
+        Ok(())
+    }
+}

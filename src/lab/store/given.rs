@@ -1,0 +1,319 @@
+//! What the core was given, as a list of keys and words: what decides a result, and nothing else.
+//!
+//! No constants, names, sources or prose: correcting a citation makes no other run. A key whose value is its *frozen
+//! default* is left out. That is the value a missing key had when the key was born, so a key that is added to the
+//! program later changes no list of a run that does not use it. [`FROZEN`] is never edited, only added to: when what
+//! users get by saying nothing changes, the key is written into the resolved configuration instead.
+
+use crate::chip::hardware::{
+    Adc, AdcRange, CellSpec, DigitalSpec, DitherBits, DitherPattern, DriveSpec, FloorKind,
+    HardwareSpec, PulseCode, Subtract, TileSpec, Timing, WriteScheme, WriteSpec,
+};
+use crate::chip::layer::{DrivenBy, LayerSpec};
+use crate::lab::config::{Select, TrainOn};
+use crate::learn::error::Centre;
+use crate::learn::route::Route;
+use crate::learn::rule::{Rule, UpdateMode};
+use crate::num::tables::{Activation, Decay};
+use crate::task::classify::Experiment;
+
+/// Frozen defaults: of keys of a layer under `layer`, whatever its number.
+const FROZEN: &[(&str, &str)] = &[
+    ("task", "classify"),
+    ("seed", "1"),
+    ("layer.wiring", "dual"),
+    ("layer.activation", "sigmoid 6"),
+    ("layer.weight_max_log2", "2"),
+    ("layer.gain_64ths", "96 32"),
+    ("layer.constant_row", "false"),
+    ("layer.rate", "20"),
+    ("learning.rule", "ed"),
+    ("learning.mode", "accumulate"),
+    ("learning.centre", "batch"),
+    ("learning.route", "modulo 1"),
+    ("learning.batch", "32"),
+    ("learning.mantissa", "1"),
+    ("learning.decay", "cosine"),
+    ("learning.epochs", "20"),
+    ("learning.shift_pixels", "0"),
+    ("learning.train_on", "train"),
+    ("learning.select", "best_validation"),
+    ("cell.level_bits", "8"),
+    ("cell.floor", "0"),
+    ("cell.ceiling", "255"),
+    ("cell.floor_kind", "recoverable"),
+    ("tile.rows", "256"),
+    ("tile.columns", "256"),
+    ("tile.count", "any"),
+    ("tile.transposed_read", "false"),
+    ("drive.bits", "8"),
+    ("drive.dac_bits", "8"),
+    ("adc", "ideal"),
+    ("digital.lut_bits", "10"),
+    ("digital.error_bits", "8"),
+    ("write.increment_max", "7"),
+    ("write.dither_bits", "8"),
+    ("write.dither_pattern", "per_cell"),
+    ("write.residual_bits", "0"),
+    ("write.scheme", "rounded"),
+    ("timing.beat", "1"),
+    ("timing.settle", "1"),
+    ("timing.convert", "1"),
+    ("timing.share", "1"),
+    ("timing.overlapped", "false"),
+    ("timing.lanes", "1"),
+    ("timing.hops", "0"),
+    ("timing.pulse", "1"),
+    ("timing.pulse_code", "unary"),
+    ("timing.verify", "false"),
+    ("timing.active_max", "any"),
+];
+
+/// Key and word.
+type Given = (String, String);
+
+/// Everything a classification run was given, the data aside.
+#[must_use]
+pub fn given(experiment: &Experiment, train_on: TrainOn, select: Select) -> Vec<Given> {
+    // without `..`, here and below: what a run is given is listed or does not compile
+    let Experiment {
+        seed,
+        hardware,
+        layers,
+        rule,
+        mode,
+        centre,
+        route,
+        batch,
+        mantissa,
+        rates,
+        decay,
+        epochs,
+        augment,
+    } = experiment;
+    let mut list = List::default();
+    list.put("task", "classify");
+    list.put("seed", seed);
+    for (number, (layer, rate)) in layers.iter().zip(rates).enumerate() {
+        list.layer(number, layer);
+        list.put(&format!("layer{number}.rate"), rate.get());
+    }
+    list.put(
+        "learning.rule",
+        match rule {
+            Rule::Ed => "ed",
+            Rule::Kaneko => "kaneko",
+            Rule::Dfa => "dfa",
+            Rule::Bp => "bp",
+        },
+    );
+    list.put(
+        "learning.mode",
+        match mode {
+            UpdateMode::Accumulate => "accumulate",
+            UpdateMode::Replay => "replay",
+            UpdateMode::Online => "online",
+        },
+    );
+    list.put(
+        "learning.centre",
+        match centre {
+            Centre::None => "none",
+            Centre::Batch => "batch",
+            Centre::Running => "running",
+        },
+    );
+    let shifted = |shift: &Option<u32>| shift.map_or(String::new(), |shift| format!(" >> {shift}"));
+    list.put(
+        "learning.route",
+        match route {
+            Route::Modulo { taps, shift } => format!("modulo {taps}{}", shifted(shift)),
+            Route::RandomSparse => "random_sparse".into(),
+            Route::ScalarBroadcast => "scalar_broadcast".into(),
+            Route::RandomDense { shift } => format!("random_dense{}", shifted(shift)),
+        },
+    );
+    list.put("learning.batch", batch.get());
+    list.put("learning.mantissa", mantissa.get());
+    list.put(
+        "learning.decay",
+        match decay {
+            Decay::Constant => "constant",
+            Decay::Cosine => "cosine",
+        },
+    );
+    list.put("learning.epochs", epochs);
+    list.put(
+        "learning.shift_pixels",
+        augment.map_or("0".into(), |a| {
+            format!("{} of {} x {} x {}", a.pixels, a.height, a.width, a.channels)
+        }),
+    );
+    list.put(
+        "learning.train_on",
+        match train_on {
+            TrainOn::Train => "train",
+            TrainOn::All => "all",
+        },
+    );
+    list.put(
+        "learning.select",
+        match select {
+            Select::BestValidation => "best_validation",
+            Select::Last => "last",
+        },
+    );
+    list.chip(hardware);
+    list.0
+}
+
+#[derive(Default)]
+struct List(Vec<Given>);
+
+impl List {
+    /// Puts a word down, unless it is the frozen default of its key.
+    fn put(&mut self, key: &str, word: impl ToString) {
+        let word = word.to_string();
+        let (head, rest) = key.split_once('.').unwrap_or((key, ""));
+        let kind = match head.strip_prefix("layer") {
+            Some(_) => format!("layer.{rest}"),
+            None => key.to_owned(),
+        };
+        let frozen = FROZEN.iter().find(|(name, _)| *name == kind);
+        if frozen.is_none_or(|(_, default)| *default != word) {
+            self.0.push((key.to_owned(), word));
+        }
+    }
+
+    fn layer(&mut self, number: usize, layer: &LayerSpec) {
+        let LayerSpec {
+            inputs,
+            units,
+            wiring,
+            driven_by,
+            activation,
+            weight_max_log2,
+            gain_64ths,
+            constant_row,
+        } = layer;
+        let mut put = |key: &str, word: &dyn ToString| {
+            self.put(&format!("layer{number}.{key}"), word.to_string());
+        };
+        put("inputs", inputs);
+        put("units", units);
+        put("wiring", &wiring.name());
+        // data drive the first layer, activities every other one: there is no single frozen default
+        match (number, driven_by) {
+            (0, DrivenBy::Shared) | (1.., DrivenBy::Streams) => {}
+            (0, DrivenBy::Streams) => put("driven_by", &"streams"),
+            (1.., DrivenBy::Shared) => put("driven_by", &"shared"),
+        }
+        let activation = match activation {
+            Activation::Sigmoid(alpha) => format!("sigmoid {}", alpha.get()),
+            Activation::Relu => "relu".into(),
+            Activation::Identity => "identity".into(),
+        };
+        put("activation", &activation);
+        put("weight_max_log2", weight_max_log2);
+        put("gain_64ths", &format!("{} {}", gain_64ths[0], gain_64ths[1]));
+        put("constant_row", constant_row);
+    }
+
+    fn chip(&mut self, hardware: &HardwareSpec) {
+        let HardwareSpec { cell, tile, drive, adc, digital, write, timing } = hardware;
+        let CellSpec { level_bits, window, floor_kind } = cell;
+        let TileSpec { rows, columns, count_max, transposed_read } = tile;
+        let DriveSpec { bits: drive_bits, dac_bits } = drive;
+        let DigitalSpec { lut_bits, error_bits } = digital;
+        let WriteSpec { increment_max, dither_bits, dither_pattern, residual_bits, scheme } = write;
+        self.put("cell.level_bits", level_bits.get());
+        self.put("cell.floor", window.floor());
+        self.put("cell.ceiling", window.ceiling());
+        let floor_kind = match floor_kind {
+            FloorKind::Recoverable => "recoverable",
+            FloorKind::Absorbing => "absorbing",
+        };
+        self.put("cell.floor_kind", floor_kind);
+        self.put("tile.rows", rows);
+        self.put("tile.columns", columns);
+        self.put("tile.count", count_max.map_or("any".into(), |count| count.to_string()));
+        self.put("tile.transposed_read", transposed_read);
+        self.put("drive.bits", drive_bits.get());
+        self.put("drive.dac_bits", dac_bits);
+        match *adc {
+            Adc::Ideal => self.put("adc", "ideal"),
+            Adc::Finite { bits, subtract, range } => {
+                self.put("adc", bits.get());
+                let subtract = match subtract {
+                    Subtract::Digital => "digital",
+                    Subtract::Current => "current",
+                };
+                self.put("adc.subtract", subtract);
+                let range = match range {
+                    AdcRange::Shift(shift) => shift.to_string(),
+                    AdcRange::Full => "full".into(),
+                    AdcRange::Calibrated { headroom, every_epoch: false } => {
+                        format!("calibrated + {headroom}")
+                    }
+                    AdcRange::Calibrated { headroom, every_epoch: true } => {
+                        format!("calibrated + {headroom}, every epoch")
+                    }
+                };
+                self.put("adc.range", range);
+            }
+        }
+        self.put("digital.lut_bits", lut_bits.get());
+        self.put("digital.error_bits", error_bits.get());
+        self.put("write.increment_max", increment_max.get());
+        let dither_bits: &DitherBits = dither_bits;
+        self.put("write.dither_bits", dither_bits.get());
+        let pattern = match dither_pattern {
+            DitherPattern::PerCell => "per_cell",
+            DitherPattern::Separable => "separable",
+        };
+        self.put("write.dither_pattern", pattern);
+        self.put("write.residual_bits", residual_bits.get());
+        let scheme = match scheme {
+            WriteScheme::Rounded => "rounded".into(),
+            WriteScheme::Trains { slots_log2 } => format!("rank1 {slots_log2}"),
+        };
+        self.put("write.scheme", scheme);
+        if let Some(timing) = *timing {
+            self.timing(timing);
+        }
+    }
+
+    /// The clock turns cycles into seconds and is read by no schedule: it is no part of what decides a run.
+    fn timing(&mut self, timing: Timing) {
+        let Timing {
+            clock_khz: _,
+            beat,
+            settle,
+            convert,
+            share,
+            overlapped,
+            lanes,
+            hops,
+            pulse,
+            pulse_code,
+            verify,
+            active_max,
+        } = timing;
+        self.put("timing", "counted");
+        self.put("timing.beat", beat);
+        self.put("timing.settle", settle);
+        self.put("timing.convert", convert);
+        self.put("timing.share", share);
+        self.put("timing.overlapped", overlapped);
+        self.put("timing.lanes", lanes);
+        self.put("timing.hops", hops);
+        self.put("timing.pulse", pulse);
+        let pulse_code = match pulse_code {
+            PulseCode::Unary => "unary",
+            PulseCode::Amplitude => "amplitude",
+        };
+        self.put("timing.pulse_code", pulse_code);
+        self.put("timing.verify", verify);
+        self.put("timing.active_max", active_max.map_or("any".into(), |cells| cells.to_string()));
+    }
+}
