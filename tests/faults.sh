@@ -76,28 +76,27 @@ fault "1 slices trade weight" $read \
     'let shift = adc.shift + e.slice as u32 * self.dac_bits;' \
     'let shift = adc.shift + e.slice as u32 * (self.dac_bits - 1);' laws::law_1
 fault "1 wide slices trade weight" $read \
-    'let shift = slice as u32 * self.dac_bits;' \
-    'let shift = slice as u32 * (self.dac_bits - 1);' laws::law_1
+    'let weight = slice as u32 * self.dac_bits;' \
+    'let weight = slice as u32 * (self.dac_bits - 1);' laws::law_1
 fault "1 np hears what pp hears" $read \
-    '&self.reads[bank][at]' '&self.reads[0][at]' laws::law_1
+    'reads: places.map(reads),' 'reads: places.map(|_| reads(places[0])),' laws::law_1
 fault "1 32-bit sums cut too late" src/chip/layer.rs \
     'pub const CHUNK_BLOCKS: usize = 512;' \
     'pub const CHUNK_BLOCKS: usize = 1024;' laws::bounds
-fault "2 a half dark block is skipped" $update \
-    'let live = codes.iter().any(|&code| code != 0);' \
-    'let live = codes[..32].iter().any(|&code| code != 0);' laws::law_2
+fault "2 a half dark block is skipped" src/chip/crossbar/kernel/data.rs \
+    'codes.chunks(256).any(any)' 'codes.chunks(256).any(|part| any(&part[..32]))' laws::law_2
 fault "2 a sum of nothing is all it sees" $scalar \
     'quotient(sum, shift, bits) != 0' \
     'quotient(sum, shift, bits) > 0' laws::law_2
 fault "2 one back end bounds one side" src/chip/crossbar/kernel/avx2/program.rs \
     'let pulses_b = _mm256_max_epi16(_mm256_min_epi16(b, most), least);' \
     'let pulses_b = _mm256_min_epi16(b, most);' laws::law_
-fault "3 means are not restored" src/learn/error.rs \
-    'self.means.copy_from_slice(means);' '' laws::runs
+fault "3 means are not restored" src/chip/engine/unit.rs \
+    'self.means = means;' '' laws::runs
 fault "3 write counts are not restored" src/lab/store/checkpoint.rs \
     '*writes = positive(&name, number)?;' 'positive(&name, number)?;' laws::runs
 fault "3 a draw depends on the tile" $update \
-    'layer: index,' 'layer: index + (hardware.tile_rows & 1) as u16,' laws::runs
+    'layer: index,' 'layer: index + (hardware.tile.rows & 1) as u16,' laws::runs
 schedule=src/chip/engine/schedule.rs
 timing=src/chip/hardware/timing.rs
 fault "4 layers wait for one another" $schedule \
@@ -107,6 +106,8 @@ fault "4 updates one after the other" $schedule \
 fault "4 all words are shared" $schedule \
     'round.join(Doing::Hearing, layer, one, !shared);' \
     'round.join(Doing::Hearing, layer, one, false);' laws::law_4
+fault "4 words are formed in no time" $schedule \
+    'round.passed[Interval::Error as usize] += shape.form;' '' laws::law_4
 fault "4 samples are written in any order" $schedule \
     '*columns || sample < written[layer] || sample < *last' \
     '*columns || sample < written[layer]' laws::law_4

@@ -12,7 +12,7 @@ use bitvec::prelude::*;
 
 use super::hardware::{FloorKind, Hardware, Window};
 use crate::num::draw::{Place, Site};
-use kernel::{Drives, Kernel};
+use kernel::{Cells, Drives, Kernel};
 use layout::{BLOCK_CELLS, BLOCK_ROWS, HALF_CELLS, HALF_COLUMNS, Layout, PANEL_COLUMNS};
 
 pub mod kernel;
@@ -20,6 +20,7 @@ pub mod layout;
 mod pulses;
 mod state;
 mod trains;
+mod words;
 mod write;
 
 pub use pulses::{Collect, Collected, RowPeaks};
@@ -35,8 +36,8 @@ pub struct Crossbar {
     low: AVec<u8>,
     high: Option<AVec<u8>>,
     residual: Option<Vec<u16>>,
-    /// One bit a cell in the order of levels, of absorbing floors.
-    pruned: Option<Vec<u64>>,
+    /// Which cells are gone for good, of absorbing floors: [`Cells::GONE`], or 0.
+    pruned: Option<Vec<u8>>,
 }
 
 /// The parts of some panels side by side that a write may change.
@@ -47,7 +48,7 @@ pub struct StripMut<'a> {
     low: &'a mut [u8],
     high: Option<&'a mut [u8]>,
     residual: Option<&'a mut [u16]>,
-    pruned: Option<&'a mut [u64]>,
+    pruned: Option<&'a mut [u8]>,
 }
 
 /// A half block of a byte plane.
@@ -78,7 +79,7 @@ impl Crossbar {
             low: avec![low; cells],
             high: wide.then(|| avec![high; cells]),
             residual: (hardware.write.residual_bits.get() > 0).then(|| vec![0; cells]),
-            pruned: (hardware.cell.floor_kind == FloorKind::Absorbing).then(|| vec![0; cells / 64]),
+            pruned: (hardware.cell.floor_kind == FloorKind::Absorbing).then(|| vec![0; cells]),
         }
     }
 
@@ -179,8 +180,8 @@ impl Crossbar {
     pub fn pruned(&self) -> Option<BitVec<u8, Lsb0>> {
         let Layout { rows, columns } = self.layout;
         let cells = (0..rows).flat_map(|row| (0..columns).map(move |column| (row, column)));
-        let bits = self.pruned.as_ref()?.view_bits::<Lsb0>();
-        Some(cells.map(|(r, c)| bits[self.layout.index(r, c)]).collect())
+        let pruned = self.pruned.as_ref()?;
+        Some(cells.map(|(r, c)| pruned[self.layout.index(r, c)] != 0).collect())
     }
 
     /// Restores the remainders, row-major.
@@ -202,11 +203,11 @@ impl Crossbar {
     /// When the floor does not absorb or the number differs.
     pub fn load_pruned(&mut self, values: &BitSlice<u8, Lsb0>) {
         let layout = self.layout;
-        let words = self.pruned.as_mut().expect("only absorbing floors load pruned cells");
+        let pruned = self.pruned.as_mut().expect("only absorbing floors load pruned cells");
         assert_eq!(values.len(), layout.cells(), "one bit a cell");
-        let bits = words.view_bits_mut::<Lsb0>();
-        for (i, value) in values.iter().by_vals().enumerate() {
-            bits.set(layout.index(i / layout.columns, i % layout.columns), value);
+        for (i, gone) in values.iter().by_vals().enumerate() {
+            let at = layout.index(i / layout.columns, i % layout.columns);
+            pruned[at] = if gone { Cells::GONE } else { 0 };
         }
     }
 
@@ -251,7 +252,7 @@ impl Crossbar {
         let mut low = self.low.chunks_mut(cells);
         let mut high = self.high.as_mut().map(|plane| plane.chunks_mut(cells));
         let mut residual = self.residual.as_mut().map(|plane| plane.chunks_mut(cells));
-        let mut pruned = self.pruned.as_mut().map(|plane| plane.chunks_mut(cells / 64));
+        let mut pruned = self.pruned.as_mut().map(|plane| plane.chunks_mut(cells));
         (0..layout.panels()).step_by(panels).map(move |first| StripMut {
             first,
             layout,

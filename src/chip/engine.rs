@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! LOADW(row)             load a row of levels
-//! LOADX(row)             put drive codes on the rows of the first layer
+//! LOADX(row)             put drive codes of data on the rows of the first layer
 //! FWD(rows | columns)    read a layer, or read it backwards
 //! ERR(words)             deliver error words over the bus; units latch their taps and form gates
 //! UPD(now | add | write) now: accumulate one sample and program; add: accumulate; write: program and clear
@@ -21,7 +21,7 @@ use super::crossbar::Collect;
 use super::crossbar::kernel::{Backend, LookUp, Team};
 use super::crossbar::layout::BLOCK_ROWS;
 use super::hardware::Hardware;
-use super::layer::Layer;
+use super::layer::{DrivenBy, Layer};
 use super::ledger::{Cycles, During, Event, Ledger};
 use super::population::{Stream, Wiring};
 
@@ -31,6 +31,8 @@ mod currents;
 mod each;
 mod error;
 mod forward;
+#[cfg(test)]
+mod pairs;
 mod passes;
 mod pulses;
 mod read;
@@ -39,7 +41,9 @@ mod state;
 mod tape;
 pub mod tick;
 mod trains;
+mod unit;
 mod update;
+mod words;
 
 use each::{MOVE, each};
 use schedule::Schedule;
@@ -47,6 +51,7 @@ use schedule::Schedule;
 pub use calibrate::Calibration;
 pub use pulses::{Pulses, TilePeaks, active};
 pub use tape::Recorded;
+pub use unit::{Centre, ErrorUnit};
 
 /// Which side of a crossbar is driven.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -100,7 +105,8 @@ pub enum Operation<'a> {
         layer: usize,
         /// Which of the loaded samples.
         samples: Range<usize>,
-        /// `width` words a sample, for stream p; stream n latches them negated.
+        /// Output words, as many a sample as the layer's delivery takes: its own words are formed of them, for stream
+        /// p; stream n latches them negated.
         words: &'a [i16],
         /// Whether they are the words of the `ERR` before, which both layers hear at once.
         shared: bool,
@@ -161,11 +167,14 @@ impl Phase {
     }
 }
 
-/// Registers of a layer for the loaded samples. Streams are indexed by [`Stream`]; what a layer does not
+/// Registers of a layer for the loaded samples, by name. Streams are indexed by [`Stream`]; what a layer does not
 /// have stays empty. Units lie in blocks of 64, samples in a block: `[block][sample][64]`.
+///
+/// A layer whose units drive the next one hands their codes to its `drives`; the last one keeps `accumulators` and
+/// `activities` of every target stream that it has, for whoever reads them out.
 #[derive(Debug, Clone, Default)]
 struct Registers {
-    /// Drive codes by source stream. The first layer drives both streams alike and keeps one copy, at P.
+    /// Drive codes by source stream; a set that both share lies at P.
     drives: [Lines<u8>; 2],
     /// Derivatives by target stream.
     derivatives: [Lines<u8>; 2],
@@ -173,10 +182,10 @@ struct Registers {
     gates: [Lines<i8>; 2],
     /// Drives by source stream as an update takes them: `[block][64 rows][stride]`.
     turned: [Lines<u8>; 2],
-    /// Accumulators of stream p, of the last layer.
-    accumulators: Vec<i64>,
-    /// Activity by target stream, of the last layer.
-    values: [Vec<u8>; 2],
+    /// Accumulators by target stream, of the last layer.
+    accumulators: [Vec<i64>; 2],
+    /// Activities by target stream, of the last layer.
+    activities: [Vec<u8>; 2],
     /// Row sums of the last transposed read, `[sample][rows]`.
     backward: Vec<i64>,
     /// Samples added and not yet programmed, and their shift.
@@ -209,7 +218,7 @@ impl<T> std::ops::DerefMut for Lines<T> {
     }
 }
 
-/// Sum of bank currents of a layer since they were last taken: `[E, I]` by target stream.
+/// Sum of bank currents of a layer since they were last taken: of banks that excite and that inhibit, by target stream.
 pub type Currents = [[i64; 2]; 2];
 
 /// A network on a chip.
@@ -226,6 +235,7 @@ pub struct Engine {
     collect: Collect,
     /// Rate mantissa.
     mantissa: u32,
+    unit: ErrorUnit,
     layers: Vec<Layer>,
     /// What units hand on and how steep they are there, by layer.
     tables: Vec<LookUp>,
@@ -234,6 +244,8 @@ pub struct Engine {
     /// Sums of levels of each row, by layer and array; forgotten when a level moves.
     row_sums: Vec<Option<Vec<Vec<i64>>>>,
     samples: usize,
+    /// Samples that `LOADX` has brought since the start, by phase: state.
+    loaded: [u64; 3],
     phase: Phase,
     ledgers: [Ledger; 3],
     /// Counts cycles, on hardware that has a timing.
@@ -249,8 +261,9 @@ impl Engine {
     /// When the layers do not follow one another: the plan checks that.
     #[must_use]
     pub fn new(hardware: Hardware, backend: Backend, seed: u64, layers: Vec<Layer>) -> Self {
-        let joined = layers.windows(2).all(|pair| pair[0].spec.units == pair[1].spec.inputs);
+        let joined = layers.windows(2).all(|pair| pair[1].spec.follows(&pair[0].spec));
         assert!(joined && !layers.is_empty(), "layers follow one another");
+        assert!(layers[0].spec.driven_by == DrivenBy::Shared, "data drive both streams alike");
         let count = layers.len();
         let schedule = hardware.timing.map(|timing| Schedule::new(&hardware, timing, &layers));
         let ledger =
@@ -260,23 +273,29 @@ impl Engine {
         let tables = layers.iter().zip(0..).map(|(l, at)| l.look_up(codes(at))).collect();
         let collect = passes::collect(&hardware);
         Self {
-            hardware,
             backend,
             team: Team::new(backend, 1),
             seed,
             potentiation_only: false,
             collect,
             mantissa: 1,
+            unit: ErrorUnit::new(
+                Centre::None,
+                hardware.digital.error_bits,
+                layers[last].spec.units,
+            ),
             registers: vec![Registers::default(); layers.len()],
             currents: vec![[[0; 2]; 2]; layers.len()],
             row_sums: vec![None; layers.len()],
             tables,
             layers,
             samples: 0,
+            loaded: [0; 3],
             phase: Phase::Training,
             ledgers: [ledger.clone(), ledger.clone(), ledger],
             schedule,
             tape: None,
+            hardware,
         }
     }
 
@@ -321,14 +340,6 @@ impl Engine {
     /// Ends what overlaps in time: the cycles of all operations so far are in the ledger.
     pub fn settle(&mut self) {
         self.time(Schedule::settle);
-    }
-
-    /// The error unit takes the mean of so many words over a batch.
-    pub fn centre(&mut self, samples: usize, words: usize) {
-        if let Some(tape) = &mut self.tape {
-            tape.push(Recorded::Centre { samples, words });
-        }
-        self.time(|schedule, cycles| schedule.centre(cycles, samples, words));
     }
 
     /// Counts cycles, if there is a timing.
@@ -376,7 +387,7 @@ impl Engine {
         &self.ledgers[phase as usize]
     }
 
-    /// A ledger, to restore a state or to charge what digital logic beside the tiles did.
+    /// A ledger, to restore a state.
     pub const fn ledger_mut(&mut self, phase: Phase) -> &mut Ledger {
         &mut self.ledgers[phase as usize]
     }
@@ -393,24 +404,44 @@ impl Engine {
         self.samples
     }
 
+    /// Samples that were loaded while a phase was charged, since the start.
+    #[must_use]
+    pub const fn samples_loaded(&self, phase: Phase) -> u64 {
+        self.loaded[phase as usize]
+    }
+
+    /// Restores how many samples were loaded in a phase.
+    pub const fn set_samples_loaded(&mut self, phase: Phase, samples: u64) {
+        self.loaded[phase as usize] = samples;
+    }
+
     /// Bank currents by layer since the last call, and starts over.
     pub fn take_currents(&mut self) -> Vec<Currents> {
         let zero = vec![[[0; 2]; 2]; self.layers.len()];
         std::mem::replace(&mut self.currents, zero)
     }
 
-    /// Accumulator of a unit of the last layer's p stream.
+    /// Accumulator and activity of a unit of the last layer, of one of its target streams.
+    ///
+    /// # Panics
+    /// When the last layer has no such stream, or has not been read.
+    #[must_use]
+    pub fn output(&self, target: Stream, sample: usize, unit: usize) -> (i64, u8) {
+        let registers = self.registers.last().expect("a network has layers");
+        let (at, stream) = (self.register_at(sample, unit), target.index());
+        (registers.accumulators[stream][at], registers.activities[stream][at])
+    }
+
+    /// Accumulator of a unit of the last layer's p stream, which predicts.
     #[must_use]
     pub fn output_accumulator(&self, sample: usize, unit: usize) -> i64 {
-        let registers = self.registers.last().expect("a network has layers");
-        registers.accumulators[self.register_at(sample, unit)]
+        self.output(Stream::P, sample, unit).0
     }
 
     /// Activity code of a unit of the last layer's p stream.
     #[must_use]
     pub fn output_activity(&self, sample: usize, unit: usize) -> u8 {
-        let registers = self.registers.last().expect("a network has layers");
-        registers.values[Stream::P.index()][self.register_at(sample, unit)]
+        self.output(Stream::P, sample, unit).1
     }
 
     /// Row sums of the last transposed read of `layer`, `[sample][inputs]`.
@@ -451,7 +482,10 @@ impl Engine {
             Operation::Forward { layer, side: Side::Rows } => self.forward(layer),
             Operation::Forward { layer, side: Side::Columns } => self.forward_columns(layer),
             Operation::Error { layer, ref samples, words, shared } => {
-                self.error(layer, samples.clone(), words);
+                let direct = self.layers[layer].delivery.is_direct();
+                assert!(direct || !shared, "formed words are heard by one layer");
+                let words = self.layer_words(layer, samples, words);
+                self.error(layer, samples.clone(), &words);
                 self.time(|schedule, cycles| schedule.error(cycles, layer, samples, shared));
             }
             Operation::Update { layer, write, ref samples, shift } => {
@@ -469,6 +503,7 @@ impl Engine {
         assert!(greatest <= self.hardware.drive.bits.code_max(), "codes have `drive_bits` bits");
         self.samples = codes.len() / inputs;
         let samples = self.samples;
+        self.loaded[self.phase as usize] += samples as u64;
         let drives = &mut self.registers[0].drives[Stream::P.index()];
         drives.resize(blocks * samples * BLOCK_ROWS, 0);
         let parts = drives.chunks_exact_mut((samples * BLOCK_ROWS).max(1)).enumerate();
@@ -507,8 +542,8 @@ impl Engine {
 
     /// Drives of a source stream of a layer.
     fn drives(&self, layer: usize, source: Stream) -> &[u8] {
-        let source = if layer == 0 { Stream::P } else { source };
-        &self.registers[layer].drives[source.index()]
+        let set = self.layers[layer].spec.drives_of(source);
+        &self.registers[layer].drives[set.index()]
     }
 
     fn charge(&mut self, layer: usize, pathway: u8, during: During, event: Event, count: u64) {
@@ -517,6 +552,6 @@ impl Engine {
 
     /// Code of the pathway that carries a target's excitatory bank: units are charged there.
     const fn code_of(wiring: Wiring, target: Stream) -> u8 {
-        wiring.pathways()[wiring.banks(target)[0]].code
+        wiring.pathways()[wiring.pairs(target)[0][0]].code
     }
 }

@@ -1,4 +1,4 @@
-//! A dense layer: its arrays, its table, its taps and its converters; and the plan that proves it fits.
+//! A dense layer: its arrays, its table, how errors reach it and its converters; and the plan that proves it fits.
 //!
 //! Layers with cells are numbered from 0 at the input. A layer of K inputs and N units is one unsigned K x N array a
 //! pathway, cut into tiles of `tile_rows` x `tile_columns`. A constant row, if any, is the last row. See
@@ -12,13 +12,26 @@ use super::crossbar::kernel::LookUp;
 use super::crossbar::layout::Layout;
 use super::hardware::{Adc, AdcRange, Hardware};
 use super::periphery;
-use super::population::Wiring;
+use super::population::{Stream, Wiring};
 use crate::num::fixed::DriveBits;
 use crate::num::tables::{Activation, Lut, Unit};
 
+mod delivery;
 mod state;
 
-/// What a layer is made of.
+pub use delivery::{Delivery, Taps, WordSource};
+
+/// Whose codes are on the rows of an array.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum DrivenBy {
+    /// One set of drives, for both streams: data.
+    Shared,
+    /// A set for each stream: activities of the array before.
+    Streams,
+}
+
+/// What a layer is made of. A network is a list of stages, input to output; an array, which is a layer, is the only
+/// kind there is.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LayerSpec {
     /// Units of the layer below, or features; without the constant row.
@@ -27,6 +40,8 @@ pub struct LayerSpec {
     pub units: usize,
     /// How the arrays are wired.
     pub wiring: Wiring,
+    /// Whose codes drive the rows.
+    pub driven_by: DrivenBy,
     /// Function of the units.
     pub activation: Activation,
     /// `log2(weight_max)`.
@@ -37,25 +52,30 @@ pub struct LayerSpec {
     pub constant_row: bool,
 }
 
-/// Which error words a unit latches: a static tap, no matrix.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Taps {
-    /// Words on the bus.
-    pub width: usize,
-    /// Words a unit adds.
-    pub per_unit: usize,
-    /// `[unit][tap]` word numbers.
-    pub words: Vec<u16>,
-    /// Shift of the sum of more than one word.
-    pub shift: u32,
-}
-
-impl Taps {
-    /// Unit c takes word c.
+impl LayerSpec {
+    /// The stream whose set of drives stands on the rows that `source` drives.
     #[must_use]
-    pub fn identity(units: usize) -> Self {
-        let words = (0..units).map(|unit| u16::try_from(unit).expect("checked by the plan"));
-        Self { width: units, per_unit: 1, words: words.collect(), shift: 0 }
+    pub const fn drives_of(&self, source: Stream) -> Stream {
+        match self.driven_by {
+            DrivenBy::Shared => Stream::P,
+            DrivenBy::Streams => source,
+        }
+    }
+
+    /// Streams that have a set of drives of their own.
+    #[must_use]
+    pub const fn drive_sets(&self) -> &'static [Stream] {
+        match self.driven_by {
+            DrivenBy::Shared => &[Stream::P],
+            DrivenBy::Streams => self.wiring.sources(),
+        }
+    }
+
+    /// Whether the units of `below` can drive this array.
+    #[must_use]
+    pub fn follows(&self, below: &Self) -> bool {
+        let given = below.wiring.targets();
+        self.inputs == below.units && self.drive_sets().iter().all(|set| given.contains(set))
     }
 }
 
@@ -121,8 +141,8 @@ pub struct Layer {
     pub layout: Layout,
     /// Activation and derivative.
     pub lut: Lut,
-    /// Error taps.
-    pub taps: Taps,
+    /// How errors reach it.
+    pub delivery: Delivery,
     /// The arrays, in the order of [`Wiring::pathways`].
     pub arrays: Vec<Crossbar>,
     /// Writes each array has had.
@@ -134,7 +154,13 @@ pub struct Layer {
 impl Layer {
     /// A layer with every cell on the floor.
     #[must_use]
-    pub fn new(index: u16, spec: LayerSpec, taps: Taps, hardware: &Hardware) -> Self {
+    pub fn new(
+        index: u16,
+        spec: LayerSpec,
+        delivery: impl Into<Delivery>,
+        hardware: &Hardware,
+    ) -> Self {
+        let delivery = delivery.into();
         let rows = spec.inputs + usize::from(spec.constant_row);
         let layout = Layout { rows, columns: spec.units };
         let lut = Lut::new(spec.activation, hardware.digital.lut_bits, unit(&spec, hardware));
@@ -153,7 +179,7 @@ impl Layer {
             }
         };
         let writes = vec![0; arrays.len()];
-        Self { index, spec, layout, lut, taps, arrays, writes, adc_shifts }
+        Self { index, spec, layout, lut, delivery, arrays, writes, adc_shifts }
     }
 
     /// The table as kernels take it: what a unit hands on is its activity or, with `drive_bits`, the drive code of
@@ -194,7 +220,7 @@ fn tiles(layout: Layout, hardware: &Hardware) -> [usize; 2] {
     [layout.rows.div_ceil(hardware.tile.rows), layout.columns.div_ceil(hardware.tile.columns)]
 }
 
-/// Proves that a network fits: addresses, words and physical tiles. A tile holds the two banks of one target.
+/// Proves that a network fits: addresses, words and physical tiles. A tile holds two banks of one target.
 ///
 /// # Errors
 /// When it does not, with what is needed and what there is.
@@ -215,7 +241,7 @@ pub fn check(specs: &[LayerSpec], hardware: &Hardware) -> Result<(), PlanError> 
             return Err(PlanError::Size { layer, rows, columns, max: SIDE_MAX });
         }
         let [down, across] = tiles(layout, hardware);
-        by_layer.push(down * across * spec.wiring.targets().len());
+        by_layer.push(down * across * spec.wiring.planes().count());
     }
     let needed = by_layer.iter().sum();
     match hardware.tile.count_max {

@@ -7,7 +7,7 @@
 pub mod cycles;
 mod state;
 
-pub use cycles::{Cycles, Part, Stage};
+pub use cycles::{Cycles, Interval, Part};
 
 /// Enums whose variants have a code that files and hashes use, and a name: said once, in one table. Codes are never
 /// reused.

@@ -61,6 +61,9 @@ const fn pathway(
     Pathway { code, name, source, target, polarity }
 }
 
+/// Banks a target can have.
+pub const BANKS_MAX: usize = 4;
+
 use Polarity::{Excites, Inhibits};
 use Stream::{N, P};
 
@@ -80,9 +83,25 @@ pub enum Wiring {
     DualReadout,
     /// One signed stream of differential pairs.
     Single,
+    /// Two populations whose four pathways are differential pairs: no rule uses it yet, so that it is here to show that
+    /// a target may have more than two banks.
+    #[cfg(test)]
+    DualPairs,
 }
 
 impl Wiring {
+    /// Name in files.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Dual => "dual",
+            Self::DualReadout => "dual_readout",
+            Self::Single => "single",
+            #[cfg(test)]
+            Self::DualPairs => "dual_pairs",
+        }
+    }
+
     /// The arrays, in code order.
     #[must_use]
     pub const fn pathways(self) -> &'static [Pathway] {
@@ -90,6 +109,8 @@ impl Wiring {
             Self::Dual => &[PP, NP, NN, PN],
             Self::DualReadout => &[PP, NP],
             Self::Single => &[PLUS, MINUS],
+            #[cfg(test)]
+            Self::DualPairs => &tests::PAIRS,
         }
     }
 
@@ -98,6 +119,8 @@ impl Wiring {
     pub const fn targets(self) -> &'static [Stream] {
         match self {
             Self::Dual => &[P, N],
+            #[cfg(test)]
+            Self::DualPairs => &[P, N],
             Self::DualReadout | Self::Single => &[P],
         }
     }
@@ -108,16 +131,35 @@ impl Wiring {
         match self {
             Self::Dual | Self::DualReadout => &[P, N],
             Self::Single => &[P],
+            #[cfg(test)]
+            Self::DualPairs => &[P, N],
         }
     }
 
-    /// Places, in [`Wiring::pathways`], of the excitatory and the inhibitory bank of a target.
+    /// Places, in [`Wiring::pathways`], of the banks of a target, in pairs of one that excites and one that inhibits.
+    /// A pair is what a physical tile holds; what all pairs read adds up in the target's accumulators.
     #[must_use]
-    pub const fn banks(self, target: Stream) -> [usize; 2] {
-        match target {
-            P => [0, 1],
-            N => [2, 3],
+    pub const fn pairs(self, target: Stream) -> &'static [[usize; 2]] {
+        match (self, target) {
+            #[cfg(test)]
+            (Self::DualPairs, P) => &[[0, 4], [1, 5]],
+            #[cfg(test)]
+            (Self::DualPairs, N) => &[[2, 6], [3, 7]],
+            (_, P) => &[[0, 1]],
+            (_, N) => &[[2, 3]],
         }
+    }
+
+    /// The pairs of all targets, target after target.
+    pub fn planes(self) -> impl Iterator<Item = (Stream, [usize; 2])> {
+        let of = move |&target| self.pairs(target).iter().map(move |&pair| (target, pair));
+        self.targets().iter().flat_map(of)
+    }
+
+    /// Places of the banks of a target, each of which has the polarity of its pathway.
+    #[must_use]
+    pub fn banks(self, target: Stream) -> &'static [usize] {
+        self.pairs(target).as_flattened()
     }
 
     /// Bits added to the rate's shift: a differential pair moves by two cells.
@@ -126,6 +168,8 @@ impl Wiring {
         match self {
             Self::Dual | Self::DualReadout => 0,
             Self::Single => 1,
+            #[cfg(test)]
+            Self::DualPairs => 1,
         }
     }
 }
@@ -134,13 +178,31 @@ impl Wiring {
 mod tests {
     use super::*;
 
+    /// Pathways of [`Wiring::DualPairs`].
+    pub(super) const PAIRS: [Pathway; 8] = [
+        pathway(0, "pp", P, P, Excites),
+        pathway(1, "np", N, P, Excites),
+        pathway(2, "nn", N, N, Excites),
+        pathway(3, "pn", P, N, Excites),
+        pathway(4, "pp_i", P, P, Inhibits),
+        pathway(5, "np_i", N, P, Inhibits),
+        pathway(6, "nn_i", N, N, Inhibits),
+        pathway(7, "pn_i", P, N, Inhibits),
+    ];
+
     #[test]
     fn the_banks_of_a_target_excite_and_inhibit_it() {
-        for wiring in [Wiring::Dual, Wiring::DualReadout, Wiring::Single] {
+        let all = [Wiring::Dual, Wiring::DualReadout, Wiring::Single, Wiring::DualPairs];
+        for wiring in all {
             for &target in wiring.targets() {
-                let [e, i] = wiring.banks(target).map(|at| wiring.pathways()[at]);
-                assert_eq!((e.target, i.target), (target, target));
-                assert_eq!((e.polarity, i.polarity), (Excites, Inhibits));
+                for pair in wiring.pairs(target) {
+                    let [e, i] = pair.map(|at| wiring.pathways()[at]);
+                    assert_eq!((e.target, i.target), (target, target));
+                    assert_eq!((e.polarity, i.polarity), (Excites, Inhibits));
+                }
+                let mine = wiring.pathways().iter().filter(|pathway| pathway.target == target);
+                assert_eq!(mine.count(), wiring.banks(target).len(), "every array is a bank once");
+                assert!(wiring.banks(target).len() <= BANKS_MAX);
             }
             assert!(wiring.pathways().is_sorted_by_key(|pathway| pathway.code));
         }

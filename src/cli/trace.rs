@@ -7,7 +7,7 @@ use serde_json::json;
 
 use super::{Done, Failure, Shared, configuration, say, usage};
 use crate::chip::engine::tick::TileAt;
-use crate::chip::ledger::Stage;
+use crate::chip::ledger::Interval;
 use crate::lab::wave::{self, Look};
 
 #[derive(Debug, Args)]
@@ -57,7 +57,7 @@ pub(super) fn execute(args: &TraceArgs) -> Done {
             written.push(path.display().to_string());
         }
     }
-    let stages = Stage::ALL.map(|stage| (stage.name(), wave.cycles.stage(stage)));
+    let stages = Interval::ALL.map(|interval| (interval.name(), wave.cycles.interval(interval)));
     if args.shared.json {
         let stages: serde_json::Map<_, _> =
             stages.into_iter().map(|(name, cycles)| (name.to_owned(), json!(cycles))).collect();

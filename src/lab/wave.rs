@@ -74,6 +74,7 @@ pub fn record(
     let engine = before.engines()[0];
     let mut network = Network::new(&config.hardware, config.seed, engine.layers(), samples);
     network.set_learning(engine.mantissa(), engine.potentiation_only());
+    network.set_error_unit(engine.error_unit());
     let place = look.tile;
     let grid = (place.layer < engine.layers().len()).then(|| network.grid(place.layer));
     let inside = |[targets, downs, acrosses]: [usize; 3]| {

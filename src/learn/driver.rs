@@ -1,16 +1,13 @@
 //! Carries out updates: puts numbers into a rule's steps and hands them to the engine.
 //!
-//! The driver owns what learning keeps beside the chip: the error unit and the number of updates done. It is
-//! driven with drive codes and labels, or, by other tasks, with drive codes and errors.
+//! The driver owns what learning keeps beside the chip: the number of updates done. What the chip does for it, the
+//! engine counts. It is driven with drive codes and labels, or, by other tasks, with drive codes and errors.
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
 use super::error::ErrorUnit;
-use super::route::Delivery;
-use super::rule::{Rule, Step, UpdateMode, Words};
+use super::rule::{Rule, Step, UpdateMode};
 use crate::chip::engine::{Engine, Operation, Side, Write};
-use crate::chip::ledger::{During, Event};
 use crate::chip::state::{Section, State, StateError, Visitor, visit_counts};
-use crate::num::fixed::{ErrorBits, rail};
 
 /// How a network learns.
 #[derive(Debug, Clone)]
@@ -19,8 +16,6 @@ pub(crate) struct Learning {
     pub(crate) rule: Rule,
     /// When a batch is written.
     pub(crate) mode: UpdateMode,
-    /// How errors reach each layer.
-    pub(crate) deliveries: Vec<Delivery>,
     /// Shifts of each layer: `(first update, k)`, in order.
     pub(crate) shifts: Vec<Vec<(u64, u32)>>,
 }
@@ -30,15 +25,15 @@ pub(crate) struct Learning {
 pub struct Driver {
     engine: Engine,
     learning: Learning,
-    unit: ErrorUnit,
     updates: u64,
 }
 
 impl Driver {
     /// Starts learning on an engine whose layers `learning` fits: the network builder sees to that.
     #[must_use]
-    pub(crate) fn new(engine: Engine, learning: Learning, unit: ErrorUnit) -> Self {
-        Self { engine, learning, unit, updates: 0 }
+    pub(crate) fn new(mut engine: Engine, learning: Learning, unit: ErrorUnit) -> Self {
+        engine.set_error_unit(unit);
+        Self { engine, learning, updates: 0 }
     }
 
     /// The chip.
@@ -55,7 +50,7 @@ impl Driver {
     /// The error unit.
     #[must_use]
     pub const fn unit(&self) -> &ErrorUnit {
-        &self.unit
+        self.engine.error_unit()
     }
 
     /// Batches learnt from.
@@ -107,33 +102,18 @@ impl Driver {
     /// Writes what the loaded samples' errors ask for.
     fn update(&mut self, errors: &[i32]) {
         let layers = self.engine.layers().len();
-        let outputs = self.engine.layers()[layers - 1].spec.units;
-        let (words, saturated) = self.unit.words(errors, outputs);
-        self.charge(layers - 1, Event::SaturatedErrors, saturated);
-        let samples = self.engine.samples();
-        if self.unit.waits_for_batch() {
-            self.engine.centre(samples, outputs);
-        }
+        let words = self.engine.output_words(errors);
+        let loaded = self.engine.samples();
         let mut heard = false;
-        for step in self.learning.rule.steps(self.learning.mode, layers, samples) {
+        for step in self.learning.rule.steps(self.learning.mode, layers, loaded) {
             match step {
-                Step::Error { layer, samples, words: Words::Routed } => {
-                    let delivery = &self.learning.deliveries[layer];
-                    let common = delivery.is_common();
-                    let (routed, saturated, products) = delivery.words(&words, outputs);
-                    self.charge(layer, Event::SaturatedErrors, saturated);
-                    self.charge(layer, Event::Multiplies, products);
-                    let shared = heard && common;
-                    heard = common;
-                    let words = &routed;
+                Step::Error { layer, samples } => {
+                    let delivery = &self.engine.layers()[layer].delivery;
+                    let (direct, outputs) = (delivery.is_direct(), delivery.output_words());
+                    let words = &words[samples.start * outputs..samples.end * outputs];
+                    let shared = heard && direct;
+                    heard = direct;
                     self.engine.execute(&Operation::Error { layer, samples, words, shared });
-                }
-                Step::Error { layer, samples, words: Words::Above } => {
-                    let (words, saturated) = self.backward(layer + 1);
-                    self.charge(layer, Event::SaturatedErrors, saturated);
-                    let (words, shared) = (&words, false);
-                    self.engine.execute(&Operation::Error { layer, samples, words, shared });
-                    heard = false;
                 }
                 Step::ReadColumns { layer } => {
                     self.engine.execute(&Operation::Forward { layer, side: Side::Columns });
@@ -146,69 +126,14 @@ impl Driver {
         }
         self.engine.settle();
     }
-
-    /// Error words for the layer below `layer`: its row sums in units of an error word.
-    fn backward(&self, layer: usize) -> (Vec<i16>, u64) {
-        let hardware = self.engine.hardware();
-        let spec = &self.engine.layers()[layer].spec;
-        backward_words(
-            self.engine.backward(layer),
-            hardware.cell.level_bits.get(),
-            spec.weight_max_log2,
-            hardware.digital.error_bits,
-        )
-    }
-
-    fn charge(&mut self, layer: usize, event: Event, count: u64) {
-        let phase = self.engine.phase();
-        self.engine.ledger_mut(phase).add(layer, 0, During::Error, event, count);
-    }
 }
 
 impl State for Driver {
     fn visit(&mut self, visitor: &mut dyn Visitor) -> Result<(), StateError> {
         self.engine.visit(visitor)?;
-        self.unit.visit(visitor)?;
         let updates = std::iter::once(&mut self.updates);
         visit_counts(visitor, "updates", Section::Progress, updates)
     }
-}
-
-/// Row sums of a transposed read as error words.
-///
-/// ```text
-/// S_below = sat_eb( rsh( d, level_bits - log2(weight_max) + 8 - error_bits ) )
-/// ```
-///
-/// A level is worth `weight_max / 2^level_bits` and a gate `2^(8 - error_bits)` of a word; a negative shift is a
-/// multiplication. The derivative's peak, `1 / (2 alpha)`, is left to the layer's rate.
-fn backward_words(
-    sums: &[i64],
-    level_bits: u32,
-    weight_max_log2: i32,
-    bits: ErrorBits,
-) -> (Vec<i16>, u64) {
-    let shift = i64::from(level_bits) - i64::from(weight_max_log2) + 8 - i64::from(bits.get());
-    let rail = rail(bits.get());
-    let mut saturated = 0;
-    // no branch: which sums saturate is hard to guess
-    let mut bounded = |scaled: i64| {
-        let word = scaled.clamp(-rail, rail);
-        saturated += u64::from(word != scaled);
-        word as i16
-    };
-    let mut words = vec![0; sums.len()];
-    let pairs = words.iter_mut().zip(sums);
-    match u32::try_from(shift) {
-        Ok(0) => pairs.for_each(|(word, &d)| *word = bounded(d)),
-        // `rsh` of at most 63
-        Ok(right) => {
-            let right = right.min(63);
-            pairs.for_each(|(word, &d)| *word = bounded((d >> right) + (d >> (right - 1) & 1)));
-        }
-        Err(_) => pairs.for_each(|(word, &d)| *word = bounded(d << shift.unsigned_abs())),
-    }
-    (words, saturated)
 }
 
 #[cfg(test)]
@@ -217,11 +142,12 @@ mod tests {
     use crate::chip::crossbar::kernel::Backend;
     use crate::chip::engine::Phase;
     use crate::chip::hardware::{DitherBits, Hardware};
-    use crate::chip::layer::{Layer, LayerSpec};
+    use crate::chip::layer::{Delivery, DrivenBy, Layer, LayerSpec};
+    use crate::chip::ledger::{During, Event};
     use crate::chip::population::Wiring;
     use crate::learn::error::Centre;
     use crate::learn::route::Route;
-    use crate::num::fixed::IncrementMax;
+    use crate::num::fixed::{ErrorBits, IncrementMax};
     use crate::num::tables::Activation;
 
     /// Two layers of a single stream, 2 to 2 to 2, with the given shifts.
@@ -239,6 +165,7 @@ mod tests {
             inputs: 2,
             units: 2,
             wiring: Wiring::Single,
+            driven_by: DrivenBy::Shared,
             activation: Activation::Identity,
             weight_max_log2: 2,
             gain_64ths: [64, 64],
@@ -246,17 +173,16 @@ mod tests {
         };
         let dense = Route::RandomDense { shift: Some(0) };
         let first = match rule {
-            Rule::Bp => Delivery::own(2, bits),
-            _ => Delivery::hidden(dense, 2, 2, bits, 1, 0),
+            Rule::Bp => Delivery::above(2),
+            _ => dense.delivery(2, 2, 1, 0),
         };
-        let deliveries = vec![first, Delivery::output(2, bits)];
-        let layers = deliveries.iter().zip(0..).map(|(delivery, index)| {
-            Layer::new(index, spec.clone(), delivery.taps().clone(), &hardware)
-        });
+        let layers = [first, Delivery::output(2)].into_iter().zip(0..);
+        let layers =
+            layers.map(|(delivery, index)| Layer::new(index, spec.clone(), delivery, &hardware));
         let layers = layers.collect();
         let engine = Engine::new(hardware, Backend::Scalar, 1, layers);
         let shifts = vec![shifts.to_vec(); 2];
-        let learning = Learning { rule, mode, deliveries, shifts };
+        let learning = Learning { rule, mode, shifts };
         Driver::new(engine, learning, ErrorUnit::new(Centre::None, bits, 2))
     }
 
@@ -302,17 +228,6 @@ mod tests {
     }
 
     #[test]
-    fn backward_sums_are_scaled_by_the_worth_of_a_level_and_bounded() {
-        let eight = ErrorBits::new(8).unwrap();
-        // 8 bits, weight_max 4: 64 levels are a weight of 1
-        let (words, saturated) =
-            backward_words(&[64, 32, -32, 31, 64 * 127, 64 * 128], 8, 2, eight);
-        assert_eq!((words, saturated), (vec![1, 1, 0, 0, 127, 127], 1));
-        // 1 bit, weight_max 4: a level is worth 2
-        assert_eq!(backward_words(&[3, -5], 1, 2, eight).0, [6, -10]);
-    }
-
-    #[test]
     fn sums_are_written_with_the_shift_of_the_update() {
         for (shift, moved) in [(30, false), (10, true)] {
             let mut driver = driver(Rule::Dfa, UpdateMode::Accumulate, &[(0, shift)]);
@@ -332,7 +247,6 @@ mod tests {
         driver.learn(&[255, 0], |_, _, list| list.extend([40, 254]));
         // words 20 and 127 give gates 20 and 127; 64 levels are a weight of 1
         assert_eq!(driver.engine().backward(1), [20 * 64, 127 * 255]);
-        assert_eq!(driver.backward(1), (vec![20, 127], 1));
         let ledger = driver.engine().ledger(Phase::Training);
         assert_eq!(ledger.get(0, 0, During::Error, Event::SaturatedErrors), 1);
         // units 0 and 1 of the first layer hear them: rsh(255 x 20, 11) and rsh(255 x 127, 11)

@@ -15,13 +15,13 @@ pub use check::{GAIN_64THS, WEIGHT_MAX_LOG2};
 
 use super::driver::{Driver, Learning};
 use super::error::{Centre, ErrorUnit};
-use super::route::{Delivery, Route};
+use super::route::Route;
 use super::rule::{Rule, UpdateMode};
 use crate::chip::crossbar::kernel::Backend;
 use crate::chip::crossbar::{initial_levels, initial_scale};
 use crate::chip::engine::{Engine, Operation};
 use crate::chip::hardware::Hardware;
-use crate::chip::layer::{self, Layer, LayerSpec, PlanError};
+use crate::chip::layer::{self, Delivery, Layer, LayerSpec, PlanError};
 use crate::chip::population::Polarity;
 use crate::num::draw::{Place, Site};
 use crate::num::fixed::{Batch, RateMantissa};
@@ -146,10 +146,9 @@ impl NetworkSpec {
     ) -> Result<Driver, NetworkError> {
         self.check(hardware)?;
         let numbers = self.numbers(place)?;
-        let deliveries = self.deliveries(hardware, place.seed, &numbers);
-        let layers = self.layers.iter().zip(&deliveries).zip(&numbers);
+        let layers = self.layers.iter().zip(self.deliveries(place.seed, &numbers)).zip(&numbers);
         let layers = layers.map(|((spec, delivery), &number)| {
-            Layer::new(number, spec.clone(), delivery.taps().clone(), hardware)
+            Layer::new(number, spec.clone(), delivery, hardware)
         });
         let layers: Vec<_> = layers.collect();
         let shifts = self.rates(hardware).enumerate().map(|(at, rate)| {
@@ -161,7 +160,7 @@ impl NetworkSpec {
         engine.set_mantissa(self.mantissa.get());
         load_initial_levels(&mut engine, place.seed);
         let unit = ErrorUnit::new(self.centre, hardware.digital.error_bits, self.outputs());
-        let learning = Learning { rule: self.rule, mode: self.mode, deliveries, shifts };
+        let learning = Learning { rule: self.rule, mode: self.mode, shifts };
         Ok(Driver::new(engine, learning, unit))
     }
 
@@ -182,14 +181,13 @@ impl NetworkSpec {
     }
 
     /// How errors reach each layer.
-    fn deliveries(&self, hardware: &Hardware, seed: u64, numbers: &[u16]) -> Vec<Delivery> {
-        let (bits, outputs) = (hardware.digital.error_bits, self.outputs());
-        let last = self.layers.len() - 1;
+    fn deliveries(&self, seed: u64, numbers: &[u16]) -> Vec<Delivery> {
+        let (outputs, last) = (self.outputs(), self.layers.len() - 1);
         let layers = self.layers.iter().zip(numbers).enumerate();
         let delivery = layers.map(|(at, (spec, &number))| match self.route {
-            _ if at == last => Delivery::output(outputs, bits),
-            None => Delivery::own(spec.units, bits),
-            Some(route) => Delivery::hidden(route, spec.units, outputs, bits, seed, number),
+            _ if at == last => Delivery::output(outputs),
+            None => Delivery::above(spec.units),
+            Some(route) => route.delivery(spec.units, outputs, seed, number),
         });
         delivery.collect()
     }

@@ -9,12 +9,13 @@
 //! random_dense     unit j hears sat( rsh(sum of +-words, shift) ), signs drawn once; computed in the error unit
 //! ```
 //!
-//! The first two are static taps on the tile and cost no product. See docs/MODEL.md, 3.2.
+//! The first two are static taps on the tile and cost no product; words of the others are formed in the error unit, by
+//! the engine. See docs/MODEL.md, 3.2.
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
-use crate::chip::layer::Taps;
+use crate::chip::layer::{Delivery, Taps, WordSource};
 use crate::num::draw::{Place, Site, below};
-use crate::num::fixed::{ErrorBits, log2_ceil, rail, rsh, sat};
+use crate::num::fixed::log2_ceil;
 
 /// How errors reach hidden units.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -37,74 +38,29 @@ pub enum Route {
     },
 }
 
-/// Words of at most 9 bits, with any signs, that add up inside 16 bits.
-const DENSE_PART: usize = 128;
-
-/// A route built for one layer: what the error unit computes, and what the tile taps.
-#[derive(Debug, Clone)]
-pub(crate) struct Delivery {
-    taps: Taps,
-    kind: Kind,
-    bits: ErrorBits,
-}
-
-#[derive(Debug, Clone)]
-enum Kind {
-    Bus,
-    Broadcast {
-        shift: u32,
-    },
-    /// Signs by output and unit.
-    Dense {
-        signs: Vec<i16>,
-        shift: u32,
-    },
-    Own,
-}
-
-impl Delivery {
-    /// The output layer: unit c takes word c.
+impl Route {
+    /// How the words of `outputs` channels reach a hidden layer of `units`. Random routes are drawn by seed and layer.
     #[must_use]
-    pub(crate) fn output(outputs: usize, bits: ErrorBits) -> Self {
-        Self { taps: Taps::identity(outputs), kind: Kind::Bus, bits }
-    }
-
-    /// A layer whose units get a word each, made elsewhere (back-propagation).
-    #[must_use]
-    pub(crate) fn own(units: usize, bits: ErrorBits) -> Self {
-        Self { taps: Taps::identity(units), kind: Kind::Own, bits }
-    }
-
-    /// A hidden layer of `units` that hears `outputs` channels by `route`.
-    #[must_use]
-    pub(crate) fn hidden(
-        route: Route,
-        units: usize,
-        outputs: usize,
-        bits: ErrorBits,
-        seed: u64,
-        layer: u16,
-    ) -> Self {
+    pub(crate) fn delivery(self, units: usize, outputs: usize, seed: u64, layer: u16) -> Delivery {
         let place = Place { layer, ..Place::global(seed, Site::Route, 0) };
         let outputs_u32 = u32::try_from(outputs).expect("checked by the plan");
         let word = |w: usize| u16::try_from(w).expect("checked by the plan");
-        let (taps, kind) = match route {
-            Route::Modulo { taps, shift } => {
+        match self {
+            Self::Modulo { taps, shift } => {
                 let words = (0..units).flat_map(|unit| modulo(unit, outputs, taps)).map(word);
                 let shift = shift.unwrap_or(log2_ceil(taps as u64));
-                let words = words.collect();
-                (Taps { width: outputs, per_unit: taps, words, shift }, Kind::Bus)
+                Taps { width: outputs, per_unit: taps, words: words.collect(), shift }.into()
             }
-            Route::RandomSparse => {
+            Self::RandomSparse => {
                 let words = place.words().take(units).map(|w| word(below(w, outputs_u32) as usize));
-                let words = words.collect();
-                (Taps { width: outputs, per_unit: 1, words, shift: 0 }, Kind::Bus)
+                Taps { width: outputs, per_unit: 1, words: words.collect(), shift: 0 }.into()
             }
-            Route::ScalarBroadcast => {
+            Self::ScalarBroadcast => {
                 let taps = Taps { width: 1, per_unit: 1, words: vec![0; units], shift: 0 };
-                (taps, Kind::Broadcast { shift: log2_ceil(outputs as u64) })
+                let source = WordSource::Sum { outputs, shift: log2_ceil(outputs as u64) };
+                Delivery { source, taps }
             }
-            Route::RandomDense { shift } => {
+            Self::RandomDense { shift } => {
                 // drawn unit by unit
                 let mut signs = vec![0; units * outputs];
                 for (at, word) in place.words().take(units * outputs).enumerate() {
@@ -112,82 +68,11 @@ impl Delivery {
                     signs[at % outputs * units + at / outputs] = sign;
                 }
                 let shift = shift.unwrap_or(log2_ceil(outputs as u64).div_ceil(2));
-                (Taps::identity(units), Kind::Dense { signs, shift })
-            }
-        };
-        Self { taps, kind, bits }
-    }
-
-    /// The tile's part.
-    #[must_use]
-    pub(crate) const fn taps(&self) -> &Taps {
-        &self.taps
-    }
-
-    /// Whether the words are those of the output, as they are: one bus brings them to all such layers at once.
-    #[must_use]
-    pub(crate) const fn is_common(&self) -> bool {
-        matches!(self.kind, Kind::Bus)
-    }
-
-    /// The words put on this layer's bus for output words `[sample][output]`; how many saturated and how many
-    /// products the error unit computed.
-    #[must_use]
-    pub(crate) fn words(&self, output: &[i16], outputs: usize) -> (Vec<i16>, u64, u64) {
-        let mut saturated = 0;
-        let mut bounded = |sum: i64, shift: u32| {
-            let (word, changed) = sat(rsh(sum, shift), self.bits.get());
-            saturated += u64::from(changed);
-            word as i16
-        };
-        match &self.kind {
-            Kind::Bus | Kind::Own => (output.to_vec(), 0, 0),
-            Kind::Broadcast { shift } => {
-                let sums =
-                    output.chunks_exact(outputs).map(|w| w.iter().map(|&w| i64::from(w)).sum());
-                (sums.map(|sum| bounded(sum, *shift)).collect(), saturated, 0)
-            }
-            Kind::Dense { signs, shift } => {
-                let units = signs.len() / outputs;
-                let mut words = Vec::with_capacity(output.len() / outputs * units);
-                let (mut sums, mut part) = (vec![0i32; units], vec![0i16; units]);
-                for sample in output.chunks_exact(outputs) {
-                    sums.fill(0);
-                    let parts = sample.chunks(DENSE_PART).zip(signs.chunks(DENSE_PART * units));
-                    for (sample, signs) in parts {
-                        // one output after the other, so that units lie side by side
-                        part.fill(0);
-                        for (&word, signs) in sample.iter().zip(signs.chunks_exact(units)) {
-                            part.iter_mut().zip(signs).for_each(|(sum, sign)| *sum += word * sign);
-                        }
-                        sums.iter_mut().zip(&part).for_each(|(sum, &p)| *sum += i32::from(p));
-                    }
-                    let from = words.len();
-                    words.resize(from + units, 0);
-                    saturated += bounded_all(&sums, *shift, self.bits, &mut words[from..]);
-                }
-                let products = (words.len() * outputs) as u64;
-                (words, saturated, products)
+                let source = WordSource::Signed { signs, shift };
+                Delivery { source, taps: Taps::identity(units) }
             }
         }
     }
-}
-
-/// `sat( rsh(sum, shift) )` of sums below 2^30, side by side; how many saturated.
-fn bounded_all(sums: &[i32], shift: u32, bits: ErrorBits, words: &mut [i16]) -> u64 {
-    let rail = rail(bits.get()) as i32;
-    // at 31 such sums are all rounded off
-    let shift = shift.min(31);
-    let half = if shift == 0 { 0 } else { 1 };
-    let before = shift.saturating_sub(1);
-    let mut saturated = 0u32;
-    for (word, &sum) in words.iter_mut().zip(sums) {
-        let rounded = (sum >> shift) + (sum >> before & half);
-        let bounded = rounded.clamp(-rail, rail);
-        saturated += u32::from(bounded != rounded);
-        *word = bounded as i16;
-    }
-    u64::from(saturated)
 }
 
 /// Words unit `unit` adds.
@@ -208,10 +93,6 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    fn bits() -> ErrorBits {
-        ErrorBits::new(8).unwrap()
-    }
-
     #[test]
     fn modulo_taps_follow_the_formula() {
         assert_eq!([0, 9, 10, 13].map(|j| modulo(j, 10, 1)[0]), [0, 9, 0, 3]);
@@ -222,60 +103,36 @@ mod tests {
 
     #[test]
     fn a_broadcast_is_one_word_and_a_dense_route_one_a_unit() {
-        let all = Delivery::hidden(Route::ScalarBroadcast, 7, 3, bits(), 1, 0);
-        assert_eq!(all.words(&[4, 4, 3, -1, 0, 0], 3), (vec![3, 0], 0, 0));
-        assert_eq!(all.taps().width, 1);
-        let dense = Delivery::hidden(Route::RandomDense { shift: Some(0) }, 7, 3, bits(), 1, 0);
-        let (words, saturated, products) = dense.words(&[100, 100, 100], 3);
-        assert!(words.iter().all(|w| [127, 100, -100, -127].contains(w)));
-        assert!(saturated > 0 && (words.len(), products) == (7, 21));
+        let all = Route::ScalarBroadcast.delivery(7, 3, 1, 0);
+        assert_eq!(all.source, WordSource::Sum { outputs: 3, shift: 2 });
+        assert_eq!((all.taps.width, all.taps.words), (1, vec![0; 7]));
+        let dense = Route::RandomDense { shift: None }.delivery(7, 10, 1, 0);
+        assert_eq!((dense.output_words(), dense.taps.width), (10, 7));
+        let WordSource::Signed { shift, .. } = dense.source else { panic!("signs") };
+        assert_eq!(shift, 2);
     }
 
     #[test]
     fn a_dense_route_negates_where_the_top_bit_of_its_word_is_set() {
-        let route = Route::RandomDense { shift: Some(0) };
-        let dense = Delivery::hidden(route, 20, 3, bits(), 9, 2);
+        let dense = Route::RandomDense { shift: Some(0) }.delivery(20, 3, 9, 2);
+        let WordSource::Signed { signs, .. } = dense.source else { panic!("signs") };
         let place = Place { layer: 2, ..Place::global(9, Site::Route, 0) };
-        let signs: Vec<i16> =
+        let drawn: Vec<i16> =
             place.words().take(60).map(|word| if word < 1 << 31 { 1 } else { -1 }).collect();
-        for output in 0..3 {
-            let mut one = [0; 3];
-            one[output] = 1;
-            let column: Vec<i16> = signs.iter().skip(output).step_by(3).copied().collect();
-            assert_eq!(dense.words(&one, 3).0, column);
+        for (output, signs) in signs.chunks(20).enumerate() {
+            assert!(signs.iter().eq(drawn.iter().skip(output).step_by(3)));
         }
     }
 
     #[test]
     fn random_routes_depend_on_seed_and_layer() {
-        let taps = |seed, layer| {
-            let made = Delivery::hidden(Route::RandomSparse, 200, 10, bits(), seed, layer);
-            made.taps().words.clone()
-        };
+        let taps = |seed, layer| Route::RandomSparse.delivery(200, 10, seed, layer).taps.words;
         assert_eq!(taps(1, 0), taps(1, 0));
         assert!(taps(1, 0) != taps(2, 0) && taps(1, 0) != taps(1, 1));
         assert!((0..10).all(|c| taps(1, 0).contains(&c)));
     }
 
     proptest! {
-        #[test]
-        fn sums_side_by_side_are_bounded_as_one(
-            sums in proptest::collection::vec(-(1i32 << 30) + 1..1 << 30, 1..40),
-            small in proptest::collection::vec(-2000i32..2000, 1..40),
-            shift in 0u32..70,
-            bits in 2i64..=9,
-        ) {
-            let bits = ErrorBits::new(bits).unwrap();
-            for sums in [sums, small] {
-                let mut words = vec![0; sums.len()];
-                let saturated = bounded_all(&sums, shift, bits, &mut words);
-                let want = sums.iter().map(|&sum| sat(rsh(i64::from(sum), shift), bits.get()));
-                let want: Vec<_> = want.collect();
-                prop_assert_eq!(saturated, want.iter().map(|w| u64::from(w.1)).sum::<u64>());
-                prop_assert!(words.iter().zip(&want).all(|(&word, w)| i64::from(word) == w.0));
-            }
-        }
-
         #[test]
         fn taps_of_a_unit_never_collide(unit in 0usize..5000, outputs in 1usize..40, taps in 1usize..=4) {
             let taps = taps.min(outputs);

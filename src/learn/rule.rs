@@ -7,15 +7,6 @@ use std::ops::Range;
 mod bp;
 mod ed;
 
-/// Where the words of an `ERR` come from.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Words {
-    /// The output error, by the layer's route.
-    Routed,
-    /// The transposed read of the layer above.
-    Above,
-}
-
 /// One step of an update, before numbers are put in.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Step {
@@ -25,8 +16,6 @@ pub enum Step {
         layer: usize,
         /// Which samples.
         samples: Range<usize>,
-        /// Whose words.
-        words: Words,
     },
     /// `FWD(columns)` of a layer.
     ReadColumns {
@@ -115,8 +104,8 @@ mod tests {
             assert_eq!(
                 steps,
                 [
-                    Step::Error { layer: 0, samples: 0..5, words: Words::Routed },
-                    Step::Error { layer: 1, samples: 0..5, words: Words::Routed },
+                    Step::Error { layer: 0, samples: 0..5 },
+                    Step::Error { layer: 1, samples: 0..5 },
                     Step::Update { layer: 0, write: Write::Add, samples: 0..5 },
                     Step::Update { layer: 1, write: Write::Add, samples: 0..5 },
                     Step::Update { layer: 0, write: Write::Program, samples: 0..0 },
@@ -138,9 +127,9 @@ mod tests {
         assert_eq!(
             steps[..3],
             [
-                Step::Error { layer: 1, samples: 0..2, words: Words::Routed },
+                Step::Error { layer: 1, samples: 0..2 },
                 Step::ReadColumns { layer: 1 },
-                Step::Error { layer: 0, samples: 0..2, words: Words::Above },
+                Step::Error { layer: 0, samples: 0..2 },
             ]
         );
         assert_eq!(

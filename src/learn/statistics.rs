@@ -150,7 +150,7 @@ mod tests {
     use crate::chip::crossbar::kernel::Backend;
     use crate::chip::crossbar::layout::Layout;
     use crate::chip::hardware::{FloorKind, Window};
-    use crate::chip::layer::{Layer, LayerSpec, Taps};
+    use crate::chip::layer::{DrivenBy, Layer, LayerSpec, Taps};
     use crate::chip::population::Wiring;
     use crate::num::fixed::LevelBits;
     use crate::num::tables::Activation;
@@ -223,6 +223,7 @@ mod tests {
             inputs: 2,
             units: 2,
             wiring,
+            driven_by: if wiring == Wiring::Dual { DrivenBy::Shared } else { DrivenBy::Streams },
             activation: Activation::Relu,
             weight_max_log2: 0,
             gain_64ths: [64, 64],

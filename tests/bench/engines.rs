@@ -21,7 +21,7 @@ use dalean::chip::engine::{Engine, Operation, Phase, Side, Write};
 use dalean::chip::hardware::{
     Adc, DitherBits, DitherPattern, FloorKind, Hardware, PulseCode, Timing, Window, WriteScheme,
 };
-use dalean::chip::layer::{Layer, LayerSpec, Taps};
+use dalean::chip::layer::{DrivenBy, Layer, LayerSpec, Taps};
 use dalean::chip::population::Wiring;
 use dalean::num::draw::{Place, Site};
 use dalean::num::fixed::*;
@@ -73,6 +73,7 @@ fn layer(hardware: &Hardware) -> Layer {
         inputs: SIDE,
         units: SIDE,
         wiring: Wiring::DualReadout,
+        driven_by: DrivenBy::Shared,
         activation: Activation::Identity,
         weight_max_log2: 2,
         gain_64ths: [64, 64],
@@ -254,7 +255,7 @@ fn main() {
     let mut rtl = Driver::new(&fast);
     let elapsed = |engine: &Engine| {
         let cycles = engine.ledger(Phase::Training).cycles().unwrap();
-        cycles.elapsed() - cycles.stage(dalean::chip::ledger::Stage::Load)
+        cycles.elapsed() - cycles.interval(dalean::chip::ledger::Interval::Load)
     };
 
     // the same levels after the same number of cycles

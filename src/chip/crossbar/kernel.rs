@@ -18,7 +18,7 @@
 use std::marker::PhantomData;
 use std::ops::Range;
 
-use super::layout::{BLOCK_CELLS, BLOCK_ROWS, HALF_COLUMNS, Layout, PANEL_COLUMNS};
+use super::layout::{BLOCK_CELLS, BLOCK_ROWS, HALF_CELLS, HALF_COLUMNS, Layout, PANEL_COLUMNS};
 use crate::num::fixed::ErrorBits;
 
 #[cfg(target_arch = "x86_64")]
@@ -32,11 +32,16 @@ mod chacha;
 mod conv;
 mod data;
 mod lanes;
+mod levels;
 #[cfg(target_arch = "aarch64")]
 mod neon;
+mod ops;
 #[cfg(target_arch = "x86_64")]
 mod peak;
+mod pulses;
+mod requests;
 mod scalar;
+mod sums;
 mod team;
 #[cfg(test)]
 mod tests;
@@ -45,6 +50,7 @@ mod tests;
 use self::data::{OneProduct, Packed};
 #[cfg(target_arch = "aarch64")]
 pub use self::neon::Neon;
+use self::ops::Ops;
 #[cfg(target_arch = "x86_64")]
 pub use self::{amx::Amx, avx2::Avx2, avx512::Avx512};
 pub use self::{
@@ -52,226 +58,54 @@ pub use self::{
     chacha::Draws,
     conv::{ConvPlan, ConvScratch, ConvShape, ConvTurned, Image, Pixels},
     data::{
-        Banks, Cells, Conversion, Dither, Drives, Extremes, Greatest, Half, LookUp, Peaks, Pulsed,
-        Scratch, Single, TOGETHER, Write, WriteCounts, is_driven,
+        Banks, Cells, Conversion, Dither, Drives, Ends, Extremes, Greatest, Half, LookUp, Peaks,
+        Pulsed, Scratch, Single, TOGETHER, Write, WriteCounts, is_driven,
     },
+    sums::Sums,
     team::Team,
 };
 
-/// What a back end does. What it does not say itself is composed of what it says, or is the law.
-trait Loops: Copy {
-    fn read(self, cells: &[u8], drives: Drives<'_>, samples: Range<usize>, out: &mut [i32]);
-
-    fn read_converted(
-        self,
-        banks: &Banks<'_>,
-        samples: Range<usize>,
-        scratch: &mut Scratch,
-        codes: &mut [i16],
-    ) -> [u64; 2] {
-        apart(self, banks, samples, scratch, codes)
-    }
-
-    fn convert(
-        self,
-        currents: [&[i32]; 2],
-        conversion: Conversion,
-        live: usize,
-        codes: &mut [i16],
-    ) -> [u64; 2] {
-        scalar::convert(currents, conversion, live, codes)
-    }
-
-    fn look_up(
-        self,
-        accumulators: &[i32],
-        table: &LookUp,
-        live: usize,
-        values: &mut [u8],
-        derivatives: &mut [u8],
-    ) -> u64 {
-        scalar::look_up(accumulators, table, live, values, derivatives)
-    }
-
-    fn difference(self, currents: [&[i32]; 2], sums: &mut [i32]) {
-        scalar::difference(currents, sums);
-    }
-
-    fn latch(self, words: &[i16], width: usize, taps: &[u16], errors: &mut [i16]) {
-        scalar::latch(words, width, taps, errors);
-    }
-
-    fn gate(
-        self,
-        errors: &[i16],
-        derivatives: &[u8],
-        negate: bool,
-        bits: ErrorBits,
-        stride: usize,
-        gates: &mut [i8],
-    ) -> u64 {
-        scalar::gate(errors, derivatives, negate, bits, stride, gates)
-    }
-
-    fn turn(self, codes: &[u8], stride: usize, turned: &mut [u8]) {
-        scalar::turn(codes, stride, turned);
-    }
-
-    fn read_columns(self, plane: &[u8], layout: Layout, gates: Drives<'_>, out: &mut [i32]) {
-        scalar::read_columns(plane, layout, gates, out);
-    }
-
-    /// Rows of positions put together, where a back end does not read an image as it lies.
-    fn read_conv(
-        self,
-        cells: &[u8],
-        image: Image<'_>,
-        (blocks, positions): (Range<usize>, Range<usize>),
-        scratch: &mut ConvScratch,
-        out: &mut [i32],
-    ) {
-        conv::assembled(self, cells, image, (blocks, positions), scratch, out);
-    }
-
-    /// As many samples as gates say, of rows that lie `stride` apart.
-    fn accumulate(self, turned: &[u8], stride: usize, gates: &[i8], sums: &mut Half<i32>);
-
-    /// Both at once, where that is faster than one after the other.
-    fn accumulate_drawn(
-        self,
-        (turned, stride): (&[u8], usize),
-        gates: &[i8],
-        sums: &mut Half<i32>,
-        (draws, (column, block)): (&Draws, (usize, usize)),
-        words: &mut Half<u8>,
-        _soon: &Half<u8>,
-    ) {
-        self.accumulate(turned, stride, gates, sums);
-        self.dither(draws, column, block, words);
-    }
-
-    fn loud(self, sums: &Half<i32>, write: &Write, bits: u32) -> u16 {
-        scalar::loud(sums, write, bits)
-    }
-
-    fn dither(self, draws: &Draws, column: usize, block: usize, words: &mut Half<u8>) {
-        scalar::dither(draws, column, block, words);
-    }
-
-    fn dither_words(self, draws: &Draws, column: usize, block: usize, words: &mut Half<u16>) {
-        scalar::dither_words(draws, column, block, words);
-    }
-
-    fn program(
-        self,
-        cells: Cells<'_>,
-        sums: &Half<i32>,
-        write: &Write,
-        dither: Dither<'_>,
-    ) -> WriteCounts {
-        scalar::program(cells, sums, write, dither)
-    }
-
-    fn single(self, _: Single<'_>) -> Option<WriteCounts> {
-        None
-    }
-
-    fn peaks(self, extremes: &Extremes) -> Peaks {
-        scalar::peaks(extremes)
-    }
-
-    fn peak(self, _rounds: usize) -> u64 {
-        0
-    }
-}
-
-/// Reads and converts one tile after the other.
-fn apart<L: Loops>(
-    loops: L,
-    banks: &Banks<'_>,
-    samples: Range<usize>,
-    scratch: &mut Scratch,
-    codes: &mut [i16],
-) -> [u64; 2] {
-    let mut saturated = [0; 2];
-    let blocks = banks.drives[0].blocks();
-    let groups = samples.clone().step_by(TOGETHER);
-    for (start, codes) in groups.zip(codes.chunks_mut(Scratch::SUMS)) {
-        let group = start..(start + TOGETHER).min(samples.end);
-        for first in (0..blocks).step_by(banks.tile_blocks) {
-            let tile = first..(first + banks.tile_blocks).min(blocks);
-            for (bank, out) in scratch.currents.iter_mut().enumerate() {
-                let cells = &banks.cells[bank][tile.start * BLOCK_CELLS..tile.end * BLOCK_CELLS];
-                let drives = banks.drives[bank].of_blocks(tile.clone());
-                loops.read(cells, drives, group.clone(), &mut out[..codes.len()]);
-            }
-            let [e, i] = [0, 1].map(|bank| &scratch.currents[bank][..codes.len()]);
-            let counts = loops.convert([e, i], banks.conversion, banks.live, codes);
-            saturated.iter_mut().zip(counts).for_each(|(sum, count)| *sum += count);
-        }
-    }
-    saturated
-}
+/// Pulses of a half block between the steps of a write.
+#[repr(align(64))]
+struct Pulses(Half<i8>);
 
 /// A back end at work on this thread.
 #[derive(Debug)]
 pub struct Kernel {
-    loops: Ready,
+    ops: &'static Ops,
+    /// Tiles keep their shape as long as this lives.
+    #[cfg(target_arch = "x86_64")]
+    _tiles: Option<amx::Tiles>,
     /// What is made ready belongs to this thread.
     _here: PhantomData<*const ()>,
 }
 
-#[derive(Debug)]
-enum Ready {
-    Scalar,
-    #[cfg(target_arch = "aarch64")]
-    Neon(Neon),
-    #[cfg(target_arch = "x86_64")]
-    Avx2(Avx2),
-    #[cfg(target_arch = "x86_64")]
-    Avx512(Avx512),
-    #[cfg(target_arch = "x86_64")]
-    Amx(amx::Tiles),
+/// Calls an operation of whichever back end is at work.
+macro_rules! call {
+    ($kernel:expr, $operation:ident($($argument:expr),*)) => {{
+        let operation = $kernel.ops.$operation;
+        // SAFETY: `Kernel::start` has the table from a token, which exists only where processor and system have all that
+        // the functions of this table are compiled for. Tiles have their shape on this thread as long as the kernel
+        // lives, which cannot leave it.
+        unsafe { operation($($argument),*) }
+    }};
 }
 
-/// Calls a method of whichever back end it is.
-macro_rules! with {
-    ($kernel:expr, $loops:ident => $call:expr) => {
-        match &$kernel.loops {
-            Ready::Scalar => {
-                let $loops = scalar::Scalar;
-                $call
-            }
-            #[cfg(target_arch = "aarch64")]
-            &Ready::Neon($loops) => $call,
-            #[cfg(target_arch = "x86_64")]
-            &Ready::Avx2($loops) => $call,
-            #[cfg(target_arch = "x86_64")]
-            &Ready::Avx512($loops) => $call,
-            #[cfg(target_arch = "x86_64")]
-            Ready::Amx($loops) => $call,
-        }
-    };
-}
-
-use with;
+use call;
 
 impl Kernel {
     /// Makes a back end ready on this thread, until the value is dropped.
     #[must_use]
     pub fn start(backend: Backend) -> Self {
-        let loops = match backend {
-            Backend::Scalar => Ready::Scalar,
-            #[cfg(target_arch = "aarch64")]
-            Backend::Neon(neon) => Ready::Neon(neon),
+        Self {
+            ops: backend.ops(),
             #[cfg(target_arch = "x86_64")]
-            Backend::Avx2(avx2) => Ready::Avx2(avx2),
-            #[cfg(target_arch = "x86_64")]
-            Backend::Avx512(avx512) => Ready::Avx512(avx512),
-            #[cfg(target_arch = "x86_64")]
-            Backend::Amx(amx) => Ready::Amx(amx.configure()),
-        };
-        Self { loops, _here: PhantomData }
+            _tiles: match backend {
+                Backend::Amx(amx) => Some(amx.configure()),
+                _ => None,
+            },
+            _here: PhantomData,
+        }
     }
 
     /// Reads one panel for some samples: `out[b][c] = sum of level[r][c] * drives[b][r]`, for the 32 columns of
@@ -284,7 +118,7 @@ impl Kernel {
         assert!(samples.end <= drives.samples(), "the samples are there");
         assert_eq!(samples.len() * PANEL_COLUMNS, out.len(), "32 sums a sample");
         if !out.is_empty() {
-            with!(self, loops => loops.read(cells, drives, samples, out));
+            call!(self, read(cells, drives, samples, out));
         }
     }
 
@@ -313,7 +147,46 @@ impl Kernel {
         if codes.is_empty() {
             return [0; 2];
         }
-        with!(self, loops => loops.read_converted(banks, samples, scratch, codes))
+        let whole = samples.len() / TOGETHER * TOGETHER;
+        let (these, rest) = codes.split_at_mut(whole * PANEL_COLUMNS);
+        let middle = samples.start + whole;
+        match call!(self, read_converted(banks, samples.start..middle, scratch, these)) {
+            Some(mut saturated) => {
+                let counts = self.read_apart(banks, middle..samples.end, scratch, rest);
+                saturated.iter_mut().zip(counts).for_each(|(sum, count)| *sum += count);
+                saturated
+            }
+            None => self.read_apart(banks, samples, scratch, codes),
+        }
+    }
+
+    /// Reads and converts one tile after the other.
+    fn read_apart(
+        &self,
+        banks: &Banks<'_>,
+        samples: Range<usize>,
+        scratch: &mut Scratch,
+        codes: &mut [i16],
+    ) -> [u64; 2] {
+        let mut saturated = [0; 2];
+        let blocks = banks.drives[0].blocks();
+        let groups = samples.clone().step_by(TOGETHER);
+        for (start, codes) in groups.zip(codes.chunks_mut(Scratch::SUMS)) {
+            let group = start..(start + TOGETHER).min(samples.end);
+            for first in (0..blocks).step_by(banks.tile_blocks) {
+                let tile = first..(first + banks.tile_blocks).min(blocks);
+                for (bank, out) in scratch.currents.iter_mut().enumerate() {
+                    let cells =
+                        &banks.cells[bank][tile.start * BLOCK_CELLS..tile.end * BLOCK_CELLS];
+                    let drives = banks.drives[bank].of_blocks(tile.clone());
+                    self.read(cells, drives, group.clone(), &mut out[..codes.len()]);
+                }
+                let [e, i] = [0, 1].map(|bank| &scratch.currents[bank][..codes.len()]);
+                let counts = call!(self, convert([e, i], banks.conversion, banks.live, codes));
+                saturated.iter_mut().zip(counts).for_each(|(sum, count)| *sum += count);
+            }
+        }
+        saturated
     }
 
     /// Looks up accumulators (`[sample][32]`, the first `live` of them): `values` and `derivatives` lie
@@ -342,7 +215,7 @@ impl Kernel {
         }
         let least = (samples - 1) * BLOCK_ROWS + PANEL_COLUMNS;
         assert!(values.len() >= least && derivatives.len() >= least, "every unit has its place");
-        with!(self, loops => loops.look_up(accumulators, table, live, values, derivatives))
+        call!(self, look_up(accumulators, table, live, values, derivatives))
     }
 
     /// `sums = E - I`, sum by sum. The plan proves that it fits.
@@ -351,7 +224,7 @@ impl Kernel {
     /// When the sizes do not match.
     pub fn difference(&self, currents: [&[i32]; 2], sums: &mut [i32]) {
         assert!(currents.iter().all(|bank| bank.len() == sums.len()), "both banks have every sum");
-        with!(self, loops => loops.difference(currents, sums));
+        call!(self, difference(currents, sums));
     }
 
     /// Latches one word a unit: `errors[b][j] = words[b][taps[j]]`, `width` words and 64 units a sample; units beyond
@@ -364,7 +237,7 @@ impl Kernel {
         assert_eq!(words.len() / width * BLOCK_ROWS, errors.len(), "64 units a sample");
         assert!(taps.len() <= BLOCK_ROWS, "at most 64 units");
         assert!(taps.iter().all(|&tap| usize::from(tap) < width), "every tap is on the bus");
-        with!(self, loops => loops.latch(words, width, taps, errors));
+        call!(self, latch(words, width, taps, errors));
     }
 
     /// Gates of a block of 64 columns from latched error words and derivatives (both `[sample][64]`), packed for an
@@ -386,7 +259,7 @@ impl Kernel {
         assert!(errors.len().is_multiple_of(BLOCK_ROWS), "64 columns a sample");
         assert!(stride.is_multiple_of(4) && stride * BLOCK_ROWS >= errors.len(), "padded samples");
         assert_eq!(gates.len(), stride * BLOCK_ROWS, "every gate has its place");
-        with!(self, loops => loops.gate(errors, derivatives, negate, bits, stride, gates))
+        call!(self, gate(errors, derivatives, negate, bits, stride, gates))
     }
 
     /// Turns one block of drives (`[sample][64]`) into rows of samples, `[64][stride]`, padded with 0.
@@ -397,7 +270,7 @@ impl Kernel {
         assert!(codes.len().is_multiple_of(BLOCK_ROWS), "64 rows a sample");
         assert!(stride.is_multiple_of(4) && stride * BLOCK_ROWS >= codes.len(), "padded samples");
         assert_eq!(turned.len(), stride * BLOCK_ROWS, "every code has its place");
-        with!(self, loops => loops.turn(codes, stride, turned));
+        call!(self, turn(codes, stride, turned));
     }
 
     /// Reads a whole array from its columns: `out[b][r] = sum of level[r][c] * gates[b][c]` over all columns.
@@ -411,7 +284,7 @@ impl Kernel {
         assert_eq!(plane.len(), layout.cells_padded(), "one byte a cell");
         assert_eq!(gates.blocks(), layout.columns.div_ceil(BLOCK_ROWS), "one gate a column");
         assert_eq!(out.len(), gates.samples() * layout.rows_padded(), "one sum a row");
-        with!(self, loops => loops.read_columns(plane, layout, gates, out));
+        call!(self, read_columns(plane, layout, gates, out));
     }
 
     /// Sums of a half block: `sums[r][c] = sum over b of turned[r][b] * gates[b][c]`. `turned` holds 64 rows of
@@ -423,7 +296,7 @@ impl Kernel {
         assert!(stride > 0 && stride.is_multiple_of(4), "samples are padded to words of four");
         assert_eq!(turned.len(), BLOCK_ROWS * stride, "64 rows");
         assert_eq!(gates.len(), HALF_COLUMNS * stride, "16 columns");
-        with!(self, loops => loops.accumulate(turned, stride, gates, sums));
+        call!(self, accumulate(turned, stride, gates, sums));
     }
 
     /// [`Kernel::accumulate`] and [`Kernel::dither`] of the half block at `(column, block)`, at once where that
@@ -443,41 +316,67 @@ impl Kernel {
         assert!(stride > 0 && stride.is_multiple_of(4), "samples are padded to words of four");
         assert_eq!(turned.len(), BLOCK_ROWS * stride, "64 rows");
         assert_eq!(gates.len(), HALF_COLUMNS * stride, "16 columns");
-        let turned = (turned, stride);
-        with!(self, loops => loops.accumulate_drawn(turned, gates, sums, from, words, soon));
+        let both = (turned, stride);
+        if !call!(self, accumulate_drawn(both, gates, sums, from, words, soon)) {
+            let (draws, (column, block)) = from;
+            call!(self, accumulate(turned, stride, gates, sums));
+            call!(self, dither(draws, column, block, words));
+        }
     }
 
     /// Groups of four rows, a bit each, with a sum that does not round to 0 whatever its dither word of `bits` bits. In
     /// all others nothing is drawn, nothing moves and nothing is counted.
     #[must_use]
-    pub fn loud(&self, sums: &Half<i32>, write: &Write, bits: u32) -> u16 {
-        with!(self, loops => loops.loud(sums, write, bits))
+    pub fn loud<'a>(&self, sums: impl Into<Sums<'a>>, write: &Write, bits: u32) -> u16 {
+        call!(self, loud(sums.into(), write, bits))
     }
 
     /// The 8-bit dither words of a half block: columns `column .. column + 16`, rows `64 * block ..`, in the order of
     /// levels.
     pub fn dither(&self, draws: &Draws, column: usize, block: usize, words: &mut Half<u8>) {
-        with!(self, loops => loops.dither(draws, column, block, words));
+        call!(self, dither(draws, column, block, words));
     }
 
     /// The 16-bit dither words of a half block, as [`Kernel::dither`] gives 8-bit words.
     pub fn dither_words(&self, draws: &Draws, column: usize, block: usize, words: &mut Half<u16>) {
-        with!(self, loops => loops.dither_words(draws, column, block, words));
+        call!(self, dither_words(draws, column, block, words));
     }
 
-    /// Rounds, bounds and programs a half block.
+    /// Rounds, bounds and programs a half block: requests become pulses, and pulses levels.
     ///
     /// # Panics
-    /// When the window is empty.
-    pub fn program(
+    /// When the window is empty, numbers lie outside the ranges of [`Write`], or a remainder has no bits.
+    pub fn program<'a>(
         &self,
-        cells: Cells<'_>,
-        sums: &Half<i32>,
+        mut cells: Cells<'_>,
+        sums: impl Into<Sums<'a>>,
         write: &Write,
         dither: Dither<'_>,
     ) -> WriteCounts {
         assert!(write.floor <= write.ceiling, "the window is not empty");
-        with!(self, loops => loops.program(cells, sums, write, dither))
+        assert!(write.shift <= 31 && (1..=15).contains(&write.mantissa), "products fit 32 bits");
+        assert!((1..=127).contains(&write.increment_max), "pulses fit a byte");
+        assert!(write.residual_bits <= 15, "a remainder fits 16 bits");
+        assert!(cells.residual.is_some() == (write.residual_bits > 0), "a remainder has bits");
+        let sums = sums.into();
+        if let Sums::Narrow(sums) = sums
+            && let Some(counts) = call!(self, fused(&mut cells, sums, write, dither))
+        {
+            return counts;
+        }
+        let mut pulses = Pulses([0; HALF_CELLS]);
+        let counts = call!(self, pulses(sums, write, dither, &mut cells, &mut pulses.0));
+        let effective = self.levels(cells, &pulses.0, write.ends(), write.groups);
+        WriteCounts { effective, ..counts }
+    }
+
+    /// Programs pulses of some groups of a half block. Returns by how many levels cells moved.
+    ///
+    /// # Panics
+    /// When the window is empty.
+    pub fn levels(&self, mut cells: Cells<'_>, pulses: &Half<i8>, ends: Ends, groups: u16) -> u64 {
+        assert!(ends.floor <= ends.ceiling, "the window is not empty");
+        call!(self, levels(&mut cells, pulses, ends, groups))
     }
 
     /// Writes a strip for one sample, all at once; `None` where a back end does not, and nothing was done.
@@ -494,19 +393,19 @@ impl Kernel {
         assert!(strip.write.floor <= strip.write.ceiling, "the window is not empty");
         let rows = strip.peaks.as_ref().map_or(0, |rows| rows.len().div_ceil(BLOCK_ROWS));
         assert!(rows == 0 || rows == strip.blocks, "peaks of all rows");
-        with!(self, loops => loops.single(strip))
+        call!(self, single(strip))
     }
 
     /// Sizes of the most positive and the most negative pulses of each row.
     #[must_use]
     pub fn peaks(&self, extremes: &Extremes) -> Peaks {
-        with!(self, loops => loops.peaks(extremes))
+        call!(self, peaks(extremes))
     }
 
     /// Multiplies random numbers in registers, and nothing else, for some rounds. Returns the products made: what this
     /// back end's instruction reaches at most, once a caller has timed it. 0 where a back end has no such measure.
     #[must_use]
     pub fn peak(&self, rounds: usize) -> u64 {
-        with!(self, loops => loops.peak(rounds))
+        call!(self, peak(rounds))
     }
 }

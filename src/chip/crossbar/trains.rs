@@ -2,16 +2,14 @@
 //!
 //! ```text
 //! pulses   sign(column) #{ slots in which row and column fire }
-//! level    clamp( level + pulses, floor, ceiling )
 //! ```
 //!
-//! A train is a word with a bit a slot, so that slots of both are a bitwise and. See docs/MODEL.md, 3.9.
+//! Levels take these pulses as they take all others: see `kernel::levels`. A train is a word with a bit a slot, so that slots of both are a bitwise and. See docs/MODEL.md, 3.9.
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
-use bitvec::prelude::*;
-
 use super::Crossbar;
-use super::kernel::WriteCounts;
+use super::kernel::{Backend, Cells, Ends, Half, Kernel, WriteCounts};
+use super::layout::{BLOCK_ROWS, HALF_CELLS, HALF_COLUMNS, in_half};
 
 /// What a column fires, and in which direction it moves cells.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -30,38 +28,44 @@ impl Crossbar {
     pub fn coincide(&mut self, rows: &[u64], columns: &[ColumnTrain]) -> WriteCounts {
         let layout = self.layout;
         assert_eq!((rows.len(), columns.len()), (layout.rows, layout.columns), "a train a line");
+        // nothing is verified and no remainder is kept: that is what makes such a write fast on a chip
+        let [floor, ceiling] = [self.window.floor(), self.window.ceiling()];
+        let ends = Ends { floor, ceiling, residual_bits: 0 };
+        let law = Kernel::start(Backend::Scalar);
         let mut counts = WriteCounts::default();
-        let (floor, ceiling) = (self.window.floor(), self.window.ceiling());
-        for (row, &train) in rows.iter().enumerate().filter(|(_, train)| **train != 0) {
-            for (column, fires) in columns.iter().enumerate() {
-                let pulses = (train & fires.slots).count_ones();
-                if pulses == 0 {
-                    continue;
+        for mut strip in self.strips_mut(layout.panels()) {
+            for (half, columns) in columns.chunks(HALF_COLUMNS).enumerate() {
+                for (block, rows) in rows.chunks(BLOCK_ROWS).enumerate() {
+                    let mut pulses = [0; HALF_CELLS];
+                    let groups = coincidences(rows, columns, &mut pulses, &mut counts);
+                    let cells = Cells { residual: None, ..strip.half(half, block) };
+                    counts.effective += law.levels(cells, &pulses, ends, groups);
                 }
-                let pulses = u16::try_from(pulses).expect("a word has 64 bits");
-                let at = layout.index(row, column);
-                let gone = self.pruned.as_ref().is_some_and(|words| words.view_bits::<Lsb0>()[at]);
-                let before = self.level(row, column);
-                let after = match fires.rises {
-                    _ if gone => before,
-                    true => before.saturating_add(pulses).min(ceiling),
-                    false => before.saturating_sub(pulses).max(floor),
-                };
-                let [low, high] = after.to_le_bytes();
-                self.low[at] = low;
-                if let Some(plane) = &mut self.high {
-                    plane[at] = high;
-                }
-                if let Some(words) = &mut self.pruned
-                    && after == floor
-                {
-                    words.view_bits_mut::<Lsb0>().set(at, true);
-                }
-                counts.requested += 1;
-                counts.attempted += u64::from(pulses);
-                counts.effective += u64::from(after.abs_diff(before));
             }
         }
         counts
     }
+}
+
+/// The pulses of a half block. Returns the groups of four rows that have some, a bit each.
+fn coincidences(
+    rows: &[u64],
+    columns: &[ColumnTrain],
+    pulses: &mut Half<i8>,
+    counts: &mut WriteCounts,
+) -> u16 {
+    let mut groups = 0;
+    for (row, &train) in rows.iter().enumerate().filter(|(_, train)| **train != 0) {
+        for (column, fires) in columns.iter().enumerate() {
+            let slots = (train & fires.slots).count_ones();
+            if slots > 0 {
+                let size = i8::try_from(slots).expect("a word has 64 bits");
+                pulses[in_half(row, column)] = if fires.rises { size } else { -size };
+                groups |= 1 << (row / 4);
+                counts.requested += 1;
+                counts.attempted += u64::from(slots);
+            }
+        }
+    }
+    groups
 }

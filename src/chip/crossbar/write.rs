@@ -10,11 +10,9 @@ use super::StripMut;
 use super::kernel::{Cells, Dither, Draws, Half, Kernel, Single, Write, WriteCounts, is_driven};
 use super::layout::{BLOCK_CELLS, HALF_CELLS, HALF_COLUMNS, PANEL_COLUMNS};
 use super::pulses::{Collect, Collected, Collector, RowPeaks};
+use super::words::Words;
 use crate::chip::hardware::{DitherBits, DitherPattern};
 use crate::num::draw::Place;
-
-/// 64-bit words of pruned bits in a half block.
-const HALF_WORDS: usize = HALF_CELLS / 64;
 
 /// Loud groups of a half block, at least, that let the next [`UNASKED`] be written without asking which of theirs are.
 const LOUD: u32 = 14;
@@ -71,7 +69,7 @@ impl StripMut<'_> {
         let mut sums = Sums([0; HALF_CELLS]);
         let columns = start * PANEL_COLUMNS..end * PANEL_COLUMNS;
         let mut collector = Collector::new(request.collect, self.layout, columns.clone());
-        let mut words = Words::new(draws, columns);
+        let mut words = Words::new(request, draws, columns);
         let live: Vec<_> = gates
             .chunks_exact(HALF_COLUMNS * stride)
             .enumerate()
@@ -115,7 +113,7 @@ impl StripMut<'_> {
                 let dither = if drawn {
                     Dither::Byte(&words.bytes)
                 } else {
-                    words.draw(kernel, request, column, block)
+                    words.draw(kernel, column, block)
                 };
                 counts += kernel.program(cells, &sums.0, &write, dither);
                 collector.take(kernel, (column, block), write.groups);
@@ -168,15 +166,14 @@ impl StripMut<'_> {
         Some(Written { counts, collected })
     }
 
-    fn half(&mut self, half: usize, block: usize) -> Cells<'_> {
+    pub(super) fn half(&mut self, half: usize, block: usize) -> Cells<'_> {
         let panel = half / 2 * self.layout.panel_cells();
         let at = panel + block * BLOCK_CELLS + half % 2 * HALF_CELLS;
-        let pruned = self.pruned.as_deref_mut().map(|bits| &mut bits[at / 64..][..HALF_WORDS]);
         Cells {
             low: half_mut(self.low, at),
             high: self.high.as_deref_mut().map(|plane| half_mut(plane, at)),
             residual: self.residual.as_deref_mut().map(|plane| half_mut(plane, at)),
-            pruned: pruned.map(|bits| bits.try_into().expect("16 words a half block")),
+            pruned: self.pruned.as_deref_mut().map(|plane| half_mut(plane, at)),
             pulses: None,
         }
     }
@@ -188,84 +185,4 @@ struct Sums(Half<i32>);
 
 fn half_mut<T>(plane: &mut [T], at: usize) -> &mut Half<T> {
     (&mut plane[at..at + HALF_CELLS]).try_into().expect("a half block has 1024 cells")
-}
-
-/// Scratch for the dither words of a half block.
-#[repr(align(64))]
-struct Words {
-    bytes: Half<u8>,
-    halves: Half<u16>,
-    draws: Draws,
-    /// Columns of the strip.
-    columns: Range<usize>,
-    /// Separable words of all rows, and of the columns of the strip; made when first drawn.
-    down: Vec<u16>,
-    across: Vec<u16>,
-}
-
-impl Words {
-    fn new(draws: Draws, columns: Range<usize>) -> Self {
-        let (bytes, halves) = ([0; HALF_CELLS], [0; HALF_CELLS]);
-        Self { bytes, halves, draws, columns, down: vec![], across: vec![] }
-    }
-
-    fn draw(
-        &mut self,
-        kernel: &Kernel,
-        request: &WriteRequest<'_>,
-        column: usize,
-        block: usize,
-    ) -> Dither<'_> {
-        let place = request.place;
-        match (request.dither_bits, request.dither_pattern) {
-            (DitherBits::Zero, _) => return Dither::Nearest,
-            (DitherBits::Eight, DitherPattern::PerCell) => {
-                kernel.dither(&self.draws, column, block, &mut self.bytes);
-            }
-            (DitherBits::Sixteen, DitherPattern::PerCell) => {
-                kernel.dither_words(&self.draws, column, block, &mut self.halves);
-            }
-            (bits, DitherPattern::Separable) => {
-                // numbered as one column each: rows at sub 1, columns at sub 2; all rows once, columns once a strip
-                if self.down.is_empty() {
-                    let blocks = self.draws.rows().div_ceil(64);
-                    self.down = separable_words(&Place { sub: 1, ..place }, bits, 0, blocks * 64);
-                    let (first, count) = (self.columns.start, self.columns.len());
-                    self.across = separable_words(&Place { sub: 2, ..place }, bits, first, count);
-                }
-                let across = &self.across[column - self.columns.start..][..HALF_COLUMNS];
-                let down = self.down[block * 64..].as_chunks::<4>().0;
-                for (group, down) in down.iter().take(16).enumerate() {
-                    let to = group * 64..group * 64 + 64;
-                    let words = self.halves[to.clone()].as_chunks_mut::<4>().0.iter_mut();
-                    for (words, across) in words.zip(across) {
-                        *words = down.map(|down| down ^ across);
-                    }
-                    if bits == DitherBits::Eight {
-                        let words = self.halves[to.clone()].iter();
-                        self.bytes[to].iter_mut().zip(words).for_each(|(b, &w)| *b = w as u8);
-                    }
-                }
-            }
-        }
-        match request.dither_bits {
-            DitherBits::Sixteen => Dither::Word(&self.halves),
-            _ => Dither::Byte(&self.bytes),
-        }
-    }
-}
-
-/// Words `first ..` of an array of one column, 8 or 16 bits wide.
-fn separable_words(place: &Place, bits: DitherBits, first: usize, count: usize) -> Vec<u16> {
-    // an array of one column has its blocks one after the other, however many rows it has
-    let wide = bits == DitherBits::Sixteen;
-    let in_block = if wide { 32 } else { 64 };
-    let mut bytes = vec![0; (first % in_block + count).div_ceil(in_block) * 64];
-    place.fill((first / in_block) as u64, &mut bytes);
-    if wide {
-        let words = bytes[first % in_block * 2..].as_chunks::<2>().0;
-        words.iter().take(count).map(|word| u16::from_le_bytes(*word)).collect()
-    } else {
-        bytes[first % in_block..].iter().take(count).map(|&byte| u16::from(byte)).collect()
-    }
 }

@@ -12,6 +12,9 @@ use crate::chip::crossbar::layout::{BLOCK_ROWS, HALF_COLUMNS};
 use crate::chip::ledger::{During, Event};
 use crate::chip::population::Stream;
 
+/// Bits of an error word in memory.
+pub(super) const WORD_BITS: u64 = 16;
+
 impl Engine {
     pub(super) fn forward_columns(&mut self, layer: usize) {
         let this = &self.layers[layer];
@@ -27,8 +30,10 @@ impl Engine {
             let gates = unpack(&self.registers[layer].gates[Stream::P.index()], samples);
             let gates = Drives::new(&gates, samples);
             let kernel = Kernel::start(self.backend);
-            let [e, i] =
-                wiring.banks(Stream::P).map(|at| this.arrays[at].read_columns(&kernel, gates));
+            let [pair] = wiring.pairs(Stream::P) else {
+                unreachable!("rows that several pairs of a target share are not read backwards")
+            };
+            let [e, i] = pair.map(|at| this.arrays[at].read_columns(&kernel, gates));
             let stride = layout.rows_padded();
             for (e, i) in e.chunks_exact(stride).zip(i.chunks_exact(stride)) {
                 let rows = e.iter().zip(i).take(this.spec.inputs);
@@ -45,15 +50,23 @@ impl Engine {
         let [down, across] = this.tiles(&self.hardware).map(|n| n as u64);
         let (rows, columns) = (this.layout.rows as u64, this.layout.columns as u64);
         let reads = 2 * u64::from(self.hardware.slices()) * self.samples as u64;
-        for at in this.spec.wiring.banks(Stream::P) {
-            let code = self.layers[layer].spec.wiring.pathways()[at].code;
+        let (wiring, inputs) = (this.spec.wiring, this.spec.inputs as u64);
+        let dac_bits = u64::from(self.hardware.drive.dac_bits);
+        for &at in wiring.banks(Stream::P) {
+            let code = wiring.pathways()[at].code;
             let during = During::ForwardColumns;
-            self.charge(layer, code, during, Event::DacSlices, columns * down * reads);
+            let driven = columns * down * reads;
+            self.charge(layer, code, during, Event::DacSlices, driven);
+            self.charge(layer, code, during, Event::SramBits, driven * dac_bits);
             self.charge(layer, code, during, Event::CellReads, rows * columns * reads);
             self.charge(layer, code, during, Event::Holds, rows * across * reads);
             self.charge(layer, code, during, Event::Conversions, rows * across * reads);
             self.charge(layer, code, during, Event::ShiftAdds, rows * across * reads);
         }
+        // what is handed down is kept as error words until it is heard
+        let code = Self::code_of(wiring, Stream::P);
+        let kept = WORD_BITS * inputs * self.samples as u64;
+        self.charge(layer, code, During::ForwardColumns, Event::SramBits, kept);
     }
 }
 

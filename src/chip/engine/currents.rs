@@ -1,4 +1,4 @@
-//! Sums of bank currents, for the balance of activity.
+//! Sums of bank currents by polarity, for the balance of activity.
 //!
 //! ```text
 //! sum over samples and columns of v = sum over rows of (sum of drives) * (sum of levels)
@@ -9,6 +9,7 @@
 
 use super::{Engine, Phase};
 use crate::chip::crossbar::layout::BLOCK_ROWS;
+use crate::chip::population::Polarity;
 
 impl Engine {
     pub(super) fn note_currents(&mut self, layer: usize) {
@@ -20,9 +21,11 @@ impl Engine {
             .get_or_insert_with(|| this.arrays.iter().map(|array| array.row_sums()).collect());
         let wiring = this.spec.wiring;
         for &target in wiring.targets() {
-            for (bank, at) in wiring.banks(target).into_iter().enumerate() {
-                let source = if layer == 0 { 0 } else { wiring.pathways()[at].source.index() };
-                let drives = &self.registers[layer].drives[source];
+            for &at in wiring.banks(target) {
+                let pathway = wiring.pathways()[at];
+                let source = this.spec.drives_of(pathway.source);
+                let bank = usize::from(pathway.polarity == Polarity::Inhibits);
+                let drives = &self.registers[layer].drives[source.index()];
                 let blocks = drives.chunks_exact(self.samples * BLOCK_ROWS);
                 let sum: i64 = blocks
                     .zip(levels[at].chunks(BLOCK_ROWS))

@@ -37,7 +37,7 @@ pub(super) const fn packed_at(stride: usize, sample: usize, unit: usize) -> usiz
 impl Engine {
     pub(super) fn error(&mut self, layer: usize, samples: Range<usize>, words: &[i16]) {
         let this = &self.layers[layer];
-        let (taps, units, wiring) = (&this.taps, this.layout.columns, this.spec.wiring);
+        let (taps, units, wiring) = (&this.delivery.taps, this.layout.columns, this.spec.wiring);
         assert_eq!(words.len(), samples.len() * taps.width, "a word a bus slot and sample");
         // sums are formed when they are programmed: what they are formed of must still be there
         let pending = self.registers[layer].pending;

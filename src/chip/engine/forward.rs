@@ -20,7 +20,7 @@ use crate::chip::crossbar::layout::{BLOCK_ROWS, PANEL_COLUMNS};
 use crate::chip::hardware::{Adc, Hardware, Subtract};
 use crate::chip::ledger::{During, Event};
 use crate::chip::periphery;
-use crate::chip::population::Stream;
+use crate::chip::population::{Pathway, Polarity, Stream};
 
 /// What one block of 64 units of a stream puts out.
 struct Out<'a> {
@@ -29,7 +29,7 @@ struct Out<'a> {
     /// What the units hand on, `[sample][64]`.
     values: &'a mut [u8],
     derivatives: &'a mut [u8],
-    /// Of the last layer.
+    /// Where they are kept.
     accumulators: Option<&'a mut [i64]>,
 }
 
@@ -48,10 +48,7 @@ impl Engine {
             let this = &self.layers[layer];
             let units = this.layout.columns;
             let size = units.div_ceil(BLOCK_ROWS) * samples * BLOCK_ROWS;
-            let drives = |source: Stream| {
-                let at = if layer == 0 { Stream::P } else { source };
-                &own.drives[at.index()][..]
-            };
+            let drives = |source: Stream| &own.drives[this.spec.drives_of(source).index()][..];
             let readers: Vec<_> = wiring
                 .targets()
                 .iter()
@@ -68,16 +65,17 @@ impl Engine {
                     [&mut p[..], &mut n[..]]
                 }
                 None => {
-                    own.accumulators.resize(size, 0);
                     for &target in wiring.targets() {
-                        own.values[target.index()].resize(size, 0);
+                        own.accumulators[target.index()].resize(size, 0);
+                        own.activities[target.index()].resize(size, 0);
                     }
-                    let [p, n] = &mut own.values;
+                    let [p, n] = &mut own.activities;
                     [&mut p[..], &mut n[..]]
                 }
             };
-            let last = layer + 1 == self.layers.len();
-            let mut accumulators = last.then(|| own.accumulators.chunks_mut(samples * BLOCK_ROWS));
+            // empty where a layer only hands on
+            let mut accumulators =
+                own.accumulators.each_mut().map(|kept| kept.chunks_mut(samples * BLOCK_ROWS));
             let mut outs: Vec<Vec<Out<'_>>> = Vec::new();
             let together = blocks_together(&self.hardware);
             let [p, n] = &mut own.derivatives;
@@ -87,10 +85,7 @@ impl Engine {
                 let chunks = values.chunks_mut(samples * BLOCK_ROWS);
                 let chunks = chunks.zip(derivatives.chunks_mut(samples * BLOCK_ROWS));
                 for (block, (values, derivatives)) in chunks.enumerate() {
-                    let accumulators = match target {
-                        Stream::P => accumulators.as_mut().and_then(Iterator::next),
-                        Stream::N => None,
-                    };
+                    let accumulators = accumulators[target.index()].next();
                     let out = Out { target, block, values, derivatives, accumulators };
                     match outs.last_mut() {
                         Some(last) if block % together > 0 => Vec::push(last, out),
@@ -125,9 +120,8 @@ impl Engine {
         let wiring = self.layers[layer].spec.wiring;
         let mut histograms = Vec::new();
         for (&target, seen) in wiring.targets().iter().zip(seen) {
-            for bank in 0..2 {
-                let code = wiring.pathways()[wiring.banks(target)[bank]].code;
-                let saturated = seen.saturated[bank];
+            for (&at, saturated) in wiring.banks(target).iter().zip(seen.saturated) {
+                let code = wiring.pathways()[at].code;
                 self.charge_read(layer, code, Event::SaturatedConversions, saturated);
             }
             let code = Self::code_of(wiring, target);
@@ -153,10 +147,11 @@ impl Engine {
         let at_difference =
             matches!(self.hardware.adc, Adc::Finite { subtract: Subtract::Current, .. });
         for &target in wiring.targets() {
-            for (bank, at) in wiring.banks(target).into_iter().enumerate() {
-                let code = wiring.pathways()[at].code;
+            for &at in wiring.banks(target) {
+                let Pathway { code, polarity, .. } = wiring.pathways()[at];
                 let held = samples * columns * down * slices;
-                let converted = if at_difference && bank == 1 { 0 } else { held };
+                let beside = at_difference && polarity == Polarity::Inhibits;
+                let converted = if beside { 0 } else { held };
                 let driven = samples * rows * across * slices;
                 self.charge_read(layer, code, Event::DacSlices, driven);
                 self.charge_read(layer, code, Event::SramBits, driven * dac_bits);

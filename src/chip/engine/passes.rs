@@ -59,8 +59,8 @@ impl Passes {
                 }
             }
             Some(Pulses::Every(arrays)) => {
-                for &target in layer.spec.wiring.targets() {
-                    let banks = layer.spec.wiring.banks(target).map(|at| &arrays[at][..]);
+                for (target, pair) in layer.spec.wiring.planes() {
+                    let banks = pair.map(|at| &arrays[at][..]);
                     for first in (0..layer.layout.columns).step_by(hardware.tile.columns) {
                         let rows = limited(hardware, timing, layer, banks, first);
                         for rows in rows.chunks(hardware.tile.rows) {

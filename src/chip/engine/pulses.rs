@@ -16,7 +16,7 @@ use crate::chip::population::Stream;
 /// Pulses of one write of a layer.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Pulses {
-    /// Peaks of each column tile, by target and then from the left.
+    /// Peaks of each column of tiles, pair after pair (`Wiring::planes`) and then from the left.
     Peaks(Vec<TilePeaks>),
     /// Every pulse, `[row][column]`, by array.
     Every(Vec<Vec<i8>>),
@@ -39,12 +39,11 @@ impl Pulses {
             Collect::Nothing => None,
             Collect::Peaks { tile_columns } => {
                 let tiles = 0..layout.columns.div_ceil(tile_columns);
-                let targets = layer.spec.wiring.targets().iter();
                 let peaks = |tile| RowPeaks::new(tile, layout.rows);
-                let of = |&target| {
+                let of = |(target, _)| {
                     tiles.clone().map(move |tile| TilePeaks { target, peaks: peaks(tile) })
                 };
-                Some(Self::Peaks(targets.flat_map(of).collect()))
+                Some(Self::Peaks(layer.spec.wiring.planes().flat_map(of).collect()))
             }
             Collect::Pulses => Some(Self::Every(vec![vec![0; layout.cells()]; layer.arrays.len()])),
         }
@@ -55,9 +54,10 @@ impl Pulses {
         let columns = layer.layout.columns;
         match (self, part) {
             (Self::Peaks(all), Collected::Peaks(part)) => {
-                let target = layer.spec.wiring.pathways()[array].target;
-                let of = |all: &TilePeaks| all.target == target;
-                let at = all.iter().position(of).expect("every target has tiles");
+                let mut planes = layer.spec.wiring.planes();
+                let plane = planes.position(|(_, pair)| pair.contains(&array));
+                let across = all.len() / layer.spec.wiring.planes().count();
+                let at = plane.expect("every array is one of a pair") * across;
                 part.iter().for_each(|part| all[at + part.tile].peaks.merge(part));
             }
             (Self::Every(all), Collected::Pulses(part)) => {
@@ -103,9 +103,9 @@ mod tests {
     use crate::chip::crossbar::kernel::Backend;
     use crate::chip::engine::{Operation, Side, Write};
     use crate::chip::hardware::Hardware;
-    use crate::chip::layer::{LayerSpec, Taps};
-    use crate::chip::population::Wiring;
+    use crate::chip::layer::{DrivenBy, LayerSpec, Taps};
 
+    use crate::chip::population::Wiring;
     use crate::num::tables::Activation;
 
     #[test]
@@ -129,6 +129,7 @@ mod tests {
             inputs: 70,
             units: 150,
             wiring: Wiring::Dual,
+            driven_by: DrivenBy::Shared,
             activation: Activation::Identity,
             weight_max_log2: 2,
             gain_64ths: [64, 64],

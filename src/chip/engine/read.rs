@@ -1,11 +1,13 @@
 //! Reading a stream: which rows are read together, with which converters, and in which width.
 //!
 //! ```text
-//! narrow   every sum fits 31 bits by the plan: kernels convert and look up
+//! narrow   every sum fits 31 bits by the plan, and nobody has to see a current: kernels convert and look up
 //! wide     anything else: 64 bits, one conversion after the other
 //! ```
 //!
-//! Both give the same numbers. See docs/MODEL.md, 2.
+//! Both give the same numbers. On the wide way currents exist as numbers in one place, [`Reader::currents`], between
+//! the cells and the converters: what disturbs currents belongs there, and [`Mode::shows_currents`] keeps such reads
+//! off the narrow way. See docs/MODEL.md, 2.
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
 use std::borrow::Cow;
@@ -17,7 +19,7 @@ use crate::chip::crossbar::layout::{BLOCK_ROWS, PANEL_COLUMNS};
 use crate::chip::hardware::{Adc, Hardware, Subtract};
 use crate::chip::layer::{CHUNK_BLOCKS, Layer};
 use crate::chip::periphery::{self, Converter};
-use crate::chip::population::Stream;
+use crate::chip::population::{BANKS_MAX, Stream};
 
 /// Histogram of the least shifts at which conversions stay off the rail, and the greatest current, by slice.
 pub(super) type Histogram = Vec<([u64; 64], i64)>;
@@ -29,6 +31,13 @@ pub(super) enum Mode {
     Hardware,
     /// With ideal converters, remembering what finite ones would need.
     Probe,
+}
+
+impl Mode {
+    /// Whether something looks at currents, or changes them, before they are converted.
+    const fn shows_currents(self) -> bool {
+        matches!(self, Self::Probe)
+    }
 }
 
 /// Rows that are read together with one slice of their drives.
@@ -43,7 +52,8 @@ struct TileRead<'a> {
 /// What reads counted.
 #[derive(Default, Clone)]
 pub(super) struct Seen {
-    pub(super) saturated: [u64; 2],
+    /// By bank.
+    pub(super) saturated: [u64; BANKS_MAX],
     pub(super) look_ups: u64,
     pub(super) histogram: Histogram,
 }
@@ -55,9 +65,7 @@ impl Seen {
     }
 
     pub(super) fn merge(&mut self, other: Self) {
-        for bank in 0..2 {
-            self.saturated[bank] += other.saturated[bank];
-        }
+        self.saturated.iter_mut().zip(other.saturated).for_each(|(sum, more)| *sum += more);
         self.look_ups += other.look_ups;
         if self.histogram.is_empty() {
             self.histogram = other.histogram;
@@ -79,10 +87,15 @@ pub(super) struct Part {
     pub(super) samples: Range<usize>,
 }
 
-/// The two banks of one target stream, and how they are read.
-pub(super) struct Reader<'a> {
+/// Two banks whose currents or codes are subtracted.
+struct Pair<'a> {
     arrays: [&'a Crossbar; 2],
     reads: [Vec<TileRead<'a>>; 2],
+}
+
+/// The banks of one target stream, and how they are read.
+pub(super) struct Reader<'a> {
+    pairs: Vec<Pair<'a>>,
     samples: usize,
     /// Converters by slice; none where they are ideal.
     converters: Option<(Vec<Converter>, Subtract)>,
@@ -104,7 +117,6 @@ impl<'a> Reader<'a> {
         drives: impl Fn(Stream) -> &'a [u8],
     ) -> Self {
         let wiring = layer.spec.wiring;
-        let places = wiring.banks(target);
         let converters = match hardware.adc {
             Adc::Ideal => None,
             Adc::Finite { bits, subtract, .. } => {
@@ -120,18 +132,25 @@ impl<'a> Reader<'a> {
             }
             _ => None,
         };
-        let narrow = probe.is_none() && is_narrow(layer, hardware, converters.as_ref());
+        let pairs = wiring.pairs(target);
+        let fits = is_narrow(layer, hardware, pairs.len(), converters.as_ref());
+        let narrow = fits && !mode.shows_currents();
         let tiles = match (&converters, narrow) {
             (None, _) => Tiles::Whole,
             (Some(_), true) => Tiles::Together,
             (Some(_), false) => Tiles::Apart,
         };
         let code_max = hardware.drive.bits.code_max();
-        let sources = places.map(|at| wiring.pathways()[at].source);
-        Self {
+        let reads = |at: usize| {
+            let drives = drives(wiring.pathways()[at].source);
+            tile_reads(layer, hardware, drives, samples, tiles)
+        };
+        let pair = |places: &[usize; 2]| Pair {
             arrays: places.map(|at| &layer.arrays[at]),
-            reads: sources
-                .map(|source| tile_reads(layer, hardware, drives(source), samples, tiles)),
+            reads: places.map(reads),
+        };
+        Self {
+            pairs: pairs.iter().map(pair).collect(),
             samples,
             converters,
             probe,
@@ -170,40 +189,79 @@ impl<'a> Reader<'a> {
         sums: &mut [i32],
         seen: &mut Seen,
     ) {
-        let Part { panel, live, samples } = part.clone();
-        let [excites, inhibits] = &self.reads;
         if let Some((converters, _)) = &self.converters {
             sums.fill(0);
-            let mut codes = [0; Scratch::SUMS];
-            let codes = &mut codes[..sums.len()];
-            for (at, (e, i)) in excites.iter().zip(inhibits).enumerate() {
-                if at == 0 || excites[at - 1].slice != e.slice {
-                    codes.fill(0);
-                }
-                let adc = converters[e.slice];
-                let banks = Banks {
-                    cells: self.arrays.map(|array| array.low(panel, e.blocks.clone())),
-                    drives: [e, i].map(|read| self.drives(read)),
-                    tile_blocks: e.tile_blocks,
-                    conversion: Conversion {
-                        shift: adc.shift,
-                        max: u16::try_from(adc.max).expect("narrow: at most 15 bits"),
-                    },
-                    live,
-                };
-                let counts = kernel.read_converted(&banks, samples.clone(), scratch, codes);
-                seen.saturated.iter_mut().zip(counts).for_each(|(sum, count)| *sum += count);
-                if excites.get(at + 1).is_none_or(|next| next.slice != e.slice) {
-                    let shift = adc.shift + e.slice as u32 * self.dac_bits;
-                    for (sum, &code) in sums.iter_mut().zip(codes.iter()) {
-                        *sum += i32::from(code) << shift;
-                    }
-                }
+            for (pair, saturated) in self.pairs.iter().zip(seen.saturated.chunks_exact_mut(2)) {
+                let counts = self.add_codes(kernel, pair, converters, part, scratch, sums);
+                saturated.iter_mut().zip(counts).for_each(|(sum, count)| *sum += count);
             }
             return;
         }
+        let (first, others) = self.pairs.split_first().expect("a target has banks");
+        self.difference(kernel, first, part, scratch, sums);
+        for pair in others {
+            let mut more = [0; Scratch::SUMS];
+            let more = &mut more[..sums.len()];
+            self.difference(kernel, pair, part, scratch, more);
+            sums.iter_mut().zip(more).for_each(|(sum, more)| *sum += *more);
+        }
+    }
+
+    /// Adds the converted codes of a pair, each slice with its weight. Conversions that saturated, by bank.
+    fn add_codes(
+        &self,
+        kernel: &Kernel,
+        pair: &Pair<'_>,
+        converters: &[Converter],
+        part: &Part,
+        scratch: &mut Scratch,
+        sums: &mut [i32],
+    ) -> [u64; 2] {
+        let Part { panel, live, samples } = part.clone();
+        let [excites, inhibits] = &pair.reads;
+        let mut saturated = [0; 2];
+        let mut codes = [0; Scratch::SUMS];
+        let codes = &mut codes[..sums.len()];
+        for (at, (e, i)) in excites.iter().zip(inhibits).enumerate() {
+            if at == 0 || excites[at - 1].slice != e.slice {
+                codes.fill(0);
+            }
+            let adc = converters[e.slice];
+            let banks = Banks {
+                cells: pair.arrays.map(|array| array.low(panel, e.blocks.clone())),
+                drives: [e, i].map(|read| self.drives(read)),
+                tile_blocks: e.tile_blocks,
+                conversion: Conversion {
+                    shift: adc.shift,
+                    max: u16::try_from(adc.max).expect("narrow: at most 15 bits"),
+                },
+                live,
+            };
+            let counts = kernel.read_converted(&banks, samples.clone(), scratch, codes);
+            saturated.iter_mut().zip(counts).for_each(|(sum, count)| *sum += count);
+            if excites.get(at + 1).is_none_or(|next| next.slice != e.slice) {
+                let shift = adc.shift + e.slice as u32 * self.dac_bits;
+                for (sum, &code) in sums.iter_mut().zip(codes.iter()) {
+                    *sum += i32::from(code) << shift;
+                }
+            }
+        }
+        saturated
+    }
+
+    /// Exact difference of the currents of a pair.
+    fn difference(
+        &self,
+        kernel: &Kernel,
+        pair: &Pair<'_>,
+        part: &Part,
+        scratch: &mut Scratch,
+        sums: &mut [i32],
+    ) {
+        let Part { panel, samples, .. } = part.clone();
+        let [excites, inhibits] = &pair.reads;
         let ([e], [i]) = (&excites[..], &inhibits[..]) else { unreachable!("read in one piece") };
-        for ((array, read), out) in self.arrays.iter().zip([e, i]).zip(&mut scratch.currents) {
+        for ((array, read), out) in pair.arrays.iter().zip([e, i]).zip(&mut scratch.currents) {
             let out = &mut out[..sums.len()];
             let drives = self.drives(read);
             kernel.read(array.low(panel, read.blocks.clone()), drives, samples.clone(), out);
@@ -224,77 +282,92 @@ impl<'a> Reader<'a> {
         sums: &mut [i64],
         seen: &mut Seen,
     ) {
-        let Part { panel, live, samples } = part.clone();
         sums.fill(0);
         let mut currents = [[0; Scratch::SUMS]; 2];
-        for at in 0..self.reads[0].len() {
-            let slice = self.reads[0][at].slice;
-            for (bank, out) in currents.iter_mut().enumerate() {
-                self.currents(kernel, bank, at, panel, samples.clone(), &mut out[..sums.len()]);
-            }
-            let [e, i] = &currents;
-            let shift = slice as u32 * self.dac_bits;
-            for (at, sum) in sums.iter_mut().enumerate() {
-                if at % PANEL_COLUMNS >= live {
-                    continue;
-                }
-                let (e, i) = (e[at], i[at]);
-                if let Some(adc) = self.probe {
-                    let entry = &mut seen.histogram[slice];
-                    let mut note = |v: i64| {
-                        entry.0[adc.least_shift(v) as usize] += 1;
-                        entry.1 = entry.1.max(v.abs());
-                    };
-                    if adc.min == 0 {
-                        note(e);
-                        note(i);
-                    } else {
-                        note(e - i);
-                    }
-                }
-                match &self.converters {
-                    Some((converters, subtract)) if self.probe.is_none() => {
-                        let adc = converters[slice];
-                        let d = match subtract {
-                            Subtract::Digital => {
-                                let [e, i] = [e, i].map(|v| adc.convert(v));
-                                seen.saturated[0] += u64::from(e.1);
-                                seen.saturated[1] += u64::from(i.1);
-                                e.0 - i.0
-                            }
-                            Subtract::Current => {
-                                let (d, saturated) = adc.convert(e - i);
-                                seen.saturated[0] += u64::from(saturated);
-                                d
-                            }
-                        };
-                        *sum += d << (adc.shift + shift);
-                    }
-                    _ => *sum += (e - i) << shift,
-                }
+        for (at, pair) in self.pairs.iter().enumerate() {
+            for read in 0..pair.reads[0].len() {
+                let [e, i] = &mut currents;
+                let (e, i) = (&mut e[..sums.len()], &mut i[..sums.len()]);
+                self.currents(kernel, pair, read, part, [e, i]);
+                let slice = pair.reads[0][read].slice;
+                self.convert([e, i], at, slice, part.live, sums, seen);
             }
         }
     }
 
-    /// Currents of one bank for one of its reads.
+    /// Currents of both banks of a pair for one of their reads: what the chip has in the columns of a tile while a
+    /// slice is on its rows, before anything is converted.
     fn currents(
         &self,
         kernel: &Kernel,
-        bank: usize,
-        at: usize,
-        panel: usize,
-        samples: Range<usize>,
-        out: &mut [i64],
+        pair: &Pair<'_>,
+        read: usize,
+        part: &Part,
+        [e, i]: [&mut [i64]; 2],
     ) {
-        let (array, read) = (self.arrays[bank], &self.reads[bank][at]);
-        let drives = self.drives(read);
-        let mut sums = [0; Scratch::SUMS];
-        let sums = &mut sums[..out.len()];
-        kernel.read(array.low(panel, read.blocks.clone()), drives, samples.clone(), sums);
-        out.iter_mut().zip(&*sums).for_each(|(out, &sum)| *out = i64::from(sum));
-        if let Some(high) = array.high(panel, read.blocks.clone()) {
-            kernel.read(high, drives, samples, sums);
-            out.iter_mut().zip(sums).for_each(|(out, sum)| *out += i64::from(*sum) << 8);
+        let Part { panel, samples, .. } = part.clone();
+        for ((array, reads), out) in pair.arrays.iter().zip(&pair.reads).zip([e, i]) {
+            let read = &reads[read];
+            let drives = self.drives(read);
+            let mut sums = [0; Scratch::SUMS];
+            let sums = &mut sums[..out.len()];
+            kernel.read(array.low(panel, read.blocks.clone()), drives, samples.clone(), sums);
+            out.iter_mut().zip(&*sums).for_each(|(out, &sum)| *out = i64::from(sum));
+            if let Some(high) = array.high(panel, read.blocks.clone()) {
+                kernel.read(high, drives, samples.clone(), sums);
+                out.iter_mut().zip(sums).for_each(|(out, sum)| *out += i64::from(*sum) << 8);
+            }
+        }
+    }
+
+    /// Converts the currents of pair number `pair` and adds them up with the weight of their slice.
+    fn convert(
+        &self,
+        [e, i]: [&[i64]; 2],
+        pair: usize,
+        slice: usize,
+        live: usize,
+        sums: &mut [i64],
+        seen: &mut Seen,
+    ) {
+        let weight = slice as u32 * self.dac_bits;
+        for (at, (sum, (&e, &i))) in sums.iter_mut().zip(e.iter().zip(i)).enumerate() {
+            if at % PANEL_COLUMNS >= live {
+                continue;
+            }
+            if let Some(adc) = self.probe {
+                let entry = &mut seen.histogram[slice];
+                let mut note = |v: i64| {
+                    entry.0[adc.least_shift(v) as usize] += 1;
+                    entry.1 = entry.1.max(v.abs());
+                };
+                if adc.min == 0 {
+                    note(e);
+                    note(i);
+                } else {
+                    note(e - i);
+                }
+            }
+            match &self.converters {
+                Some((converters, subtract)) if self.probe.is_none() => {
+                    let adc = converters[slice];
+                    let d = match subtract {
+                        Subtract::Digital => {
+                            let [e, i] = [e, i].map(|v| adc.convert(v));
+                            seen.saturated[2 * pair] += u64::from(e.1);
+                            seen.saturated[2 * pair + 1] += u64::from(i.1);
+                            e.0 - i.0
+                        }
+                        Subtract::Current => {
+                            let (d, saturated) = adc.convert(e - i);
+                            seen.saturated[2 * pair] += u64::from(saturated);
+                            d
+                        }
+                    };
+                    *sum += d << (adc.shift + weight);
+                }
+                _ => *sum += (e - i) << weight,
+            }
         }
     }
 }
@@ -311,15 +384,16 @@ const NARROW: u128 = 1 << 30;
 fn is_narrow(
     layer: &Layer,
     hardware: &Hardware,
+    pairs: usize,
     converters: Option<&(Vec<Converter>, Subtract)>,
 ) -> bool {
     let ceiling = u128::from(hardware.cell.window.ceiling());
-    let rows = layer.layout.rows;
+    let (rows, pairs) = (layer.layout.rows, pairs as u128);
     let current = |rows: usize, code: u32| rows as u128 * ceiling * u128::from(code);
     match converters {
         None => {
             layer.layout.blocks() <= CHUNK_BLOCKS
-                && current(rows, hardware.drive.bits.code_max().into()) < NARROW
+                && pairs * current(rows, hardware.drive.bits.code_max().into()) < NARROW
         }
         Some((_, Subtract::Current)) => false,
         Some((converters, Subtract::Digital)) => {
@@ -329,7 +403,7 @@ fn is_narrow(
                 let codes = tiles * adc.max.unsigned_abs() as u128;
                 let total = codes << (adc.shift.min(64) + slice * hardware.drive.dac_bits);
                 let inside = adc.shift <= Conversion::SHIFT_MAX && codes < 1 << 15;
-                (inside && total < NARROW / 8).then_some(total)
+                (inside && pairs * total < NARROW / 8).then_some(total)
             };
             hardware.cell.level_bits.get() <= 8
                 && tiles < 1024

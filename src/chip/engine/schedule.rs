@@ -8,7 +8,8 @@
 //!                sum_l (1 + T_fwd(l)) + (B - 1) max_l (1 + again(l))
 //! rounds     ERR, FWD(columns), UPD(add), UPD(now), sample by sample in the order of the list; in a round a run of
 //!            ERR with the same words is heard by all their layers at once, and a run of UPD on different layers
-//!            goes side by side:  sum_b ( 1 + T_err + ... + 1 + max_l T_upd(l, b) )
+//!            goes side by side:  sum_b ( 1 + T_err + ... + 1 + max_l T_upd(l, b) ); words that the error unit forms for
+//!            a layer are formed before its ERR, while nothing else happens
 //! writes     UPD(write) on different layers side by side:  1 + max_l T_write(l)
 //! loads      LOADW, a row a cycle
 //! ```
@@ -24,7 +25,8 @@ use super::Write;
 use crate::chip::hardware::Hardware;
 use crate::chip::hardware::timing::{Timing, tree_levels};
 use crate::chip::layer::Layer;
-use crate::chip::ledger::{Cycles, During, Part, Stage};
+use crate::chip::ledger::{Cycles, During, Interval, Part};
+use crate::chip::population::Stream;
 
 /// A layer as time sees it.
 #[derive(Debug, Clone, Copy)]
@@ -36,6 +38,8 @@ struct Shape {
     levels: [u64; 2],
     /// Words on the bus.
     words: u64,
+    /// Cycles in which the error unit forms the words of a sample.
+    form: u64,
 }
 
 /// Layers whose commands of one kind run at the same time.
@@ -69,25 +73,25 @@ enum Doing {
 struct Round {
     doing: Doing,
     run: Run,
-    passed: [u64; Stage::ALL.len()],
+    passed: [u64; Interval::ALL.len()],
 }
 
 impl Round {
     const NEW: Self = Self {
         doing: Doing::Nothing,
         run: Run { layers: 0, longest: 0 },
-        passed: [0; Stage::ALL.len()],
+        passed: [0; Interval::ALL.len()],
     };
 
     /// Ends the run in progress.
     fn close(&mut self) {
-        let stage = match self.doing {
+        let interval = match self.doing {
             Doing::Nothing => return,
-            Doing::Hearing => Stage::Error,
-            Doing::Adding => Stage::Accumulate,
-            Doing::Writing => Stage::Program,
+            Doing::Hearing => Interval::Error,
+            Doing::Adding => Interval::Accumulate,
+            Doing::Writing => Interval::Program,
         };
-        self.passed[stage as usize] += self.run.longest;
+        self.passed[interval as usize] += self.run.longest;
         self.doing = Doing::Nothing;
         self.run = Run::default();
     }
@@ -153,11 +157,14 @@ impl Schedule {
     pub(super) fn new(hardware: &Hardware, timing: Timing, layers: &[Layer]) -> Self {
         let shape = |layer: &Layer| {
             let [down, across] = layer.tiles(hardware).map(|n| n as u64);
+            // the pairs of a target are added by the same tree
+            let pairs = layer.spec.wiring.pairs(Stream::P).len() as u64;
             Shape {
                 rows: layer.layout.rows.min(hardware.tile.rows) as u64,
                 columns: layer.layout.columns.min(hardware.tile.columns) as u64,
-                levels: [tree_levels(down), tree_levels(across)],
-                words: layer.taps.width as u64,
+                levels: [tree_levels(down * pairs), tree_levels(across)],
+                words: layer.delivery.taps.width as u64,
+                form: timing.form(layer.delivery.terms() as u64),
             }
         };
         Self {
@@ -171,7 +178,7 @@ impl Schedule {
     /// `LOADW` of one row.
     pub(super) fn load(&mut self, cycles: &mut Cycles, layer: usize) {
         self.settle(cycles);
-        cycles.pass(Stage::Load, self.timing.accept());
+        cycles.pass(Interval::Load, self.timing.accept());
         cycles.occupy(layer, During::LoadWeights, self.timing.accept());
     }
 
@@ -218,7 +225,7 @@ impl Schedule {
     /// The error unit takes the mean over a batch.
     pub(super) fn centre(&mut self, cycles: &mut Cycles, samples: usize, words: usize) {
         self.settle(cycles);
-        cycles.pass(Stage::Centre, self.timing.centre(samples as u64, words as u64));
+        cycles.pass(Interval::Centre, self.timing.centre(samples as u64, words as u64));
     }
 
     /// The rounds in progress, or new ones.
@@ -258,6 +265,10 @@ impl Schedule {
         let (t, shape) = (self.timing, self.shapes[layer]);
         let one = t.accept() + t.error(shape.words, shape.columns);
         for round in self.rounds(cycles, samples) {
+            if shape.form > 0 {
+                round.close();
+                round.passed[Interval::Error as usize] += shape.form;
+            }
             round.join(Doing::Hearing, layer, one, !shared);
         }
         let count = samples.len() as u64;
@@ -279,7 +290,7 @@ impl Schedule {
         let one = t.accept() + t.read(slices, shape.rows, shape.levels[1]);
         for round in self.rounds(cycles, &(0..samples)) {
             round.close();
-            round.passed[Stage::Columns as usize] += one;
+            round.passed[Interval::Columns as usize] += one;
         }
         if let Segment::Rounds { columns, .. } = &mut self.segment {
             *columns = true;
@@ -351,17 +362,17 @@ impl Schedule {
         match std::mem::replace(&mut self.segment, Segment::Nothing) {
             Segment::Nothing => {}
             Segment::Reads { samples, latency, again, .. } => {
-                cycles.pass(Stage::Forward, latency + (samples - 1) * again);
+                cycles.pass(Interval::Forward, latency + (samples - 1) * again);
             }
             Segment::Rounds { rounds, .. } => {
                 for (count, mut round) in rounds {
                     round.close();
-                    for (stage, passed) in Stage::ALL.into_iter().zip(round.passed) {
-                        cycles.pass(stage, passed * count as u64);
+                    for (interval, passed) in Interval::ALL.into_iter().zip(round.passed) {
+                        cycles.pass(interval, passed * count as u64);
                     }
                 }
             }
-            Segment::Writes(run) => cycles.pass(Stage::Program, run.longest),
+            Segment::Writes(run) => cycles.pass(Interval::Program, run.longest),
         }
     }
 }

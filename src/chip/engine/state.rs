@@ -1,4 +1,4 @@
-//! What an engine keeps: its layers and its ledgers. Registers are none of it: a batch begins by loading them.
+//! What an engine keeps: its layers, its error unit and its ledgers. Registers are none of it: a batch begins by loading them.
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
 use super::{Engine, Phase};
@@ -10,6 +10,7 @@ impl State for Engine {
         for layer in self.layers_mut() {
             layer.visit(residual_bits, visitor)?;
         }
+        self.unit.visit(visitor)?;
         for (code, phase) in (0..).zip(Phase::ALL) {
             self.ledger_mut(phase).visit(code, phase.name(), visitor)?;
         }

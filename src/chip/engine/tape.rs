@@ -31,12 +31,10 @@ pub enum Recorded {
         /// Which side.
         side: Side,
     },
-    /// The mean over a batch.
-    Centre {
-        /// Samples of the batch.
-        samples: usize,
-        /// Words of a sample.
-        words: usize,
+    /// The error unit makes output words.
+    Words {
+        /// Errors of the loaded samples, `[sample][output]`.
+        errors: Vec<i32>,
     },
     /// `ERR`.
     Error {
@@ -44,7 +42,7 @@ pub enum Recorded {
         layer: usize,
         /// Which samples.
         samples: Range<usize>,
-        /// `width` words a sample.
+        /// Output words.
         words: Vec<i16>,
         /// Whether they are the words of the `ERR` before.
         shared: bool,
@@ -88,7 +86,7 @@ impl Recorded {
             }
             Self::LoadDrives { codes } => Operation::LoadDrives { codes },
             Self::Forward { layer, side } => Operation::Forward { layer: *layer, side: *side },
-            Self::Centre { .. } => return None,
+            Self::Words { .. } => return None,
             Self::Error { layer, samples, words, shared } => {
                 Operation::Error { layer: *layer, samples: samples.clone(), words, shared: *shared }
             }

@@ -120,13 +120,13 @@ impl Engine {
     ) -> Vec<(usize, WriteCounts)> {
         let wiring = self.layers[layer].spec.wiring;
         let stride = stride_of(samples.len());
-        let sources = if layer == 0 { &[Stream::P][..] } else { wiring.sources() };
+        let sets = self.layers[layer].spec.drive_sets();
         // taken, so that cells can be written while they are read
         let mut kept = std::mem::take(&mut self.registers[layer].turned);
-        let live: Vec<_> = sources
+        let live: Vec<_> = sets
             .iter()
             .zip(&mut kept)
-            .map(|(&source, turned)| self.turn(layer, source, samples, turned))
+            .map(|(&set, turned)| self.turn(layer, set, samples, turned))
             .collect();
         let turned: Vec<Vec<_>> = kept
             .iter()
@@ -156,12 +156,11 @@ impl Engine {
         };
         let (seed, collect) = (self.seed, self.collect);
         let this = &mut self.layers[layer];
-        let index = this.index;
+        let (index, spec) = (this.index, this.spec.clone());
         let request = |array: usize, count: u64| {
             let pathway = wiring.pathways()[array];
-            let source = if layer == 0 { 0 } else { pathway.source.index() };
             WriteRequest {
-                turned: &turned[source],
+                turned: &turned[spec.drives_of(pathway.source).index()],
                 stride,
                 write: kernel::Write { negate: pathway.polarity == Polarity::Inhibits, ..base },
                 dither_bits: write.dither_bits,
@@ -203,19 +202,18 @@ impl Engine {
         written.into_iter().map(|(array, _, written)| (array, written.counts)).collect()
     }
 
-    /// Turns the drives of some samples as an update takes them. Returns which blocks are driven at all.
+    /// Turns a set of drives of some samples as an update takes it. Returns which blocks are driven at all.
     fn turn(
         &mut self,
         layer: usize,
-        source: Stream,
+        set: Stream,
         samples: &Range<usize>,
         turned: &mut AVec<u8>,
     ) -> Vec<bool> {
         let size = BLOCK_ROWS * stride_of(samples.len());
         let blocks = self.layers[layer].layout.blocks();
         turned.resize(blocks * size, 0);
-        let source = if layer == 0 { Stream::P } else { source };
-        let drives = &self.registers[layer].drives[source.index()];
+        let drives = &self.registers[layer].drives[set.index()];
         let drives = drives.chunks_exact(self.samples * BLOCK_ROWS);
         let parts = drives.zip(turned.chunks_exact_mut(size)).enumerate().collect();
         each(&mut self.team, blocks * size * MOVE, blocks, parts, |kernel, (codes, turned)| {

@@ -4,6 +4,7 @@
 //! FWD, samples and holds overlapped   T_A + (NS - 1) max(T_A, conv) + conv + T_tree + NG      conv = S T_C
 //! FWD, not overlapped                 NS (T_A + conv) + T_tree + NG                           NG = ceil(C / U)
 //! until the next FWD                  max(NS period, NG)            period = max(T_A, conv), or T_A + conv
+//! words formed in the error unit       ceil(CE N / U)              of N words, each a sum of CE
 //! ERR                                 CE + H + NG
 //! UPD add                             rows NG
 //! a pulse of a row                    T_W passes, and T_A + conv more when it is verified
@@ -140,6 +141,12 @@ impl Timing {
     #[must_use]
     pub const fn centre(&self, samples: u64, words: u64) -> u64 {
         self.beat * (samples * words + words)
+    }
+
+    /// Cycles of the error unit that adds so many terms to form the words of a layer.
+    #[must_use]
+    pub const fn form(&self, terms: u64) -> u64 {
+        self.beat * terms.div_ceil(self.lanes)
     }
 
     /// Cycles of one pass of a pulse.

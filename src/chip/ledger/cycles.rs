@@ -1,7 +1,7 @@
 //! How long it took: cycles, beside the counts of what happened.
 //!
-//! Three views of the same time. *Elapsed*: by stage of an update, what a clock on the wall would show; stages do not
-//! overlap, so they add up. *Busy*: by layer and operation, from the acceptance of a command until it is done; layers
+//! Three views of the same time. *Elapsed*: by interval of an update, what a clock on the wall would show; intervals
+//! do not overlap, so they add up. *Busy*: by layer and operation, from the acceptance of a command until it is done; layers
 //! work side by side, so these do not add up to elapsed. *Used*: by layer and part of its tiles; used / elapsed is a
 //! part's utilisation. See docs/MODEL.md, 4.5.
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
@@ -11,7 +11,7 @@ use super::During;
 /// What the chip as a whole is doing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 #[repr(usize)]
-pub enum Stage {
+pub enum Interval {
     /// `LOADW`: levels of a fresh network, row by row.
     Load,
     /// `FWD(rows)`, layers in a pipeline.
@@ -28,8 +28,8 @@ pub enum Stage {
     Program,
 }
 
-impl Stage {
-    /// All stages, in order.
+impl Interval {
+    /// All intervals, in order.
     pub const ALL: [Self; 7] = [
         Self::Load,
         Self::Forward,
@@ -109,7 +109,7 @@ impl Part {
 /// Cycles of a network.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Cycles {
-    elapsed: [u64; Stage::ALL.len()],
+    elapsed: [u64; Interval::ALL.len()],
     busy: Vec<[u64; During::ALL.len()]>,
     used: Vec<[u64; Part::ALL.len()]>,
 }
@@ -119,15 +119,15 @@ impl Cycles {
     #[must_use]
     pub fn new(layers: usize) -> Self {
         Self {
-            elapsed: [0; Stage::ALL.len()],
+            elapsed: [0; Interval::ALL.len()],
             busy: vec![[0; During::ALL.len()]; layers],
             used: vec![[0; Part::ALL.len()]; layers],
         }
     }
 
-    /// Time passes in a stage.
-    pub const fn pass(&mut self, stage: Stage, cycles: u64) {
-        self.elapsed[stage as usize] += cycles;
+    /// Time passes in an interval.
+    pub const fn pass(&mut self, interval: Interval, cycles: u64) {
+        self.elapsed[interval as usize] += cycles;
     }
 
     /// A layer is busy with an operation.
@@ -140,10 +140,10 @@ impl Cycles {
         self.used[layer][part as usize] += cycles;
     }
 
-    /// Cycles of a stage.
+    /// Cycles of an interval.
     #[must_use]
-    pub const fn stage(&self, stage: Stage) -> u64 {
-        self.elapsed[stage as usize]
+    pub const fn interval(&self, interval: Interval) -> u64 {
+        self.elapsed[interval as usize]
     }
 
     /// Cycles from start to end.
@@ -214,21 +214,21 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_order_of_stages_and_parts_is_their_number() {
-        assert!(Stage::ALL.iter().enumerate().all(|(i, &s)| s as usize == i));
+    fn the_order_of_intervals_and_parts_is_their_number() {
+        assert!(Interval::ALL.iter().enumerate().all(|(i, &s)| s as usize == i));
         assert!(Part::ALL.iter().enumerate().all(|(i, &p)| p as usize == i));
     }
 
     #[test]
     fn what_passed_is_the_difference() {
         let mut cycles = Cycles::new(2);
-        cycles.pass(Stage::Error, 3);
+        cycles.pass(Interval::Error, 3);
         let before = cycles.clone();
         cycles.occupy(1, During::Update, 5);
         cycles.engage(0, Part::Writers, 7);
-        cycles.pass(Stage::Error, 4);
+        cycles.pass(Interval::Error, 4);
         let passed = cycles.since(&before);
-        assert_eq!((passed.elapsed(), passed.stage(Stage::Error)), (4, 4));
+        assert_eq!((passed.elapsed(), passed.interval(Interval::Error)), (4, 4));
         assert_eq!((passed.busy(1, During::Update), passed.used(0, Part::Writers)), (5, 7));
         assert_eq!(passed.entries().filter(|(_, n)| *n > 0).count(), 3);
     }

@@ -2,7 +2,7 @@
 
 use super::check::wrong;
 use super::{Config, ConfigError};
-use crate::chip::layer::LayerSpec;
+use crate::chip::layer::{DrivenBy, LayerSpec};
 use crate::chip::population::Wiring;
 use crate::learn::network::NetworkSpec;
 use crate::learn::rule::Rule;
@@ -64,6 +64,7 @@ impl Config {
                 inputs: sizes[layer],
                 units: sizes[layer + 1],
                 wiring,
+                driven_by: if layer == 0 { DrivenBy::Shared } else { DrivenBy::Streams },
                 activation: self.activations[layer],
                 weight_max_log2: self.weight_max_log2[layer],
                 gain_64ths: self.gain_64ths[usize::from(last)],

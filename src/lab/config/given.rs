@@ -10,8 +10,7 @@ use crate::chip::hardware::{
     Adc, AdcRange, CellSpec, DigitalSpec, DitherBits, DitherPattern, DriveSpec, FloorKind,
     HardwareSpec, PulseCode, Subtract, TileSpec, Timing, WriteScheme, WriteSpec,
 };
-use crate::chip::layer::LayerSpec;
-use crate::chip::population::Wiring;
+use crate::chip::layer::{DrivenBy, LayerSpec};
 use crate::learn::error::Centre;
 use crate::learn::network::NetworkSpec;
 use crate::learn::route::Route;
@@ -195,6 +194,7 @@ impl List {
             inputs,
             units,
             wiring,
+            driven_by,
             activation,
             weight_max_log2,
             gain_64ths,
@@ -205,12 +205,13 @@ impl List {
         };
         put("inputs", inputs);
         put("units", units);
-        let wiring = match wiring {
-            Wiring::Dual => "dual",
-            Wiring::DualReadout => "dual_readout",
-            Wiring::Single => "single",
-        };
-        put("wiring", &wiring);
+        put("wiring", &wiring.name());
+        // data drive the first layer, activities every other one: there is no single frozen default
+        match (number, driven_by) {
+            (0, DrivenBy::Shared) | (1.., DrivenBy::Streams) => {}
+            (0, DrivenBy::Streams) => put("driven_by", &"streams"),
+            (1.., DrivenBy::Shared) => put("driven_by", &"shared"),
+        }
         let activation = match activation {
             Activation::Sigmoid(alpha) => format!("sigmoid {}", alpha.get()),
             Activation::Relu => "relu".into(),

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use serde::{Deserialize, Serialize};
 
 use crate::chip::engine::{Engine, Phase};
-use crate::chip::ledger::{Cycles, During, Event, Ledger, Part, Stage};
+use crate::chip::ledger::{Cycles, During, Event, Interval, Ledger, Part};
 
 /// Everything that was counted.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -42,7 +42,7 @@ pub struct CountRecord {
 pub struct CyclesRecord {
     /// From start to end.
     pub elapsed: u64,
-    /// The same by stage; stages do not overlap.
+    /// The same by interval; intervals do not overlap.
     pub stages: BTreeMap<String, u64>,
     /// Layer by layer; layers work side by side.
     pub layers: Vec<LayerCycles>,
@@ -60,7 +60,8 @@ pub struct LayerCycles {
 
 impl From<&Cycles> for CyclesRecord {
     fn from(cycles: &Cycles) -> Self {
-        let stages = Stage::ALL.map(|stage| (stage.name().to_owned(), cycles.stage(stage)));
+        let stages =
+            Interval::ALL.map(|interval| (interval.name().to_owned(), cycles.interval(interval)));
         let layers = (0..cycles.layers()).map(|layer| LayerCycles {
             busy: During::ALL.map(|d| (d.name().to_owned(), cycles.busy(layer, d))).into(),
             used: Part::ALL.map(|p| (p.name().to_owned(), cycles.used(layer, p))).into(),
@@ -179,7 +180,7 @@ mod tests {
     #[test]
     fn a_record_comes_back_from_its_text() {
         let mut cycles = Cycles::new(1);
-        cycles.pass(Stage::Forward, 9);
+        cycles.pass(Interval::Forward, 9);
         cycles.engage(0, Part::Lanes, 4);
         let line = CountRecord {
             phase: "training".into(),

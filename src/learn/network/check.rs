@@ -3,7 +3,7 @@
 
 use super::{NetworkError, NetworkSpec};
 use crate::chip::hardware::{Adc, Hardware, WriteScheme};
-use crate::chip::layer::{self, LayerSpec};
+use crate::chip::layer::{self, DrivenBy, LayerSpec};
 use crate::chip::population::Wiring;
 use crate::learn::error::Centre;
 use crate::learn::route::Route;
@@ -116,6 +116,14 @@ fn wiring(network: &NetworkSpec) -> Checked {
                 "error diffusion has two populations and reads one out, baselines have differential pairs: wire it {wanted:?}"
             );
             return misfit("learning.rule", found, allowed);
+        }
+        let drives = if at == 0 { DrivenBy::Shared } else { DrivenBy::Streams };
+        if layer.driven_by != drives {
+            let found = format!("has a layer {at} driven by {:?}", layer.driven_by);
+            let allowed = format!(
+                "data drive both streams of the first layer alike, and streams those of the others: {drives:?}"
+            );
+            return misfit("network.hidden", found, allowed);
         }
     }
     Ok(())

@@ -1,6 +1,7 @@
 use super::*;
 use crate::chip::engine::Phase;
 use crate::chip::hardware::{Adc, AdcRange, HardwareSpec, Subtract, WriteScheme};
+use crate::chip::layer::DrivenBy;
 use crate::chip::ledger::Event;
 use crate::chip::population::Wiring;
 use crate::num::fixed::AdcBits;
@@ -12,6 +13,7 @@ fn plain() -> NetworkSpec {
         inputs,
         units,
         wiring,
+        driven_by: if inputs == 5 { DrivenBy::Shared } else { DrivenBy::Streams },
         activation: Activation::Sigmoid(Positive::new(4.0).unwrap()),
         weight_max_log2: 2,
         gain_64ths: [96, 32],
@@ -85,6 +87,8 @@ fn everything_that_does_not_fit_together_is_refused_with_its_key() {
         }),
         ("learning.rule", "wire it DualReadout", |n| n.layers[1].wiring = Wiring::Dual),
         ("learning.rule", "wire it Dual", |n| n.layers[0].wiring = Wiring::Single),
+        ("network.hidden", "Shared", |n| n.layers[0].driven_by = DrivenBy::Streams),
+        ("network.hidden", "Streams", |n| n.layers[1].driven_by = DrivenBy::Shared),
         ("learning.centre", "one sample has no mean", |n| n.mode = UpdateMode::Online),
         ("learning.centre", "larger learning.batch", |n| n.batch = Batch::new(1).unwrap()),
         ("learning.route", "is missing", |n| n.route = None),

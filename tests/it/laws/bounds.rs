@@ -5,7 +5,7 @@ use std::ops::Range;
 use dalean::chip::crossbar::kernel::Backend;
 use dalean::chip::engine::{Engine, Operation, Side, Write};
 use dalean::chip::hardware::{DitherBits, Hardware, Window};
-use dalean::chip::layer::{CHUNK_BLOCKS, Layer, LayerSpec, SIDE_MAX, Taps};
+use dalean::chip::layer::{CHUNK_BLOCKS, DrivenBy, Layer, LayerSpec, SIDE_MAX, Taps};
 use dalean::chip::population::Wiring;
 use dalean::num::fixed::*;
 use dalean::num::tables::Activation;
@@ -29,6 +29,7 @@ fn engine(hardware: Hardware, backend: Backend, inputs: usize, units: usize) -> 
         inputs,
         units,
         wiring: Wiring::Single,
+        driven_by: DrivenBy::Shared,
         activation: Activation::Identity,
         weight_max_log2: 2,
         gain_64ths: [64, 64],

@@ -4,8 +4,9 @@ use dalean::chip::hardware::{
     Adc, AdcRange, DitherBits, DitherPattern, FloorKind, Hardware, HardwareSpec, PulseCode,
     Subtract, Timing, Window, WriteScheme,
 };
-use dalean::chip::layer::{LayerSpec, Taps};
+use dalean::chip::layer::{Delivery, DrivenBy, LayerSpec, Taps, WordSource};
 use dalean::chip::population::Wiring;
+use dalean::learn::error::Centre;
 use dalean::num::fixed::*;
 use dalean::num::tables::{Activation, Positive};
 use proptest::prelude::*;
@@ -34,7 +35,8 @@ pub(crate) struct Net {
     pub(crate) seed: u64,
     pub(crate) hardware: Hardware,
     pub(crate) specs: Vec<LayerSpec>,
-    pub(crate) taps: Vec<Taps>,
+    pub(crate) deliveries: Vec<Delivery>,
+    pub(crate) centre: Centre,
     pub(crate) mantissa: u32,
     pub(crate) potentiation_only: bool,
 }
@@ -160,6 +162,32 @@ pub(crate) fn wiring() -> impl Strategy<Value = (Wiring, Wiring)> {
     ])
 }
 
+/// Any way for errors to reach a layer; `above`: also from what the layer above reads from its columns.
+fn delivery(numbers: &mut Numbers, units: usize, above: bool) -> Delivery {
+    let shift = numbers.within(0, 3) as u32;
+    match numbers.within(0, 9) {
+        0..=4 if above => Delivery::above(units),
+        5 => {
+            let taps = Taps { width: 1, per_unit: 1, words: vec![0; units], shift: 0 };
+            let outputs = numbers.within(1, 17) as usize;
+            Delivery { source: WordSource::Sum { outputs, shift }, taps }
+        }
+        6 | 7 => {
+            let signs = units * numbers.within(1, 17) as usize;
+            let signs = (0..signs).map(|_| 1 - 2 * numbers.within(0, 1) as i16).collect();
+            let source = WordSource::Signed { signs, shift };
+            Delivery { source, taps: Taps::identity(units) }
+        }
+        _ => {
+            let width = numbers.within(1, 17);
+            let per_unit = numbers.within(1, width.min(4)) as usize;
+            let words = (0..units * per_unit).map(|_| numbers.within(0, width - 1) as u16);
+            let words = words.collect();
+            Taps { width: width as usize, per_unit, words, shift: shift.min(2) }.into()
+        }
+    }
+}
+
 /// A network whose layers have these sides, on any chip.
 pub(crate) fn net(sides: impl Strategy<Value = Vec<usize>>) -> impl Strategy<Value = Net> {
     let chip = sides.prop_flat_map(|sides| {
@@ -173,26 +201,32 @@ pub(crate) fn net(sides: impl Strategy<Value = Vec<usize>>) -> impl Strategy<Val
         |((sides, hardware, layers, (hidden, last)), (seed, mantissa, potentiation_only))| {
             let mut numbers = Numbers(seed);
             let count = layers.len();
-            let (mut specs, mut taps) = (vec![], vec![]);
+            // now and then, stream p drives both
+            let shared: Vec<_> = (0..count).map(|_| numbers.within(0, 9) == 0).collect();
+            let centres = [Centre::None, Centre::Batch, Centre::Running];
+            let centre = centres[numbers.within(0, 2) as usize];
+            let reads_backwards = hardware.tile.transposed_read && hardware.adc == Adc::Ideal;
+            let (mut specs, mut deliveries) = (vec![], vec![]);
             for (at, (activation, weight_max_log2, constant_row)) in layers.into_iter().enumerate()
             {
                 specs.push(LayerSpec {
                     inputs: sides[at],
                     units: sides[at + 1],
                     wiring: if at + 1 == count { last } else { hidden },
+                    driven_by: if at == 0 || shared[at] {
+                        DrivenBy::Shared
+                    } else {
+                        DrivenBy::Streams
+                    },
                     activation,
                     weight_max_log2,
                     gain_64ths: [96, 32],
                     constant_row,
                 });
-                let width = numbers.within(1, 17);
-                let per_unit = numbers.within(1, width.min(4)) as usize;
-                let words = sides[at + 1] * per_unit;
-                let words = (0..words).map(|_| numbers.within(0, width - 1) as u16).collect();
-                let shift = numbers.within(0, 2) as u32;
-                taps.push(Taps { width: width as usize, per_unit, words, shift });
+                let above = reads_backwards && last == Wiring::Single && at + 1 < count;
+                deliveries.push(delivery(&mut numbers, sides[at + 1], above));
             }
-            Net { seed, hardware, specs, taps, mantissa, potentiation_only }
+            Net { seed, hardware, specs, deliveries, centre, mantissa, potentiation_only }
         },
     )
 }

@@ -77,11 +77,19 @@ pub(crate) enum Fault {
     BackwardPhaseAdds,
     /// A write of nothing is not counted.
     EmptyWriteNotCounted,
+    /// Errors are not centred on the mean of their batch.
+    MeanForgotten,
+    /// All output words are added, whatever their sign.
+    SignsIgnored,
+    /// Row sums of the layer above are halved once too often.
+    WordsAboveOffByOne,
+    /// A transposed read takes its gates from no memory.
+    GateMemoryFree,
 }
 
 impl Fault {
     /// All of them.
-    pub(crate) const ALL: [Self; 37] = [
+    pub(crate) const ALL: [Self; 41] = [
         Self::WrapAtCeiling,
         Self::FloorOffByOne,
         Self::CeilingOffByOne,
@@ -119,5 +127,9 @@ impl Fault {
         Self::ConstantRowDark,
         Self::BackwardPhaseAdds,
         Self::EmptyWriteNotCounted,
+        Self::MeanForgotten,
+        Self::SignsIgnored,
+        Self::WordsAboveOffByOne,
+        Self::GateMemoryFree,
     ];
 }

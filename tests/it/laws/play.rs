@@ -5,8 +5,9 @@ use std::ops::Range;
 use dalean::chip::crossbar::kernel::Backend;
 use dalean::chip::engine::{Calibration, Engine, Operation, Phase, Side, Write};
 use dalean::chip::hardware::{Adc, WriteScheme};
-use dalean::chip::layer::Layer;
+use dalean::chip::layer::{Layer, WordSource};
 use dalean::chip::ledger::Ledger;
+use dalean::learn::error::ErrorUnit;
 
 use super::choose::{Choice, Net, Numbers};
 use super::fault::Fault;
@@ -15,14 +16,39 @@ use super::shadow::{Shadow, Table};
 /// An operation with numbers of its own.
 #[derive(Debug, Clone)]
 pub(crate) enum Op {
-    Levels { layer: usize, array: usize, row: usize, levels: Vec<u16> },
+    Levels {
+        layer: usize,
+        array: usize,
+        row: usize,
+        levels: Vec<u16>,
+    },
     Drives(Vec<u8>),
     Forward(usize),
     Backward(usize),
-    Error { layer: usize, samples: Range<usize>, words: Vec<i16>, shared: bool },
-    Update { layer: usize, write: Write, samples: Range<usize>, shift: u32 },
+    Error {
+        layer: usize,
+        samples: Range<usize>,
+        words: Vec<i16>,
+        shared: bool,
+    },
+    Update {
+        layer: usize,
+        write: Write,
+        samples: Range<usize>,
+        shift: u32,
+    },
+    /// Errors of the loaded samples.
+    Words(Vec<i32>),
     Calibrate(Vec<u8>),
     Charge(Phase),
+}
+
+/// What came of an operation that gives something.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) enum Found {
+    Nothing,
+    Words(Vec<i16>),
+    Ranges(Option<Calibration>),
 }
 
 /// What may come next: the order of operations that registers allow.
@@ -33,6 +59,8 @@ struct Script<'a> {
     samples: usize,
     /// Layers read since the samples were loaded.
     read: usize,
+    /// By layer: whether it was read backwards since.
+    columns: Vec<bool>,
     /// By layer and sample: whether gates were formed since the samples were loaded.
     gates: Vec<Vec<bool>>,
     /// Samples added and not yet written.
@@ -55,6 +83,7 @@ pub(crate) fn script_of(net: &Net, choices: &[Choice], calibrates: bool) -> Vec<
         ops: vec![],
         samples: 0,
         read: 0,
+        columns: vec![false; count],
         gates: vec![vec![]; count],
         pending: vec![0; count],
         calibrates,
@@ -113,6 +142,7 @@ impl Script<'_> {
 
     fn loaded(&mut self) {
         self.read = 0;
+        self.columns = vec![false; self.net.specs.len()];
         self.gates = vec![vec![false; self.samples]; self.net.specs.len()];
     }
 
@@ -146,13 +176,17 @@ impl Script<'_> {
         while self.read <= layer {
             self.forward(self.read);
         }
+        let delivery = &{ self.net }.deliveries[layer];
+        if delivery.source == WordSource::Above && !self.columns[layer + 1] {
+            self.columns(layer + 1);
+        }
         let from = if all { 0 } else { self.pick(self.samples) };
         let to = if all { self.samples } else { from + self.pick(self.samples - from + 1) };
         if from < to && from < self.pending[layer] {
             self.program(layer);
         }
         let rail = (1i64 << (self.net.hardware.digital.error_bits.get() - 1)) - 1;
-        let width = self.net.taps[layer].width;
+        let (width, direct) = (delivery.output_words(), delivery.is_direct());
         let style = self.pick(6);
         let numbers = &mut self.numbers;
         let word = |_| match style {
@@ -161,13 +195,35 @@ impl Script<'_> {
             2 => 0,
             3 if numbers.within(0, 9) > 0 => 0,
             // wider than a bus: every clamp behind it is reached
-            4 => numbers.within(-1000, 1000),
+            4 if direct => numbers.within(-1000, 1000),
             _ => numbers.within(-rail, rail),
         };
         let words = (0..(to - from) * width).map(word).map(|word| word as i16).collect();
-        let shared = self.pick(2) == 1;
+        let shared = self.pick(2) == 1 && direct;
         self.ops.push(Op::Error { layer, samples: from..to, words, shared });
         self.gates[layer][from..to].fill(true);
+    }
+
+    /// Reads a layer backwards, once all its samples have gates.
+    fn columns(&mut self, layer: usize) {
+        if self.gates[layer].is_empty() || self.gates[layer].contains(&false) {
+            self.error(layer, true);
+        }
+        self.ops.push(Op::Backward(layer));
+        self.columns[layer] = true;
+    }
+
+    fn words(&mut self) {
+        let outputs = self.net.specs.last().unwrap().units;
+        let style = self.pick(3);
+        let numbers = &mut self.numbers;
+        let error = |at: usize| match style {
+            0 => numbers.within(-255, 255) as i32,
+            1 => 255 - 510 * (at as i32 % 2),
+            _ => numbers.within(-40, 200) as i32,
+        };
+        let errors = (0..self.samples * outputs).map(error).collect();
+        self.ops.push(Op::Words(errors));
     }
 
     /// A shift that often moves cells, and sometimes any.
@@ -237,10 +293,7 @@ impl Script<'_> {
                 if self.net.hardware.tile.transposed_read
                     && self.net.hardware.adc == Adc::Ideal =>
             {
-                if self.gates[layer].is_empty() || self.gates[layer].contains(&false) {
-                    self.error(layer, true);
-                }
-                self.ops.push(Op::Backward(layer));
+                self.columns(layer);
             }
             9 if self.calibrates && self.net.hardware.adc != Adc::Ideal => {
                 (0..count).for_each(|layer| self.write_pending(layer));
@@ -256,6 +309,7 @@ impl Script<'_> {
             _ => {
                 self.batch();
                 (0..count).for_each(|layer| self.forward(layer));
+                self.words();
                 (0..count).for_each(|layer| self.error(layer, true));
                 for layer in 0..count {
                     if kind == 11 {
@@ -271,12 +325,16 @@ impl Script<'_> {
 }
 
 pub(crate) fn engine(net: &Net, backend: Backend) -> Engine {
-    let layers = net.specs.iter().zip(&net.taps).zip(0u16..);
-    let layers = layers
-        .map(|((spec, taps), index)| Layer::new(index, spec.clone(), taps.clone(), &net.hardware));
+    let layers = net.specs.iter().zip(&net.deliveries).zip(0u16..);
+    let layers = layers.map(|((spec, delivery), index)| {
+        Layer::new(index, spec.clone(), delivery.clone(), &net.hardware)
+    });
     let mut engine = Engine::new(net.hardware.clone(), backend, net.seed, layers.collect());
     engine.set_mantissa(net.mantissa);
     engine.set_potentiation_only(net.potentiation_only);
+    let outputs = net.specs.last().unwrap().units;
+    let bits = net.hardware.digital.error_bits;
+    engine.set_error_unit(ErrorUnit::new(net.centre, bits, outputs));
     engine
 }
 
@@ -298,20 +356,21 @@ pub(crate) fn operation(op: &Op) -> Option<Operation<'_>> {
             samples: samples.clone(),
             shift: *shift,
         },
-        Op::Calibrate(_) | Op::Charge(_) => return None,
+        Op::Words(_) | Op::Calibrate(_) | Op::Charge(_) => return None,
     })
 }
 
-pub(crate) fn execute(engine: &mut Engine, op: &Op) -> Option<Calibration> {
+pub(crate) fn execute(engine: &mut Engine, op: &Op) -> Found {
     match op {
-        Op::Calibrate(codes) => return engine.calibrate(codes),
+        Op::Words(errors) => return Found::Words(engine.output_words(errors)),
+        Op::Calibrate(codes) => return Found::Ranges(engine.calibrate(codes)),
         Op::Charge(phase) => engine.set_phase(*phase),
         _ => engine.execute(&operation(op).expect("an operation of the chip")),
     }
-    None
+    Found::Nothing
 }
 
-fn shadow_execute(shadow: &mut Shadow, pending: &mut [usize], op: &Op) -> Option<Calibration> {
+fn shadow_execute(shadow: &mut Shadow, pending: &mut [usize], op: &Op) -> Found {
     match op {
         Op::Levels { layer, array, row, levels } => {
             shadow.load_weights(*layer, *array, *row, levels);
@@ -335,10 +394,11 @@ fn shadow_execute(shadow: &mut Shadow, pending: &mut [usize], op: &Op) -> Option
                 shadow.program(*layer, *shift, nothing);
             }
         }
-        Op::Calibrate(codes) => return shadow.calibrate(codes),
+        Op::Words(errors) => return Found::Words(shadow.output_words(errors)),
+        Op::Calibrate(codes) => return Found::Ranges(shadow.calibrate(codes)),
         Op::Charge(phase) => shadow.charge_to(*phase),
     }
-    None
+    Found::Nothing
 }
 
 /// Carries out `ops` on the shadow and on every back end, and compares them after each.
@@ -356,9 +416,12 @@ pub(crate) fn law(
         for engine in &mut engines {
             let name = engine.backend().name();
             let fail = |what: String| format!("{name} after operation {at}, {op:?}: {what}");
-            let calibration = execute(engine, op);
-            if calibration != found {
-                return Err(fail(format!("{calibration:?}, but the law says {found:?}")));
+            let got = execute(engine, op);
+            if got != found {
+                return Err(fail(format!("{got:?}, but the law says {found:?}")));
+            }
+            if engine.error_unit().means() != shadow.means {
+                return Err(fail("running means differ".into()));
             }
             compare_step(engine, &shadow, op).map_err(fail)?;
         }
@@ -372,6 +435,10 @@ pub(crate) fn law(
 fn compare_step(engine: &Engine, shadow: &Shadow, op: &Op) -> Result<(), String> {
     for (phase, want) in Phase::ALL.into_iter().zip(&shadow.ledgers) {
         compare_ledgers(engine.ledger(phase), want)?;
+        let (got, want) = (engine.samples_loaded(phase), shadow.loaded[phase as usize]);
+        if got != want {
+            return Err(format!("{got} samples were loaded in {phase:?}, not {want}"));
+        }
     }
     let last = shadow.layers.len() - 1;
     match op {
@@ -407,16 +474,16 @@ pub(crate) fn compare_ledgers(got: &Ledger, want: &Ledger) -> Result<(), String>
 
 fn compare_outputs(engine: &Engine, shadow: &Shadow) -> Result<(), String> {
     let layer = shadow.layers.last().unwrap();
-    for (sample, row) in layer.accumulators[0].iter().enumerate() {
-        for (unit, &want) in row.iter().enumerate() {
-            let got = engine.output_accumulator(sample, unit);
-            if got != want {
-                return Err(format!("accumulator {sample}, {unit} is {got}, not {want}"));
-            }
-            let (got, want) =
-                (engine.output_activity(sample, unit), layer.activity[0][sample][unit]);
-            if i64::from(got) != want {
-                return Err(format!("activity {sample}, {unit} is {got}, not {want}"));
+    for &stream in layer.spec.wiring.targets() {
+        let (sums, activity) =
+            (&layer.accumulators[stream.index()], &layer.activity[stream.index()]);
+        for (sample, (sums, activity)) in sums.iter().zip(activity).enumerate() {
+            for (unit, want) in sums.iter().zip(activity).enumerate() {
+                let got = engine.output(stream, sample, unit);
+                if (&got.0, &i64::from(got.1)) != want {
+                    let what = format!("{stream:?} {sample}, {unit}");
+                    return Err(format!("output of {what} is {got:?}, not {want:?}"));
+                }
             }
         }
     }

@@ -3,6 +3,7 @@
 use dalean::chip::crossbar::kernel::Backend;
 use dalean::chip::engine::{Operation, Phase, Side};
 use dalean::chip::hardware::{Adc, AdcRange, Subtract};
+use dalean::chip::layer::WordSource;
 use dalean::chip::ledger::Event;
 use dalean::num::fixed::AdcBits;
 use dalean::num::tables::Activation;
@@ -58,7 +59,7 @@ fn equals_its_product(net: &Net, backend: Backend) {
 
     let bits = net.hardware.digital.error_bits.get();
     let rail = (1i64 << (bits - 1)) - 1;
-    let taps = &net.taps[0];
+    let taps = &net.deliveries[0].taps;
     let word = |_| numbers.within(-rail, rail) as i16;
     let words: Vec<i16> = (0..samples * taps.width).map(word).collect();
     engine.execute(&Operation::Error {
@@ -106,8 +107,9 @@ proptest! {
         net in net(prop::collection::vec(side(), 2..=2)),
     ) {
         let mut net = ideal(net);
-        net.taps[0].per_unit = 1;
-        net.taps[0].words.truncate(net.specs[0].units);
+        net.deliveries[0].source = WordSource::Output;
+        net.deliveries[0].taps.per_unit = 1;
+        net.deliveries[0].taps.words.truncate(net.specs[0].units);
         for backend in Backend::available() {
             equals_its_product(&net, backend);
         }

@@ -2,7 +2,7 @@
 
 use dalean::chip::crossbar::kernel::Backend;
 use dalean::chip::hardware::{Adc, AdcRange, HardwareSpec};
-use dalean::chip::layer::LayerSpec;
+use dalean::chip::layer::{DrivenBy, LayerSpec};
 use dalean::chip::population::Wiring;
 use dalean::lab::store::checkpoint::{self, Identity};
 use dalean::lab::store::hash;
@@ -111,6 +111,7 @@ fn run() -> impl Strategy<Value = Run> {
                         _ if at + 1 == count => Wiring::DualReadout,
                         _ => Wiring::Dual,
                     },
+                    driven_by: if at == 0 { DrivenBy::Shared } else { DrivenBy::Streams },
                     activation,
                     weight_max_log2: weight,
                     gain_64ths: [96, 32],

@@ -7,14 +7,16 @@ use std::ops::Range;
 
 use dalean::chip::engine::{Calibration, Phase};
 use dalean::chip::hardware::{Adc, AdcRange, Subtract};
-use dalean::chip::layer::{self, LayerSpec, Taps};
+use dalean::chip::layer::{self, Delivery, DrivenBy, LayerSpec};
 use dalean::chip::ledger::{During, Event, Ledger};
 use dalean::chip::population::{Polarity, Stream};
+use dalean::learn::error::Centre;
 use dalean::num::tables::Lut;
 
 use super::choose::Net;
 use super::fault::Fault;
 
+mod unit;
 mod write;
 
 /// `(v + 2^(s-1)) >> s`, in numbers so wide that nothing can wrap.
@@ -50,7 +52,7 @@ pub(crate) struct Array {
 #[derive(Debug, Clone)]
 pub(crate) struct Side {
     pub(crate) spec: LayerSpec,
-    taps: Taps,
+    delivery: Delivery,
     lut: Lut,
     rows: usize,
     pub(crate) arrays: Vec<Array>,
@@ -70,6 +72,10 @@ pub(crate) struct Shadow {
     fault: Option<Fault>,
     pub(crate) layers: Vec<Side>,
     samples: usize,
+    /// Samples loaded so far, by phase.
+    pub(crate) loaded: [u64; 3],
+    /// Running means of the error unit.
+    pub(crate) means: Vec<i64>,
     phase: Phase,
     pub(crate) ledgers: [Ledger; 3],
 }
@@ -82,7 +88,7 @@ impl Shadow {
     pub(crate) fn new(net: &Net, fault: Option<Fault>) -> Self {
         let hw = &net.hardware;
         let floor = i64::from(hw.cell.window.floor());
-        let layers = net.specs.iter().zip(&net.taps).map(|(spec, taps)| {
+        let layers = net.specs.iter().zip(&net.deliveries).map(|(spec, delivery)| {
             let rows = spec.inputs + usize::from(spec.constant_row);
             let array = Array {
                 level: table(rows, spec.units, floor),
@@ -109,7 +115,7 @@ impl Shadow {
             };
             Side {
                 spec: spec.clone(),
-                taps: taps.clone(),
+                delivery: delivery.clone(),
                 lut: Lut::new(spec.activation, hw.digital.lut_bits, layer::unit(spec, hw)),
                 rows,
                 arrays: vec![array; spec.wiring.pathways().len()],
@@ -123,11 +129,14 @@ impl Shadow {
             }
         });
         let ledger = Ledger::new(net.specs.len());
+        let outputs = net.specs.last().unwrap().units;
         Self {
             net: net.clone(),
             fault,
             layers: layers.collect(),
             samples: 0,
+            loaded: [0; 3],
+            means: if net.centre == Centre::Running { vec![0; outputs] } else { vec![] },
             phase: Phase::Training,
             ledgers: [ledger.clone(), ledger.clone(), ledger],
         }
@@ -173,6 +182,7 @@ impl Shadow {
         let rows = codes.chunks_exact(self.layers[0].spec.inputs);
         let rows: Table = rows.map(|row| row.iter().map(|&x| i64::from(x)).collect()).collect();
         self.samples = rows.len();
+        self.loaded[self.phase as usize] += rows.len() as u64;
         let rows: Table = rows.into_iter().map(|row| self.with_constant(0, row)).collect();
         self.layers[0].drives = [rows.clone(), rows];
     }
@@ -223,7 +233,7 @@ impl Shadow {
     fn read(&mut self, layer: usize, target: Stream, probe: bool) -> Vec<Vec<i64>> {
         let hw = self.net.hardware.clone();
         let (units, t) = (self.layers[layer].spec.units, target.index());
-        let banks = self.layers[layer].spec.wiring.banks(target);
+        let [banks] = self.layers[layer].spec.wiring.pairs(target) else { panic!("one pair") };
         let tiles = self.row_tiles(layer);
         let slices =
             if hw.adc == Adc::Ideal { 1 } else { hw.drive.bits.get().div_ceil(hw.drive.dac_bits) };
@@ -288,7 +298,7 @@ impl Shadow {
         this.accumulators[t] = accumulators;
         this.activity[t] = activity;
         this.derivative[t] = derivative;
-        for (bank, saturated) in banks.into_iter().zip(saturated) {
+        for (&bank, saturated) in banks.iter().zip(saturated) {
             let code = self.code(layer, bank);
             self.count(layer, code, During::ForwardRows, Event::SaturatedConversions, saturated);
         }
@@ -314,7 +324,7 @@ impl Shadow {
         let current = matches!(hw.adc, Adc::Finite { subtract: Subtract::Current, .. });
         let times = self.samples as u64 * slices;
         for &target in wiring.targets() {
-            for (bank, at) in wiring.banks(target).into_iter().enumerate() {
+            for (bank, &at) in wiring.banks(target).iter().enumerate() {
                 let code = self.code(layer, at);
                 for (high, wide) in tile_sizes(rows, columns, hw.tile.rows, hw.tile.columns) {
                     let converted = if current && bank == 1 { 0 } else { wide };
@@ -341,13 +351,15 @@ impl Shadow {
             return;
         }
         let bits = self.net.hardware.drive.bits.get();
+        let shared = self.layers[layer + 1].spec.driven_by == DrivenBy::Shared;
         for stream in 0..2 {
             let code = |&a: &i64| {
                 let round =
                     if self.is(Fault::DriveTruncates) { a >> (8 - bits) } else { rsh(a, 8 - bits) };
                 round.min((1 << bits) - 1)
             };
-            let rows = self.layers[layer].activity[stream].iter();
+            let from = if shared { 0 } else { stream };
+            let rows = self.layers[layer].activity[from].iter();
             let rows: Table = rows.map(|row| row.iter().map(code).collect()).collect();
             let rows = rows.into_iter().map(|row| self.with_constant(layer + 1, row)).collect();
             self.layers[layer + 1].drives[stream] = rows;

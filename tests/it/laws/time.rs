@@ -20,16 +20,26 @@ pub(crate) fn law(net: &Net, choices: &[Choice], seed: u64) -> Result<(), String
     let mut engine = play::engine(net, Backend::best());
     let mut tick = Network::new(&net.hardware, net.seed, engine.layers(), slots);
     tick.set_learning(net.mantissa, net.potentiation_only);
+    tick.set_error_unit(engine.error_unit());
     let mut numbers = Numbers(seed);
     let mut rest = &ops[..];
     while !rest.is_empty() {
         let longest = if numbers.within(0, 1) == 0 { 1 } else { 24 };
         let most = numbers.within(1, longest) as usize;
-        let until = rest.iter().position(|op| matches!(op, Op::Charge(_))).unwrap_or(rest.len());
+        let alone = |op: &Op| matches!(op, Op::Charge(_) | Op::Words(_));
+        let until = rest.iter().position(alone).unwrap_or(rest.len());
         let (stretch, after) = rest.split_at(most.min(until).min(rest.len()));
         if let Some(Op::Charge(phase)) = rest.first() {
             engine.set_phase(*phase);
             tick.set_phase(*phase);
+            rest = &rest[1..];
+            continue;
+        }
+        if let Some(Op::Words(errors)) = rest.first() {
+            let (got, want) = (engine.output_words(errors), tick.output_words(errors));
+            if got != want || engine.error_unit().means() != tick.means() {
+                return Err(format!("{errors:?} became {got:?}, not {want:?}"));
+            }
             rest = &rest[1..];
             continue;
         }
@@ -72,11 +82,13 @@ fn compare(engine: &Engine, tick: &Network, outputs: bool) -> Result<(), String>
         }
     }
     if outputs {
-        let units = engine.layers().last().unwrap().spec.units;
-        for (sample, unit) in (0..engine.samples()).flat_map(|s| (0..units).map(move |u| (s, u))) {
-            let sum = engine.output_accumulator(sample, unit);
-            if (sum, engine.output_activity(sample, unit)) != tick.output(sample, unit) {
-                return Err(format!("output {unit} of sample {sample} differs"));
+        let spec = &engine.layers().last().unwrap().spec;
+        for &stream in spec.wiring.targets() {
+            let places = (0..engine.samples()).flat_map(|s| (0..spec.units).map(move |u| (s, u)));
+            for (sample, unit) in places {
+                if engine.output(stream, sample, unit) != tick.output(stream, sample, unit) {
+                    return Err(format!("output {unit} of {stream:?}, sample {sample} differs"));
+                }
             }
         }
     }

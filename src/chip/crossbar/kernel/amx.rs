@@ -21,12 +21,9 @@ use self::drawn::Factors;
 use self::fused::TileBank;
 use self::product::{Walk, half_block, levels_by_drives, levels_by_gates, pair};
 use super::avx512::{self, Avx512};
-use super::{
-    Banks, Cells, ConvScratch, Conversion, Dither, Draws, Drives, Extremes, Half, Image, LookUp,
-    Loops, Packed, Peaks, Scratch, Single, TOGETHER, Write, WriteCounts, apart, peak,
-};
-use crate::chip::crossbar::layout::{BLOCK_CELLS, BLOCK_ROWS, HALF_CELLS, Layout, PANEL_COLUMNS};
-use crate::num::fixed::ErrorBits;
+use super::ops::Ops;
+use super::{Banks, Draws, Drives, Half, Image, Packed, Scratch, TOGETHER, peak};
+use crate::chip::crossbar::layout::{BLOCK_CELLS, BLOCK_ROWS, HALF_CELLS, Layout};
 
 /// Sums of the first four tile registers start at 0.
 macro_rules! zero_sums {
@@ -64,7 +61,7 @@ mod product;
 
 /// Proof that the processor has AMX with 8-bit products and AVX-512, and that the system lets this process use it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Amx(Avx512);
+pub struct Amx(());
 
 thread_local! {
     /// How many [`Tiles`] this thread has: the last one that goes gives up the shape.
@@ -74,7 +71,18 @@ thread_local! {
 /// Tiles of this thread have their shape, until dropped. It never leaves its thread: [`super::Kernel`] holds it, which
 /// cannot be sent.
 #[derive(Debug)]
-pub(super) struct Tiles(Avx512);
+pub(super) struct Tiles(());
+
+impl Tiles {
+    /// The tiles of this thread.
+    ///
+    /// # Safety
+    /// They have their shape, and keep it as long as the reference is used.
+    unsafe fn here<'a>() -> &'a Self {
+        static HERE: Tiles = Tiles(());
+        &HERE
+    }
+}
 
 /// `ldtilecfg` takes this: palette 1, and eight tiles of 16 rows x 64 bytes.
 #[repr(C, align(64))]
@@ -97,8 +105,8 @@ impl Amx {
     #[must_use]
     pub fn detect() -> Option<Self> {
         static GRANTED: OnceLock<bool> = OnceLock::new();
-        let avx512 = Avx512::detect()?;
-        GRANTED.get_or_init(granted).then_some(Self(avx512))
+        Avx512::detect()?;
+        GRANTED.get_or_init(granted).then_some(Self(()))
     }
 
     /// Gives the tiles of this thread their shape, if they do not have it yet.
@@ -112,7 +120,7 @@ impl Amx {
             }
         }
         HOLDERS.set(holders + 1);
-        Tiles(self.0)
+        Tiles(())
     }
 }
 
@@ -172,250 +180,201 @@ fn permission() -> bool {
     false
 }
 
-impl Loops for &Tiles {
-    fn read(self, cells: &[u8], drives: Drives<'_>, samples: Range<usize>, out: &mut [i32]) {
-        if cells.is_empty() {
-            return out.fill(0);
-        }
-        let walk = Walk {
-            steps: drives.blocks(),
-            a_row: BLOCK_ROWS,
-            a_step: drives.samples() * BLOCK_ROWS,
-            b_half: HALF_CELLS,
-            b_step: BLOCK_CELLS,
-            c_row: 32,
-        };
-        let (mut at, mut out) = (samples.start, out);
-        while samples.end - at >= 16 {
-            let together = if samples.end - at >= 32 { 32 } else { 16 };
-            let (these, rest) = out.split_at_mut(together * 32);
-            let a = &drives.codes()[at * BLOCK_ROWS..];
-            if together == 32 {
-                levels_by_drives(self, walk, a, cells, these);
-            } else {
-                pair(self, walk, a, cells, these);
-            }
-            (at, out) = (at + together, rest);
-        }
-        if at < samples.end {
-            self.0.read(cells, drives, at..samples.end, out);
-        }
-    }
+/// Handed out by the token: functions compiled for its features, of which those of this module take tiles in their
+/// shape.
+pub(super) const OPS: Ops = Ops {
+    read,
+    read_conv,
+    read_converted,
+    read_columns,
+    accumulate,
+    accumulate_drawn,
+    peak: peak::amx,
+    ..avx512::OPS
+};
 
-    fn read_conv(
-        self,
-        cells: &[u8],
-        image: Image<'_>,
-        (blocks, positions): (Range<usize>, Range<usize>),
-        scratch: &mut ConvScratch,
-        out: &mut [i32],
-    ) {
-        let offsets = image.plan().offsets().map(|offsets| &offsets[blocks.clone()]);
-        let done = offsets
-            .is_some_and(|offsets| conv::read(self, cells, image, offsets, positions.clone(), out));
-        if !done {
-            super::conv::assembled(self, cells, image, (blocks, positions), scratch, out);
-        }
+/// # Safety
+/// Tiles of this thread have their shape.
+#[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi,popcnt")]
+unsafe fn read(cells: &[u8], drives: Drives<'_>, samples: Range<usize>, out: &mut [i32]) {
+    // SAFETY: the caller says so.
+    let tiles = unsafe { Tiles::here() };
+    if cells.is_empty() {
+        return out.fill(0);
     }
-
-    /// Converts each bank of a tile while the next one is multiplied.
-    fn read_converted(
-        self,
-        banks: &Banks<'_>,
-        samples: Range<usize>,
-        scratch: &mut Scratch,
-        codes: &mut [i16],
-    ) -> [u64; 2] {
-        let blocks = banks.drives[0].blocks();
-        let whole = samples.len() / TOGETHER * TOGETHER;
-        let (these, rest) = codes.split_at_mut(whole * PANEL_COLUMNS);
-        let beyond = samples.start + whole..samples.end;
-        let mut saturated =
-            if rest.is_empty() { [0; 2] } else { apart(self, banks, beyond, scratch, rest) };
-        let sums = &mut scratch.currents;
-        for (group, codes) in these.as_chunks_mut::<{ Scratch::SUMS }>().0.iter_mut().enumerate() {
-            let first = (samples.start + group * TOGETHER) * BLOCK_ROWS;
-            let mut packed = Packed { codes: [0; Scratch::SUMS], saturated: [[0; 32]; 2] };
-            let tile = |tile: &Range<usize>, bank: usize| {
-                let drives = banks.drives[bank];
-                let size = drives.samples() * BLOCK_ROWS;
-                let next = |bank: usize, block: usize| {
-                    let block = if block < blocks { block } else { 0 };
-                    [
-                        banks.drives[bank].codes()[block * size + first..].as_ptr(),
-                        banks.cells[bank][block * BLOCK_CELLS..].as_ptr(),
-                    ]
-                };
-                TileBank {
-                    drives: &drives.codes()[tile.start * size + first..tile.end * size],
-                    step: size,
-                    cells: &banks.cells[bank][tile.start * BLOCK_CELLS..tile.end * BLOCK_CELLS],
-                    next: if bank == 0 { next(1, tile.start) } else { next(0, tile.end) },
-                }
-            };
-            let tiles = (0..blocks).step_by(banks.tile_blocks);
-            for (at, from) in tiles.enumerate() {
-                let blocks = from..(from + banks.tile_blocks).min(blocks);
-                let [e, i] = &mut *sums;
-                if at == 0 {
-                    // nothing to convert yet: zeros are code 0, and no conversion of them saturates
-                    i.fill(0);
-                }
-                fused::converting_inhibition(
-                    self,
-                    tile(&blocks, 0),
-                    e,
-                    i,
-                    banks.conversion,
-                    &mut packed,
-                );
-                fused::converting_excitation(
-                    self,
-                    tile(&blocks, 1),
-                    i,
-                    e,
-                    banks.conversion,
-                    &mut packed,
-                );
-            }
-            let counts = self.0.settle(&sums[1], banks.conversion, banks.live, &mut packed, codes);
-            saturated.iter_mut().zip(counts).for_each(|(sum, count)| *sum += count);
-        }
-        saturated
-    }
-
-    fn read_columns(self, plane: &[u8], layout: Layout, gates: Drives<'_>, out: &mut [i32]) {
-        let samples = gates.samples();
-        let together = samples / 32 * 32;
-        let rows = layout.rows_padded();
-        let mut turned = avx512::Turned::new(gates.blocks());
-        for block in 0..layout.blocks() {
-            self.0.turn_columns(plane, layout, block, &mut turned);
-            for pair in 0..2 {
-                let at = block * BLOCK_ROWS + 32 * pair;
-                let walk = Walk {
-                    steps: gates.blocks(),
-                    a_row: BLOCK_ROWS,
-                    a_step: samples * BLOCK_ROWS,
-                    b_half: turned.group_bytes(),
-                    b_step: 16 * 64,
-                    c_row: rows,
-                };
-                for first in (0..together).step_by(32) {
-                    let a = &gates.codes()[first * BLOCK_ROWS..];
-                    let c = &mut out[first * rows + at..];
-                    levels_by_gates(self, walk, a, turned.groups(2 * pair), c);
-                }
-                if together < samples {
-                    let out = &mut out[together * rows + at..];
-                    self.0.columns_pair(gates, together..samples, rows, &turned, pair, out);
-                }
-            }
-        }
-    }
-
-    fn accumulate_drawn(
-        self,
-        (turned, stride): (&[u8], usize),
-        gates: &[i8],
-        sums: &mut Half<i32>,
-        (draws, (column, block)): (&Draws, (usize, usize)),
-        words: &mut Half<u8>,
-        soon: &Half<u8>,
-    ) {
-        if !stride.is_multiple_of(64) {
-            self.0.accumulate(turned, stride, gates, sums);
-            return self.0.dither(draws, column, block, words);
-        }
-        let counter = draws.counter(64, column, block);
-        let factors = Factors { turned, gates: avx512::as_bytes(gates) };
-        drawn::half_block_drawn(self, factors, sums, (draws, counter), words, soon);
-    }
-
-    fn accumulate(self, turned: &[u8], stride: usize, gates: &[i8], sums: &mut Half<i32>) {
-        if gates.len().is_multiple_of(HALF_CELLS) {
-            half_block(self, stride, turned, avx512::as_bytes(gates), sums);
+    let walk = Walk {
+        steps: drives.blocks(),
+        a_row: BLOCK_ROWS,
+        a_step: drives.samples() * BLOCK_ROWS,
+        b_half: HALF_CELLS,
+        b_step: BLOCK_CELLS,
+        c_row: 32,
+    };
+    let (mut at, mut out) = (samples.start, out);
+    while samples.end - at >= 16 {
+        let together = if samples.end - at >= 32 { 32 } else { 16 };
+        let (these, rest) = out.split_at_mut(together * 32);
+        let a = &drives.codes()[at * BLOCK_ROWS..];
+        if together == 32 {
+            levels_by_drives(tiles, walk, a, cells, these);
         } else {
-            self.0.accumulate(turned, stride, gates, sums);
+            pair(tiles, walk, a, cells, these);
+        }
+        (at, out) = (at + together, rest);
+    }
+    if at < samples.end {
+        avx512::read(cells, drives, at..samples.end, out);
+    }
+}
+
+/// # Safety
+/// Tiles of this thread have their shape.
+#[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi,popcnt")]
+unsafe fn read_conv(
+    cells: &[u8],
+    image: Image<'_>,
+    (blocks, positions): (Range<usize>, Range<usize>),
+    out: &mut [i32],
+) -> bool {
+    // SAFETY: the caller says so.
+    let tiles = unsafe { Tiles::here() };
+    let offsets = image.plan().offsets().map(|offsets| &offsets[blocks]);
+    offsets.is_some_and(|offsets| conv::read(tiles, cells, image, offsets, positions, out))
+}
+
+/// Converts each bank of a tile while the next one is multiplied.
+///
+/// # Safety
+/// Tiles of this thread have their shape.
+#[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi,popcnt")]
+unsafe fn read_converted(
+    banks: &Banks<'_>,
+    samples: Range<usize>,
+    scratch: &mut Scratch,
+    codes: &mut [i16],
+) -> Option<[u64; 2]> {
+    // SAFETY: the caller says so.
+    let tiles = unsafe { Tiles::here() };
+    let blocks = banks.drives[0].blocks();
+    let mut saturated = [0; 2];
+    let sums = &mut scratch.currents;
+    for (group, codes) in codes.as_chunks_mut::<{ Scratch::SUMS }>().0.iter_mut().enumerate() {
+        let first = (samples.start + group * TOGETHER) * BLOCK_ROWS;
+        let mut packed = Packed { codes: [0; Scratch::SUMS], saturated: [[0; 32]; 2] };
+        let tile = |tile: &Range<usize>, bank: usize| {
+            let drives = banks.drives[bank];
+            let size = drives.samples() * BLOCK_ROWS;
+            let next = |bank: usize, block: usize| {
+                let block = if block < blocks { block } else { 0 };
+                [
+                    banks.drives[bank].codes()[block * size + first..].as_ptr(),
+                    banks.cells[bank][block * BLOCK_CELLS..].as_ptr(),
+                ]
+            };
+            TileBank {
+                drives: &drives.codes()[tile.start * size + first..tile.end * size],
+                step: size,
+                cells: &banks.cells[bank][tile.start * BLOCK_CELLS..tile.end * BLOCK_CELLS],
+                next: if bank == 0 { next(1, tile.start) } else { next(0, tile.end) },
+            }
+        };
+        let walk = (0..blocks).step_by(banks.tile_blocks);
+        for (at, from) in walk.enumerate() {
+            let blocks = from..(from + banks.tile_blocks).min(blocks);
+            let [e, i] = &mut *sums;
+            if at == 0 {
+                // nothing to convert yet: zeros are code 0, and no conversion of them saturates
+                i.fill(0);
+            }
+            fused::converting_inhibition(
+                tiles,
+                tile(&blocks, 0),
+                e,
+                i,
+                banks.conversion,
+                &mut packed,
+            );
+            fused::converting_excitation(
+                tiles,
+                tile(&blocks, 1),
+                i,
+                e,
+                banks.conversion,
+                &mut packed,
+            );
+        }
+        let counts = avx512::settle(&sums[1], banks.conversion, banks.live, &mut packed, codes);
+        saturated.iter_mut().zip(counts).for_each(|(sum, count)| *sum += count);
+    }
+    Some(saturated)
+}
+
+/// # Safety
+/// Tiles of this thread have their shape.
+#[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi,popcnt")]
+unsafe fn read_columns(plane: &[u8], layout: Layout, gates: Drives<'_>, out: &mut [i32]) {
+    // SAFETY: the caller says so.
+    let tiles = unsafe { Tiles::here() };
+    let samples = gates.samples();
+    let together = samples / 32 * 32;
+    let rows = layout.rows_padded();
+    let mut turned = avx512::Turned::new(gates.blocks());
+    for block in 0..layout.blocks() {
+        avx512::turn_columns(plane, layout, block, &mut turned);
+        for pair in 0..2 {
+            let at = block * BLOCK_ROWS + 32 * pair;
+            let walk = Walk {
+                steps: gates.blocks(),
+                a_row: BLOCK_ROWS,
+                a_step: samples * BLOCK_ROWS,
+                b_half: turned.group_bytes(),
+                b_step: 16 * 64,
+                c_row: rows,
+            };
+            for first in (0..together).step_by(32) {
+                let a = &gates.codes()[first * BLOCK_ROWS..];
+                let c = &mut out[first * rows + at..];
+                levels_by_gates(tiles, walk, a, turned.groups(2 * pair), c);
+            }
+            if together < samples {
+                let out = &mut out[together * rows + at..];
+                avx512::pair(gates, together..samples, rows, &turned, pair, out);
+            }
         }
     }
+}
 
-    fn convert(
-        self,
-        currents: [&[i32]; 2],
-        conversion: Conversion,
-        live: usize,
-        codes: &mut [i16],
-    ) -> [u64; 2] {
-        self.0.convert(currents, conversion, live, codes)
+/// # Safety
+/// Tiles of this thread have their shape.
+#[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi,popcnt")]
+unsafe fn accumulate_drawn(
+    (turned, stride): (&[u8], usize),
+    gates: &[i8],
+    sums: &mut Half<i32>,
+    (draws, (column, block)): (&Draws, (usize, usize)),
+    words: &mut Half<u8>,
+    soon: &Half<u8>,
+) -> bool {
+    // SAFETY: the caller says so.
+    let tiles = unsafe { Tiles::here() };
+    if !stride.is_multiple_of(64) {
+        return false;
     }
+    let counter = draws.counter(64, column, block);
+    let factors = Factors { turned, gates: avx512::as_bytes(gates) };
+    drawn::half_block_drawn(tiles, factors, sums, (draws, counter), words, soon);
+    true
+}
 
-    fn look_up(
-        self,
-        accumulators: &[i32],
-        table: &LookUp,
-        live: usize,
-        values: &mut [u8],
-        derivatives: &mut [u8],
-    ) -> u64 {
-        self.0.look_up(accumulators, table, live, values, derivatives)
-    }
-
-    fn difference(self, currents: [&[i32]; 2], sums: &mut [i32]) {
-        self.0.difference(currents, sums);
-    }
-
-    fn latch(self, words: &[i16], width: usize, taps: &[u16], errors: &mut [i16]) {
-        self.0.latch(words, width, taps, errors);
-    }
-
-    fn gate(
-        self,
-        errors: &[i16],
-        derivatives: &[u8],
-        negate: bool,
-        bits: ErrorBits,
-        stride: usize,
-        gates: &mut [i8],
-    ) -> u64 {
-        self.0.gate(errors, derivatives, negate, bits, stride, gates)
-    }
-
-    fn turn(self, codes: &[u8], stride: usize, turned: &mut [u8]) {
-        self.0.turn(codes, stride, turned);
-    }
-
-    fn loud(self, sums: &Half<i32>, write: &Write, bits: u32) -> u16 {
-        self.0.loud(sums, write, bits)
-    }
-
-    fn dither(self, draws: &Draws, column: usize, block: usize, words: &mut Half<u8>) {
-        self.0.dither(draws, column, block, words);
-    }
-
-    fn dither_words(self, draws: &Draws, column: usize, block: usize, words: &mut Half<u16>) {
-        self.0.dither_words(draws, column, block, words);
-    }
-
-    fn program(
-        self,
-        cells: Cells<'_>,
-        sums: &Half<i32>,
-        write: &Write,
-        dither: Dither<'_>,
-    ) -> WriteCounts {
-        self.0.program(cells, sums, write, dither)
-    }
-
-    fn single(self, strip: Single<'_>) -> Option<WriteCounts> {
-        self.0.single(strip)
-    }
-
-    fn peaks(self, extremes: &Extremes) -> Peaks {
-        self.0.peaks(extremes)
-    }
-
-    fn peak(self, rounds: usize) -> u64 {
-        peak::amx(self, rounds)
+/// # Safety
+/// Tiles of this thread have their shape.
+#[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi,popcnt")]
+unsafe fn accumulate(turned: &[u8], stride: usize, gates: &[i8], sums: &mut Half<i32>) {
+    // SAFETY: the caller says so.
+    let tiles = unsafe { Tiles::here() };
+    if gates.len().is_multiple_of(HALF_CELLS) {
+        half_block(tiles, stride, turned, avx512::as_bytes(gates), sums);
+    } else {
+        avx512::accumulate(turned, stride, gates, sums);
     }
 }

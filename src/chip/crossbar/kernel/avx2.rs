@@ -13,16 +13,16 @@
 use std::arch::x86_64::*;
 use std::ops::Range;
 
+use super::ops::{Ops, twins};
 use super::{
-    Cells, Conversion, Dither, Draws, Drives, Extremes, Half, LookUp, Loops, Peaks, Single, Write,
-    WriteCounts, lanes, peak,
+    Cells, Conversion, Dither, Drives, Ends, Half, Sums, Write, WriteCounts, lanes, peak, scalar,
 };
 use crate::chip::crossbar::layout::{BLOCK_CELLS, BLOCK_ROWS, HALF_CELLS, HALF_COLUMNS, Layout};
 use crate::num::fixed::ErrorBits;
 
 mod dither;
+mod fused;
 mod pairs;
-mod program;
 mod single;
 mod units;
 
@@ -39,98 +39,29 @@ impl Avx2 {
     }
 }
 
-/// Calls functions compiled for the token's features.
-macro_rules! compiled {
-    ($call:expr) => {
-        // SAFETY: `self` exists only where `detect` found every feature the function is compiled for.
-        unsafe { $call }
-    };
-}
+/// Handed out by the token: functions compiled for its features.
+pub(super) const OPS: Ops = Ops {
+    read,
+    read_conv: |_, _, _, _| false,
+    convert,
+    look_up: units::look_up,
+    gate,
+    turn: units::turn,
+    read_columns,
+    accumulate,
+    dither: dither::dither,
+    dither_words: dither::dither_words,
+    loud,
+    pulses,
+    levels,
+    fused: fused::fused,
+    single: single::single,
+    peaks: units::peaks,
+    peak: peak::avx2,
+    ..scalar::OPS
+};
 
-impl Loops for Avx2 {
-    fn read(self, cells: &[u8], drives: Drives<'_>, samples: Range<usize>, out: &mut [i32]) {
-        compiled!(read(cells, drives, samples, out));
-    }
-
-    fn convert(
-        self,
-        currents: [&[i32]; 2],
-        conversion: Conversion,
-        live: usize,
-        codes: &mut [i16],
-    ) -> [u64; 2] {
-        compiled!(convert(currents, conversion, live, codes))
-    }
-
-    fn look_up(
-        self,
-        accumulators: &[i32],
-        table: &LookUp,
-        live: usize,
-        values: &mut [u8],
-        derivatives: &mut [u8],
-    ) -> u64 {
-        compiled!(units::look_up(accumulators, table, live, values, derivatives))
-    }
-
-    fn turn(self, codes: &[u8], stride: usize, turned: &mut [u8]) {
-        compiled!(units::turn(codes, stride, turned));
-    }
-
-    fn gate(
-        self,
-        errors: &[i16],
-        derivatives: &[u8],
-        negate: bool,
-        bits: ErrorBits,
-        stride: usize,
-        gates: &mut [i8],
-    ) -> u64 {
-        compiled!(gate(errors, derivatives, negate, bits, stride, gates))
-    }
-
-    fn read_columns(self, plane: &[u8], layout: Layout, gates: Drives<'_>, out: &mut [i32]) {
-        compiled!(read_columns(plane, layout, gates, out));
-    }
-
-    fn accumulate(self, turned: &[u8], stride: usize, gates: &[i8], sums: &mut Half<i32>) {
-        compiled!(accumulate(turned, stride, gates, sums));
-    }
-
-    fn loud(self, sums: &Half<i32>, write: &Write, bits: u32) -> u16 {
-        compiled!(program::loud(sums, write, bits))
-    }
-
-    fn dither(self, draws: &Draws, column: usize, block: usize, words: &mut Half<u8>) {
-        compiled!(dither::dither(draws, column, block, words));
-    }
-
-    fn dither_words(self, draws: &Draws, column: usize, block: usize, words: &mut Half<u16>) {
-        compiled!(dither::dither_words(draws, column, block, words));
-    }
-
-    fn program(
-        self,
-        cells: Cells<'_>,
-        sums: &Half<i32>,
-        write: &Write,
-        dither: Dither<'_>,
-    ) -> WriteCounts {
-        compiled!(program::program(cells, sums, write, dither))
-    }
-
-    fn single(self, strip: Single<'_>) -> Option<WriteCounts> {
-        compiled!(single::single(strip))
-    }
-
-    fn peaks(self, extremes: &Extremes) -> Peaks {
-        compiled!(units::peaks(extremes))
-    }
-
-    fn peak(self, rounds: usize) -> u64 {
-        peak::avx2(self, rounds)
-    }
-}
+twins!("avx2,popcnt");
 
 #[target_feature(enable = "avx2,popcnt")]
 fn convert(

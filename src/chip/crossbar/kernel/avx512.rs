@@ -15,26 +15,24 @@
 use std::arch::x86_64::*;
 use std::ops::Range;
 
-use super::{
-    Cells, ConvScratch, Conversion, Dither, Draws, Drives, Extremes, Half, Image, LookUp, Loops,
-    Packed, Peaks, Scratch, Single, Write, WriteCounts, peak,
-};
-use crate::chip::crossbar::layout::{BLOCK_CELLS, BLOCK_ROWS, HALF_CELLS, HALF_COLUMNS, Layout};
-use crate::num::fixed::ErrorBits;
+use super::ops::{Ops, twins};
+use super::{Cells, Dither, Drives, Ends, Half, Sums, Write, WriteCounts, peak, scalar};
+use crate::chip::crossbar::layout::{BLOCK_CELLS, BLOCK_ROWS, HALF_CELLS, HALF_COLUMNS};
 
 mod columns;
 mod conv;
 mod dither;
 mod few;
-mod program;
-mod pulses;
+mod fused;
+mod peaks;
 mod single;
 mod turn;
 mod units;
 
-pub(super) use columns::Turned;
+pub(super) use columns::{Turned, pair, turn_columns};
+pub(super) use units::settle;
 
-/// Proof that the processor has AVX-512 F, BW, VL, VNNI and VBMI, counts bits and gathers them (BMI2).
+/// Proof that the processor has AVX-512 F, BW, VL, VNNI and VBMI, and counts bits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Avx512(());
 
@@ -47,168 +45,36 @@ impl Avx512 {
             && is_x86_feature_detected!("avx512vl")
             && is_x86_feature_detected!("avx512vnni")
             && is_x86_feature_detected!("avx512vbmi")
-            && is_x86_feature_detected!("popcnt")
-            && is_x86_feature_detected!("bmi2");
+            && is_x86_feature_detected!("popcnt");
         there.then_some(Self(()))
     }
 }
 
-/// Calls functions compiled for the token's features.
-macro_rules! compiled {
-    ($call:expr) => {
-        // SAFETY: `self` exists only where `detect` found every feature the function is compiled for.
-        unsafe { $call }
-    };
-}
+/// Handed out by the token: functions compiled for its features.
+pub(super) const OPS: Ops = Ops {
+    read,
+    read_conv: conv::read,
+    convert: units::convert,
+    look_up: units::look_up,
+    difference: units::difference,
+    latch: units::latch,
+    gate: units::gate,
+    turn: turn::turn,
+    read_columns: columns::read_columns,
+    accumulate,
+    dither: dither::dither,
+    dither_words: dither::dither_words,
+    loud: fused::loud,
+    pulses,
+    levels,
+    fused: fused::fused,
+    single: single::single,
+    peaks: peaks::peaks,
+    peak: peak::avx512,
+    ..scalar::OPS
+};
 
-/// What the matrix unit shares.
-impl Avx512 {
-    /// Turns one block of rows.
-    pub(super) fn turn_columns(
-        self,
-        plane: &[u8],
-        layout: Layout,
-        block: usize,
-        turned: &mut Turned,
-    ) {
-        compiled!(columns::turn_columns(plane, layout, block, turned));
-    }
-
-    /// Converts the last inhibitory sums and adds packed codes to `codes`, in order. Returns saturated conversions.
-    pub(super) fn settle(
-        self,
-        last: &[i32; Scratch::SUMS],
-        conversion: Conversion,
-        live: usize,
-        packed: &mut Packed,
-        codes: &mut [i16; Scratch::SUMS],
-    ) -> [u64; 2] {
-        compiled!(units::settle(last, conversion, live, packed, codes))
-    }
-
-    /// Sums of 32 turned rows for some samples.
-    pub(super) fn columns_pair(
-        self,
-        gates: Drives<'_>,
-        samples: Range<usize>,
-        rows: usize,
-        turned: &Turned,
-        pair: usize,
-        out: &mut [i32],
-    ) {
-        compiled!(columns::pair(gates, samples, rows, turned, pair, out));
-    }
-}
-
-impl Loops for Avx512 {
-    fn read(self, cells: &[u8], drives: Drives<'_>, samples: Range<usize>, out: &mut [i32]) {
-        compiled!(read(cells, drives, samples, out));
-    }
-
-    fn read_conv(
-        self,
-        cells: &[u8],
-        image: Image<'_>,
-        (blocks, positions): (Range<usize>, Range<usize>),
-        scratch: &mut ConvScratch,
-        out: &mut [i32],
-    ) {
-        let [_, across] = image.plan().shape().output();
-        match image.plan().offsets() {
-            Some(offsets) if blocks.len() == offsets.len() && across > 4 => {
-                compiled!(conv::read(cells, image, offsets, positions, out));
-            }
-            _ => super::conv::assembled(self, cells, image, (blocks, positions), scratch, out),
-        }
-    }
-
-    fn convert(
-        self,
-        currents: [&[i32]; 2],
-        conversion: Conversion,
-        live: usize,
-        codes: &mut [i16],
-    ) -> [u64; 2] {
-        compiled!(units::convert(currents, conversion, live, codes))
-    }
-
-    fn look_up(
-        self,
-        accumulators: &[i32],
-        table: &LookUp,
-        live: usize,
-        values: &mut [u8],
-        derivatives: &mut [u8],
-    ) -> u64 {
-        compiled!(units::look_up(accumulators, table, live, values, derivatives))
-    }
-
-    fn difference(self, currents: [&[i32]; 2], sums: &mut [i32]) {
-        compiled!(units::difference(currents, sums));
-    }
-
-    fn latch(self, words: &[i16], width: usize, taps: &[u16], errors: &mut [i16]) {
-        compiled!(units::latch(words, width, taps, errors));
-    }
-
-    fn gate(
-        self,
-        errors: &[i16],
-        derivatives: &[u8],
-        negate: bool,
-        bits: ErrorBits,
-        stride: usize,
-        gates: &mut [i8],
-    ) -> u64 {
-        compiled!(units::gate(errors, derivatives, negate, bits, stride, gates))
-    }
-
-    fn turn(self, codes: &[u8], stride: usize, turned: &mut [u8]) {
-        compiled!(turn::turn(codes, stride, turned));
-    }
-
-    fn read_columns(self, plane: &[u8], layout: Layout, gates: Drives<'_>, out: &mut [i32]) {
-        compiled!(columns::read_columns(plane, layout, gates, out));
-    }
-
-    fn accumulate(self, turned: &[u8], stride: usize, gates: &[i8], sums: &mut Half<i32>) {
-        compiled!(accumulate(turned, stride, gates, sums));
-    }
-
-    fn loud(self, sums: &Half<i32>, write: &Write, bits: u32) -> u16 {
-        compiled!(program::loud(sums, write, bits))
-    }
-
-    fn dither(self, draws: &Draws, column: usize, block: usize, words: &mut Half<u8>) {
-        compiled!(dither::dither(draws, column, block, words));
-    }
-
-    fn dither_words(self, draws: &Draws, column: usize, block: usize, words: &mut Half<u16>) {
-        compiled!(dither::dither_words(draws, column, block, words));
-    }
-
-    fn program(
-        self,
-        cells: Cells<'_>,
-        sums: &Half<i32>,
-        write: &Write,
-        dither: Dither<'_>,
-    ) -> WriteCounts {
-        compiled!(program::program(cells, sums, write, dither))
-    }
-
-    fn single(self, strip: Single<'_>) -> Option<WriteCounts> {
-        compiled!(single::single(strip))
-    }
-
-    fn peaks(self, extremes: &Extremes) -> Peaks {
-        compiled!(pulses::peaks(extremes))
-    }
-
-    fn peak(self, rounds: usize) -> u64 {
-        peak::avx512(self, rounds)
-    }
-}
+twins!("avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi,popcnt");
 
 /// Levels against drives.
 const READ: u8 = 0;
@@ -389,7 +255,7 @@ fn drive_sum(drives: Drives<'_>, sample: usize) -> i32 {
 }
 
 #[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi,popcnt")]
-fn read(cells: &[u8], drives: Drives<'_>, samples: Range<usize>, out: &mut [i32]) {
+pub(super) fn read(cells: &[u8], drives: Drives<'_>, samples: Range<usize>, out: &mut [i32]) {
     if samples.len() <= 4 {
         return few::read(cells, drives, samples, out);
     }
@@ -410,7 +276,7 @@ fn read(cells: &[u8], drives: Drives<'_>, samples: Range<usize>, out: &mut [i32]
 }
 
 #[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi,popcnt")]
-fn accumulate(turned: &[u8], stride: usize, gates: &[i8], sums: &mut Half<i32>) {
+pub(super) fn accumulate(turned: &[u8], stride: usize, gates: &[i8], sums: &mut Half<i32>) {
     let walk = Walk {
         runs: 1,
         quads: gates.len() / 64,

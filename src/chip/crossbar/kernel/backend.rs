@@ -3,8 +3,10 @@
 
 #[cfg(target_arch = "aarch64")]
 use super::neon::Neon;
+use super::ops::Ops;
+use super::scalar;
 #[cfg(target_arch = "x86_64")]
-use super::{amx::Amx, avx2::Avx2, avx512::Avx512};
+use super::{amx, amx::Amx, avx2, avx2::Avx2, avx512, avx512::Avx512};
 
 /// Which loops run. All give the same bits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -66,6 +68,21 @@ impl Backend {
     #[must_use]
     pub fn best() -> Self {
         *Self::available().last().expect("the scalar law is always there")
+    }
+
+    /// What it does.
+    pub(super) const fn ops(self) -> &'static Ops {
+        match self {
+            Self::Scalar => &scalar::OPS,
+            #[cfg(target_arch = "aarch64")]
+            Self::Neon(neon) => neon.ops(),
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx2(_) => &avx2::OPS,
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx512(_) => &avx512::OPS,
+            #[cfg(target_arch = "x86_64")]
+            Self::Amx(_) => &amx::OPS,
+        }
     }
 
     /// The name `--kernel` takes.

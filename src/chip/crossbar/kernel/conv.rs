@@ -24,7 +24,7 @@ use std::ops::Range;
 
 use aligned_vec::{AVec, avec};
 
-use super::{Half, Kernel, Loops, Ready, TOGETHER, scalar, with};
+use super::{Half, Kernel, TOGETHER, call};
 use crate::chip::crossbar::layout::{
     BLOCK_CELLS, BLOCK_ROWS, HALF_CELLS, HALF_COLUMNS, PANEL_COLUMNS, in_half,
 };
@@ -105,7 +105,27 @@ impl Kernel {
         assert!(positions.end <= plan.positions(), "the positions are there");
         assert_eq!(positions.len() * PANEL_COLUMNS, out.len(), "32 sums a position");
         if !out.is_empty() {
-            with!(self, loops => loops.read_conv(cells, image, (blocks, positions), scratch, out));
+            let part = (blocks.clone(), positions.clone());
+            if !call!(self, read_conv(cells, image, part, out)) {
+                self.read_assembled(cells, image, (blocks, positions), scratch, out);
+            }
+        }
+    }
+
+    /// Reads positions put together: what back ends do where an image cannot be read as it lies.
+    fn read_assembled(
+        &self,
+        cells: &[u8],
+        image: Image<'_>,
+        (blocks, positions): (Range<usize>, Range<usize>),
+        scratch: &mut ConvScratch,
+        out: &mut [i32],
+    ) {
+        let groups = positions.clone().step_by(TOGETHER);
+        for (start, out) in groups.zip(out.chunks_mut(TOGETHER * PANEL_COLUMNS)) {
+            let group = start..(start + TOGETHER).min(positions.end);
+            let drives = scratch.assemble(image, blocks.clone(), group);
+            self.read(cells, drives, 0..drives.samples(), out);
         }
     }
 
@@ -167,25 +187,8 @@ impl Kernel {
         let (block, along) = if taps.is_empty() { (block, 0) } else { taps[block] };
         let rows = &codes[block * BLOCK_ROWS * stride..][..BLOCK_ROWS * stride][along..];
         let mut part = Sums([0; HALF_CELLS]);
-        with!(self, loops => loops.accumulate(rows, *stride, gates, &mut part.0));
+        call!(self, accumulate(rows, *stride, gates, &mut part.0));
         sums.iter_mut().zip(&part.0).for_each(|(sum, &part)| *sum += i64::from(part));
-    }
-}
-
-/// Reads positions put together: what back ends do where an image cannot be read as it lies.
-pub(super) fn assembled<L: Loops>(
-    loops: L,
-    cells: &[u8],
-    image: Image<'_>,
-    (blocks, positions): (Range<usize>, Range<usize>),
-    scratch: &mut ConvScratch,
-    out: &mut [i32],
-) {
-    let groups = positions.clone().step_by(TOGETHER);
-    for (start, out) in groups.zip(out.chunks_mut(TOGETHER * PANEL_COLUMNS)) {
-        let group = start..(start + TOGETHER).min(positions.end);
-        let drives = scratch.assemble(image, blocks.clone(), group);
-        loops.read(cells, drives, 0..drives.samples(), out);
     }
 }
 
@@ -195,7 +198,7 @@ pub(super) fn read(
     image: Image<'_>,
     (blocks, positions): (Range<usize>, Range<usize>),
     out: &mut [i32],
-) {
+) -> bool {
     for (position, out) in positions.zip(out.chunks_exact_mut(PANEL_COLUMNS)) {
         out.fill(0);
         for row in blocks.start * BLOCK_ROWS..blocks.end * BLOCK_ROWS {
@@ -207,4 +210,5 @@ pub(super) fn read(
             }
         }
     }
+    true
 }

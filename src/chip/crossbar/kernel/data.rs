@@ -201,10 +201,50 @@ pub struct Cells<'a> {
     pub high: Option<&'a mut Half<u8>>,
     /// Remainder, of writes with `residual_bits > 0`.
     pub residual: Option<&'a mut Half<u16>>,
-    /// Cells gone for good, of absorbing floors: one bit a cell, in the order of levels.
-    pub pruned: Option<&'a mut [u64; HALF_CELLS / 64]>,
+    /// Cells gone for good, of absorbing floors: [`Cells::GONE`], or 0.
+    pub pruned: Option<&'a mut Half<u8>>,
     /// Where bounded pulses go, if they are wanted. Groups that are passed over put nothing there.
     pub pulses: Option<Pulsed<'a>>,
+}
+
+impl Cells<'_> {
+    /// Says that a cell is gone for good.
+    pub const GONE: u8 = u8::MAX;
+
+    /// The window, where there is nothing but levels of 8 bits.
+    pub(super) fn plain_window(&self, write: &Write) -> Option<(u8, u8)> {
+        if self.high.is_some() || self.residual.is_some() || self.pruned.is_some() {
+            return None;
+        }
+        Some((u8::try_from(write.floor).ok()?, u8::try_from(write.ceiling).ok()?))
+    }
+}
+
+/// The ends of levels, and how fine what lies behind them is.
+#[derive(Debug, Clone, Copy)]
+pub struct Ends {
+    /// Least level.
+    pub floor: u16,
+    /// Greatest level.
+    pub ceiling: u16,
+    /// Fractional bits of the remainder behind a cell.
+    pub residual_bits: u32,
+}
+
+impl Ends {
+    /// The greatest remainder.
+    #[inline(always)]
+    pub(super) const fn most_left(self) -> u16 {
+        (1 << self.residual_bits) - 1
+    }
+}
+
+impl Write {
+    /// Where levels end.
+    #[must_use]
+    pub const fn ends(&self) -> Ends {
+        Ends { floor: self.floor, ceiling: self.ceiling, residual_bits: self.residual_bits }
+    }
 }
 
 /// A strip of panels that is written for one sample, with 8-bit words of every cell.

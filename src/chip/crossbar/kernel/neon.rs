@@ -16,12 +16,9 @@ use std::arch::aarch64::*;
 use std::arch::{asm, is_aarch64_feature_detected};
 use std::ops::Range;
 
-use super::{
-    Cells, Conversion, Dither, Draws, Drives, Extremes, Half, Loops, Peaks, Write, WriteCounts,
-    lanes,
-};
+use super::ops::Ops;
+use super::{Drives, Extremes, Half, Peaks, lanes, levels, pulses, scalar};
 use crate::chip::crossbar::layout::{BLOCK_CELLS, BLOCK_ROWS, HALF_CELLS, HALF_COLUMNS, Layout};
-use crate::num::fixed::ErrorBits;
 
 mod dither;
 #[cfg(test)]
@@ -59,79 +56,32 @@ impl Neon {
     }
 }
 
-/// Calls functions compiled for NEON.
-macro_rules! compiled {
-    ($call:expr) => {
-        // SAFETY: `self` exists only where `detect` found NEON, all that the function is compiled for.
-        unsafe { $call }
-    };
-}
-
-/// Calls functions compiled for NEON with the way to multiply that this processor has.
-macro_rules! multiplied {
-    ($neon:expr, $products:ident => $call:expr) => {
-        match $neon.0 {
-            Products::Long($products) => compiled!($call),
-            Products::Dot($products) => compiled!($call),
+impl Neon {
+    /// Functions compiled for NEON, with the way to multiply that this processor has.
+    pub(super) const fn ops(self) -> &'static Ops {
+        match self.0 {
+            Products::Long(_) => &const { table::<Long>() },
+            Products::Dot(_) => &const { table::<Dot>() },
         }
-    };
+    }
 }
 
-impl Loops for Neon {
-    fn read(self, cells: &[u8], drives: Drives<'_>, samples: Range<usize>, out: &mut [i32]) {
-        multiplied!(self, products => read(products, cells, drives, samples, out));
-    }
-
-    fn convert(
-        self,
-        currents: [&[i32]; 2],
-        conversion: Conversion,
-        live: usize,
-        codes: &mut [i16],
-    ) -> [u64; 2] {
-        lanes::convert(currents, conversion, live, codes)
-    }
-
-    fn gate(
-        self,
-        errors: &[i16],
-        derivatives: &[u8],
-        negate: bool,
-        bits: ErrorBits,
-        stride: usize,
-        gates: &mut [i8],
-    ) -> u64 {
-        lanes::gate(errors, derivatives, negate, bits, stride, gates)
-    }
-
-    fn read_columns(self, plane: &[u8], layout: Layout, gates: Drives<'_>, out: &mut [i32]) {
-        multiplied!(self, products => read_columns(products, plane, layout, gates, out));
-    }
-
-    fn accumulate(self, turned: &[u8], stride: usize, gates: &[i8], sums: &mut Half<i32>) {
-        multiplied!(self, products => accumulate(products, turned, stride, gates, sums));
-    }
-
-    fn dither(self, draws: &Draws, column: usize, block: usize, words: &mut Half<u8>) {
-        compiled!(dither::dither(draws, column, block, words));
-    }
-
-    fn dither_words(self, draws: &Draws, column: usize, block: usize, words: &mut Half<u16>) {
-        compiled!(dither::dither_words(draws, column, block, words));
-    }
-
-    fn program(
-        self,
-        cells: Cells<'_>,
-        sums: &Half<i32>,
-        write: &Write,
-        dither: Dither<'_>,
-    ) -> WriteCounts {
-        lanes::program(cells, sums, write, dither)
-    }
-
-    fn peaks(self, extremes: &Extremes) -> Peaks {
-        peaks(extremes)
+/// Handed out by the token alone.
+const fn table<M: Multiply>() -> Ops {
+    Ops {
+        read: read::<M>,
+        read_conv: |_, _, _, _| false,
+        convert: lanes::convert,
+        gate: lanes::gate,
+        read_columns: read_columns::<M>,
+        accumulate: accumulate::<M>,
+        dither: dither::dither,
+        dither_words: dither::dither_words,
+        loud: pulses::loud_twin,
+        pulses: pulses::twin,
+        levels: levels::twin,
+        peaks,
+        ..scalar::OPS
     }
 }
 
@@ -172,6 +122,12 @@ trait Multiply: Copy {
     /// Whether the sums of a lane lie in two halves, side by side; else the first vector holds all of them.
     const HALVED: bool;
 
+    /// The proof that the processor multiplies so.
+    ///
+    /// # Safety
+    /// It does.
+    unsafe fn here() -> Self;
+
     /// Adds products of signed or unsigned bytes, modulo 2^32.
     fn add<const SIGNED: bool>(self, sums: Sums, x: uint8x16_t, y: uint8x16_t) -> Sums;
 }
@@ -181,6 +137,10 @@ type Sums = [uint32x4_t; 2];
 impl Multiply for Long {
     const STREAMS: usize = 2;
     const HALVED: bool = true;
+
+    unsafe fn here() -> Self {
+        Self(())
+    }
 
     #[inline(always)]
     fn add<const SIGNED: bool>(self, sums: Sums, x: uint8x16_t, y: uint8x16_t) -> Sums {
@@ -208,6 +168,10 @@ fn long<const SIGNED: bool>([low, high]: Sums, x: uint8x16_t, y: uint8x16_t) -> 
 impl Multiply for Dot {
     const STREAMS: usize = 4;
     const HALVED: bool = false;
+
+    unsafe fn here() -> Self {
+        Self(())
+    }
 
     #[inline(always)]
     fn add<const SIGNED: bool>(self, [mut sums, none]: Sums, x: uint8x16_t, y: uint8x16_t) -> Sums {
@@ -332,14 +296,17 @@ fn dots_batch<M: Multiply, const KIND: u8>(
     }
 }
 
+/// # Safety
+/// The processor has what `M` multiplies by.
 #[target_feature(enable = "neon")]
-fn read<M: Multiply>(
-    products: M,
+unsafe fn read<M: Multiply>(
     cells: &[u8],
     drives: Drives<'_>,
     samples: Range<usize>,
     out: &mut [i32],
 ) {
+    // SAFETY: the caller says so.
+    let products = unsafe { M::here() };
     out.fill(0);
     let walk = Walk {
         runs: drives.blocks(),
@@ -365,14 +332,17 @@ const HALF_VECTORS: usize = HALF_CELLS / 64;
 /// Words of a block of a stream.
 const BLOCK_WORDS: usize = BLOCK_ROWS / 4;
 
+/// # Safety
+/// The processor has what `M` multiplies by.
 #[target_feature(enable = "neon")]
-fn accumulate<M: Multiply>(
-    products: M,
+unsafe fn accumulate<M: Multiply>(
     turned: &[u8],
     stride: usize,
     gates: &[i8],
     sums: &mut Half<i32>,
 ) {
+    // SAFETY: the caller says so.
+    let products = unsafe { M::here() };
     let mut starts = [0; HALF_COLUMNS];
     for gates in gates.as_chunks::<64>().0 {
         for (start, gates) in starts.iter_mut().zip(gates.as_chunks::<4>().0) {
@@ -389,14 +359,18 @@ fn accumulate<M: Multiply>(
 }
 
 /// The transposed read: levels are turned, 4 columns of a row to a word, once for all samples.
+///
+/// # Safety
+/// The processor has what `M` multiplies by.
 #[target_feature(enable = "neon")]
-fn read_columns<M: Multiply>(
-    products: M,
+unsafe fn read_columns<M: Multiply>(
     plane: &[u8],
     layout: Layout,
     gates: Drives<'_>,
     out: &mut [i32],
 ) {
+    // SAFETY: the caller says so.
+    let products = unsafe { M::here() };
     for (sample, out) in out.chunks_exact_mut(layout.rows_padded()).enumerate() {
         let gates = (0..gates.blocks()).flat_map(|block| gates.row(block, sample));
         out.fill(gates.map(|&gate| 128 * i32::from(gate.cast_signed())).sum());

@@ -13,10 +13,6 @@
 
 use std::arch::asm;
 
-use super::amx::Tiles;
-use super::avx2::Avx2;
-use super::avx512::Avx512;
-
 /// Four tiles of random bytes.
 #[repr(C, align(64))]
 struct Operands([u8; 4096]);
@@ -36,9 +32,12 @@ static OPERANDS: Operands = {
 };
 
 /// Products of `rounds` rounds of four.
-pub(super) fn amx(_: &Tiles, rounds: usize) -> u64 {
+///
+/// # Safety
+/// Tiles of this thread have their shape.
+pub(super) unsafe fn amx(rounds: usize) -> u64 {
     if rounds > 0 {
-        // SAFETY: a `Tiles` says that tiles of this thread have 16 rows of 64 bytes, so the four loads read the 4096
+        // SAFETY: the caller says that tiles of this thread have 16 rows of 64 bytes, so the four loads read the 4096
         // bytes of the operands. Nothing else is read or written. All tiles used are named.
         unsafe {
             asm!(
@@ -70,10 +69,10 @@ pub(super) fn amx(_: &Tiles, rounds: usize) -> u64 {
 }
 
 /// Products of `rounds` rounds of twelve.
-pub(super) fn avx512(_: Avx512, rounds: usize) -> u64 {
+#[target_feature(enable = "avx512f,avx512vnni")]
+pub(super) fn avx512(rounds: usize) -> u64 {
     if rounds > 0 {
-        // SAFETY: the token exists only where AVX-512 F and VNNI do.
-        unsafe { dot_products(rounds) }
+        dot_products(rounds);
     }
     rounds as u64 * 12 * 64
 }
@@ -116,10 +115,10 @@ fn dot_products(rounds: usize) {
 }
 
 /// Products of `rounds` rounds of ten.
-pub(super) fn avx2(_: Avx2, rounds: usize) -> u64 {
+#[target_feature(enable = "avx2")]
+pub(super) fn avx2(rounds: usize) -> u64 {
     if rounds > 0 {
-        // SAFETY: the token exists only where AVX2 does.
-        unsafe { pair_products(rounds) }
+        pair_products(rounds);
     }
     rounds as u64 * 10 * 16
 }

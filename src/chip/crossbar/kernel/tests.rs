@@ -192,7 +192,7 @@ struct State {
     low: Half<u8>,
     high: Half<u8>,
     residual: Half<u16>,
-    pruned: [u64; 16],
+    pruned: Half<u8>,
     pulses: Half<i8>,
     counts: WriteCounts,
 }
@@ -226,7 +226,8 @@ fn check_program(levels: &Half<u8>, sums: &Half<i32>, write: &Write, seed: u64) 
     residual.reverse();
     residual.iter_mut().for_each(|left| *left &= (1 << write.residual_bits) - 1);
     let high = levels.map(|level| level.rotate_left(3) & 15);
-    let pruned = std::array::from_fn(|i| u64::from(words[i]) * 0x8000_4000_2001);
+    let gone = |at: usize| u64::from(words[at / 64]) * 0x8000_4000_2001 >> (at % 64) & 1 == 1;
+    let pruned = std::array::from_fn(|at| if gone(at) { Cells::GONE } else { 0 });
     let (pulses, counts) = ([0; HALF_CELLS], WriteCounts::default());
     let fresh = State { low: *levels, high, residual, pruned, pulses, counts };
     for dither in [Dither::Nearest, Dither::Byte(&byte_words), Dither::Word(&words)] {
@@ -393,7 +394,7 @@ fn a_zero_sum_moves_nothing_whatever_the_word() {
                         low: levels,
                         high: [0; HALF_CELLS],
                         residual: [0; HALF_CELLS],
-                        pruned: [0; 16],
+                        pruned: [0; HALF_CELLS],
                         pulses: [0; HALF_CELLS],
                         counts: WriteCounts::default(),
                     };

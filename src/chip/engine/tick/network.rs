@@ -12,15 +12,17 @@ use super::super::{Operation, Phase, Recorded, Side, Write};
 use super::tile::{BankEvents, Command, Tile, TileEvents};
 use crate::chip::hardware::{Hardware, Timing};
 use crate::chip::layer::Layer;
-use crate::chip::ledger::{Cycles, During, Event, Ledger, Part, Stage};
+use crate::chip::ledger::{Cycles, During, Event, Interval, Ledger, Part};
 use crate::chip::population::Stream;
 
 mod layer;
 mod segment;
+mod unit;
 mod watch;
 
 use layer::TickLayer;
 use segment::Segment;
+use unit::Unit;
 use watch::Watch;
 pub use watch::{Span, TileAt};
 
@@ -29,6 +31,7 @@ pub use watch::{Span, TileAt};
 pub struct Network {
     timing: Timing,
     layers: Vec<TickLayer>,
+    unit: Unit,
     samples: usize,
     phase: Phase,
     ledgers: [Ledger; 3],
@@ -43,7 +46,7 @@ struct Order<'a> {
     layer: usize,
     command: Command<'a>,
     during: During,
-    /// Words on the bus while it lasts.
+    /// Output words of an `ERR`; while it is played, the words on the bus.
     words: &'a [i16],
 }
 
@@ -61,6 +64,7 @@ impl Network {
         Self {
             timing,
             layers: layers.collect(),
+            unit: Unit::new(hardware),
             samples: 0,
             phase: Phase::Training,
             ledgers: [ledger.clone(), ledger.clone(), ledger],
@@ -109,11 +113,11 @@ impl Network {
         self.layers[layer].residuals(array)
     }
 
-    /// Accumulator and activity of a unit of the last layer's p stream.
+    /// Accumulator and activity of a unit of the last layer, of one of its target streams.
     #[must_use]
-    pub fn output(&self, sample: usize, unit: usize) -> (i64, u8) {
+    pub fn output(&self, target: Stream, sample: usize, unit: usize) -> (i64, u8) {
         let last = self.layers.last().expect("a network has layers");
-        last.outputs[sample * last.columns + unit]
+        last.outputs[target.index()][sample * last.columns + unit]
     }
 
     /// Row sums of the last transposed read, `[sample][inputs]`.
@@ -137,7 +141,7 @@ impl Network {
         self.watch.tile(at, Box::new(look));
     }
 
-    /// Target streams, tiles down and tiles across of a layer.
+    /// Pairs of banks (one a target stream), tiles down and tiles across of a layer.
     #[must_use]
     pub fn grid(&self, layer: usize) -> [usize; 3] {
         self.layers[layer].grid()
@@ -148,8 +152,8 @@ impl Network {
     }
 
     /// A cycle of the whole chip begins.
-    fn begin(&mut self, stage: Stage) {
-        self.cycles().pass(stage, 1);
+    fn begin(&mut self, interval: Interval) {
+        self.cycles().pass(interval, 1);
     }
 
     /// It has ended.
@@ -158,24 +162,14 @@ impl Network {
         self.watch.look(self.clock, &self.layers);
     }
 
-    /// The error unit takes the mean over a batch.
-    pub fn centre(&mut self, samples: usize, words: usize) {
-        let start = self.clock;
-        for _ in 0..self.timing.beat * (samples * words + words) as u64 {
-            self.begin(Stage::Centre);
-            self.end();
-        }
-        self.watch.span(Span { layer: None, name: "mean", sample: None, start, end: self.clock });
-    }
-
     /// Plays what an engine has recorded.
     pub fn play_tape(&mut self, tape: &[Recorded]) {
-        let error_unit = |recorded: &Recorded| matches!(recorded, Recorded::Centre { .. });
+        let error_unit = |recorded: &Recorded| matches!(recorded, Recorded::Words { .. });
         for stretch in tape.split_inclusive(error_unit) {
             let operations: Vec<_> = stretch.iter().filter_map(Recorded::operation).collect();
             self.run(&operations);
-            if let Some(&Recorded::Centre { samples, words }) = stretch.last() {
-                self.centre(samples, words);
+            if let Some(Recorded::Words { errors }) = stretch.last() {
+                self.output_words(errors);
             }
         }
     }
@@ -198,7 +192,7 @@ impl Network {
                         levels.len() as u64,
                     );
                     for _ in 0..self.timing.beat {
-                        self.begin(Stage::Load);
+                        self.begin(Interval::Load);
                         self.cycles().occupy(layer, During::LoadWeights, 1);
                         self.end();
                     }
@@ -213,7 +207,7 @@ impl Network {
                         words: &[],
                     };
                     let orders: Vec<_> = writes.iter().map(order).collect();
-                    self.play(&orders, Stage::Program);
+                    self.play(&orders, Interval::Program);
                     orders.iter().for_each(|order| self.layers[order.layer].written());
                 }
             }
@@ -237,7 +231,7 @@ impl Network {
         let mut started = vec![vec![]; count];
         let beat = self.timing.beat;
         while done[layers.end - 1] < samples {
-            self.begin(Stage::Forward);
+            self.begin(Interval::Forward);
             for layer in layers.clone() {
                 let command = Command::Forward { slot: issued[layer] };
                 let there = layer == layers.start || done[layer - 1] > issued[layer];
@@ -294,11 +288,11 @@ impl Network {
         let end = ranges.iter().map(|range| range.end).max().unwrap_or(0);
         for sample in 0..end {
             let here = operations.iter().zip(&ranges).filter(|(_, range)| range.contains(&sample));
-            let mut orders: Vec<(Order<'_>, Stage, bool)> = Vec::new();
+            let mut orders: Vec<(Order<'_>, Interval, bool)> = Vec::new();
             for (operation, range) in here {
                 let order = self.order(operation, range, sample);
-                let (_, stage, apart) = order;
-                let same = orders.last().is_some_and(|last| last.1 == stage);
+                let (_, interval, apart) = order;
+                let same = orders.last().is_some_and(|last| last.1 == interval);
                 let again = orders.iter().any(|other| other.0.layer == order.0.layer);
                 if !orders.is_empty() && (!same || again || apart) {
                     self.play_in_round(&orders, sample);
@@ -318,51 +312,58 @@ impl Network {
         operation: &Operation<'a>,
         range: &Range<usize>,
         sample: usize,
-    ) -> (Order<'a>, Stage, bool) {
+    ) -> (Order<'a>, Interval, bool) {
         let slot = sample;
         match *operation {
             Operation::Error { layer, words, shared, .. } => {
-                let width = self.layers[layer].width;
+                let width = self.layers[layer].delivery.output_words();
                 let words = &words[(sample - range.start) * width..][..width];
                 let command = Command::Error { slot };
-                (Order { layer, command, during: During::Error, words }, Stage::Error, !shared)
+                (Order { layer, command, during: During::Error, words }, Interval::Error, !shared)
             }
             Operation::Forward { layer, side: Side::Columns } => {
                 let command = Command::Columns { slot };
                 let during = During::ForwardColumns;
-                (Order { layer, command, during, words: &[] }, Stage::Columns, true)
+                (Order { layer, command, during, words: &[] }, Interval::Columns, true)
             }
             Operation::Update { layer, write, shift, .. } => {
-                let (command, stage) = match write {
-                    Write::Now => (Command::Now { slot, shift }, Stage::Program),
-                    _ => (Command::Add { slot }, Stage::Accumulate),
+                let (command, interval) = match write {
+                    Write::Now => (Command::Now { slot, shift }, Interval::Program),
+                    _ => (Command::Add { slot }, Interval::Accumulate),
                 };
-                (Order { layer, command, during: During::Update, words: &[] }, stage, false)
+                (Order { layer, command, during: During::Update, words: &[] }, interval, false)
             }
             _ => unreachable!("only operations of a round"),
         }
     }
 
-    fn play_in_round(&mut self, orders: &[(Order<'_>, Stage, bool)], sample: usize) {
-        let stage = orders[0].1;
-        let plain: Vec<_> = orders.iter().map(|order| order.0).collect();
-        self.play(&plain, stage);
+    fn play_in_round(&mut self, orders: &[(Order<'_>, Interval, bool)], sample: usize) {
+        let interval = orders[0].1;
+        let formed: Vec<Vec<i16>> =
+            orders.iter().map(|(order, ..)| self.layer_words(order, sample)).collect();
+        let plain = orders.iter().zip(&formed);
+        let plain: Vec<_> = plain.map(|((order, ..), words)| Order { words, ..*order }).collect();
+        self.play(&plain, interval);
         for order in &plain {
             let layer = &mut self.layers[order.layer];
             match order.command {
                 Command::Error { slot } => layer.share_gates(slot),
                 Command::Now { .. } => layer.written(),
-                Command::Columns { .. } => layer.keep_backward(sample),
+                Command::Columns { .. } => {
+                    layer.keep_backward(sample, self.samples);
+                    let (code, bits) = (layer.unit_code(Stream::P), 16 * layer.inputs as u64);
+                    self.charge(order.layer, code, order.during, Event::SramBits, bits);
+                }
                 _ => {}
             }
         }
     }
 
     /// Commands of different layers, accepted together; until the last of them is done.
-    fn play(&mut self, orders: &[Order<'_>], stage: Stage) {
+    fn play(&mut self, orders: &[Order<'_>], interval: Interval) {
         let start = self.clock;
         for offered in 1..=self.timing.beat {
-            self.begin(stage);
+            self.begin(interval);
             for order in orders {
                 let given = (offered == self.timing.beat).then_some(order.command);
                 let layer = &mut self.layers[order.layer];
@@ -374,7 +375,7 @@ impl Network {
         }
         let mut ends = vec![None; orders.len()];
         while orders.iter().any(|order| !self.layers[order.layer].idle()) {
-            self.begin(stage);
+            self.begin(interval);
             for order in orders {
                 self.account(order.layer, order.during, false);
                 self.layers[order.layer].cycle(None, order.words);
@@ -413,19 +414,19 @@ impl Network {
     /// Moves what tiles have counted into the ledger.
     fn take_events(&mut self, layer: usize, during: During, now: bool) {
         let taken = self.layers[layer].take_events();
-        for (target, banks, events) in taken {
-            let codes = self.layers[layer].codes(target);
+        for (plane, (target, banks, events)) in taken.into_iter().enumerate() {
+            let codes = self.layers[layer].codes(plane);
             for (code, e) in codes.into_iter().zip(banks) {
                 for (event, count) in self.bank_counts(&e, during, now) {
                     self.charge(layer, code, during, event, count);
                 }
             }
+            let code = self.layers[layer].unit_code(target);
             for (event, count) in self.counts(&events) {
-                self.charge(layer, codes[0], during, event, count);
+                self.charge(layer, code, during, event, count);
             }
-            let p = self.layers[layer].codes(Stream::P)[0];
             if target == Stream::P {
-                self.charge(layer, p, during, Event::SaturatedErrors, events.saturated_errors);
+                self.charge(layer, code, during, Event::SaturatedErrors, events.saturated_errors);
             }
         }
     }
@@ -435,8 +436,8 @@ impl Network {
         let updating = during == During::Update;
         let sums = if updating && !now { 64 * (e.accumulates + e.delta_computations) } else { 0 };
         let rests = 2 * hardware.residual_bits * e.delta_computations;
-        let drives =
-            if during == During::ForwardRows { hardware.dac_bits * e.dac_slices } else { 0 };
+        // every slice that is driven comes out of a memory, of codes or of gates
+        let drives = hardware.dac_bits * e.dac_slices;
         vec![
             (Event::DacSlices, e.dac_slices),
             (Event::CellReads, e.cell_reads),

@@ -13,7 +13,9 @@ impl Shadow {
     /// Delivers words; the units of some samples latch their taps and form gates.
     pub(crate) fn error(&mut self, layer: usize, samples: Range<usize>, words: &[i16]) {
         let bits = self.net.hardware.digital.error_bits.get();
-        let (taps, wiring) = (self.layers[layer].taps.clone(), self.layers[layer].spec.wiring);
+        let words = &self.layer_words(layer, &samples, words)[..];
+        let taps = self.layers[layer].delivery.taps.clone();
+        let wiring = self.layers[layer].spec.wiring;
         let units = self.layers[layer].spec.units;
         for &target in wiring.targets() {
             let gates = &mut self.layers[layer].gates[target.index()];
@@ -88,11 +90,16 @@ impl Shadow {
         let hw = self.net.hardware.clone();
         let slices = u64::from(hw.drive.bits.get().div_ceil(hw.drive.dac_bits));
         let times = 2 * slices * self.samples as u64;
-        for at in banks {
+        let free = self.is(Fault::GateMemoryFree);
+        let handed_down = (16 * self.samples * self.layers[layer].spec.inputs) as u64;
+        let code = self.unit_code(layer, Stream::P);
+        self.count(layer, code, During::ForwardColumns, Event::SramBits, handed_down);
+        for &at in banks {
             let code = self.code(layer, at);
             for (high, wide) in tile_sizes(rows, columns, hw.tile.rows, hw.tile.columns) {
                 for (event, count) in [
                     (Event::DacSlices, wide),
+                    (Event::SramBits, if free { 0 } else { wide * u64::from(hw.drive.dac_bits) }),
                     (Event::CellReads, high * wide),
                     (Event::Holds, high),
                     (Event::Conversions, high),

@@ -46,7 +46,7 @@ pub(super) fn read_columns(plane: &[u8], layout: Layout, gates: Drives<'_>, out:
 
 /// Sums of 32 rows for some samples.
 #[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi,popcnt")]
-pub(super) fn pair(
+pub(in crate::chip::crossbar::kernel) fn pair(
     gates: Drives<'_>,
     samples: Range<usize>,
     rows: usize,
@@ -69,7 +69,12 @@ pub(super) fn pair(
 
 /// Turns one block of rows. Columns of a panel that does not exist become 0.
 #[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi,popcnt")]
-pub(super) fn turn_columns(plane: &[u8], layout: Layout, block: usize, turned: &mut Turned) {
+pub(in crate::chip::crossbar::kernel) fn turn_columns(
+    plane: &[u8],
+    layout: Layout,
+    block: usize,
+    turned: &mut Turned,
+) {
     let group = turned.group_bytes();
     for panel in 0..2 * turned.blocks {
         if panel < layout.panels() {

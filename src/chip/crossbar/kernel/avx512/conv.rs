@@ -13,18 +13,19 @@ use super::{READ, Walk, dots_batch, load};
 use crate::chip::crossbar::kernel::conv::Image;
 use crate::chip::crossbar::layout::{BLOCK_CELLS, BLOCK_ROWS, HALF_CELLS, PANEL_COLUMNS};
 
-/// Reads positions with all blocks of rows, which begin at `offsets`.
+/// Reads positions with all blocks of rows, where rows of positions are wide enough.
 #[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi,popcnt")]
 pub(super) fn read(
     cells: &[u8],
     image: Image<'_>,
-    offsets: &[usize],
-    positions: Range<usize>,
+    (blocks, positions): (Range<usize>, Range<usize>),
     out: &mut [i32],
-) {
+) -> bool {
     let plan = image.plan();
     let (shape, channels) = (plan.shape(), plan.channel_blocks());
     let [_, across] = shape.output();
+    let offsets = plan.offsets().filter(|offsets| blocks.len() == offsets.len() && across > 4);
+    let Some(offsets) = offsets else { return false };
     let walk = Walk {
         runs: shape.side,
         quads: 16,
@@ -53,6 +54,7 @@ pub(super) fn read(
         }
         (at, out) = (at + count, rest);
     }
+    true
 }
 
 /// Sum of the drives of all rows at a position.

@@ -42,15 +42,15 @@ fn blocks(draws: &Draws, counter: Counter, words: &mut Half<u8>) {
     let lane = _mm512_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
     let grown = _mm512_mullo_epi32(lane, _mm512_set1_epi32(counter.step));
     let counter = _mm512_add_epi32(_mm512_set1_epi32(counter.first), grown);
-    for (words, v) in words.as_chunks_mut().0.iter_mut().zip(drawn(draws, counter)) {
-        store(words, v);
-    }
+    let words = words.as_chunks_mut().0;
+    drawn(draws, counter, |i, v| store(&mut words[i], v));
 }
 
-/// The blocks whose word 12 starts as `counter` says: word i of each.
+/// The blocks whose word 12 starts as `counter` says: word i of each is handed on. Were they returned, they would take the
+/// way through memory.
 #[inline]
 #[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi,popcnt")]
-pub(super) fn drawn(draws: &Draws, counter: __m512i) -> [__m512i; 16] {
+pub(super) fn drawn(draws: &Draws, counter: __m512i, mut take: impl FnMut(usize, __m512i)) {
     let mut first = [_mm512_setzero_si512(); 16];
     for (first, word) in first.iter_mut().zip(draws.mixed()) {
         *first = _mm512_set1_epi32(*word);
@@ -66,11 +66,10 @@ pub(super) fn drawn(draws: &Draws, counter: __m512i) -> [__m512i; 16] {
         quarter(&mut s, 3, 7, 11, 15);
         diagonals(&mut s);
     }
-    for (i, (s, word)) in s.iter_mut().zip(draws.start()).enumerate() {
+    for (i, (s, word)) in s.into_iter().zip(draws.start()).enumerate() {
         let first = if i == 12 { counter } else { _mm512_set1_epi32(*word) };
-        *s = _mm512_add_epi32(*s, first);
+        take(i, _mm512_add_epi32(s, first));
     }
-    s
 }
 
 #[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi,popcnt")]

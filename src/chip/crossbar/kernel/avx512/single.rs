@@ -18,7 +18,7 @@
 use std::arch::x86_64::*;
 
 use super::dither::drawn;
-use super::pulses::{peaks as fold_rows, take};
+use super::peaks::{peaks as fold_rows, take};
 use super::units::store_bytes;
 use super::{as_bytes, load, load_sums, store, store_sums};
 use crate::chip::crossbar::kernel::{Extremes, OneProduct, Pulsed, Single, WriteCounts};
@@ -110,9 +110,9 @@ fn strip_of<const USUAL: bool>(
         }
         for first in (0..columns).step_by(16) {
             let counter = load_sums(counters[first..].first_chunk().expect("a vector of room"));
-            for (row, v) in words.0.iter_mut().zip(drawn(draws, counter)) {
-                store_sums(row[first..].first_chunk_mut().expect("a vector of room"), v);
-            }
+            drawn(draws, counter, |i, v| {
+                store_sums(words.0[i][first..].first_chunk_mut().expect("a vector of room"), v);
+            });
         }
         for (half, gates) in all.iter().enumerate().filter(|(half, _)| live[*half] != 0) {
             let least = _mm512_set1_epi32(least_loud.div_ceil(gates.most).cast_signed());

@@ -78,9 +78,9 @@ fn converted<const ALL: bool>(
     })
 }
 
-/// See [`super::Avx512::settle`].
+/// Converts the last inhibitory sums and adds packed codes to `codes`, in order. Returns saturated conversions.
 #[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi,popcnt")]
-pub(super) fn settle(
+pub(in crate::chip::crossbar::kernel) fn settle(
     last: &[i32; Scratch::SUMS],
     conversion: Conversion,
     live: usize,

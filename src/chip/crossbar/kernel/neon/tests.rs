@@ -2,6 +2,7 @@
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
 use super::*;
+use crate::chip::crossbar::kernel::{Backend, Kernel};
 use crate::num::draw::{Place, Site};
 
 fn bytes(count: u64, len: usize) -> Vec<u8> {
@@ -11,9 +12,9 @@ fn bytes(count: u64, len: usize) -> Vec<u8> {
 }
 
 /// Both ways to multiply that this machine has.
-fn both() -> Option<[Neon; 2]> {
+fn both() -> Option<[Kernel; 2]> {
     let neon = Neon::detect()?;
-    Some([neon, Neon(Products::Long(Long(())))])
+    Some([neon, Neon(Products::Long(Long(())))].map(|neon| Kernel::start(Backend::Neon(neon))))
 }
 
 #[test]
@@ -22,24 +23,29 @@ fn both_ways_to_multiply_give_the_same_bits() {
     for batch in 1..=9 {
         let layout = Layout { rows: 130, columns: 70 };
         let (plane, codes) = (bytes(0, layout.cells_padded()), bytes(1, batch * 192));
-        let [a, b] = both.map(|neon| {
+        let [a, b] = both.each_ref().map(|kernel| {
             let mut out = vec![7; batch * 32];
             let cells = &plane[..layout.panel_cells()];
-            neon.read(cells, Drives::new(&codes, batch), 0..batch, &mut out);
+            kernel.read(cells, Drives::new(&codes, batch), 0..batch, &mut out);
             out
         });
         assert_eq!(a, b, "a read of {batch} samples");
-        let [a, b] = both.map(|neon| {
+        let [a, b] = both.each_ref().map(|kernel| {
             let mut out = vec![7; batch * layout.rows_padded()];
-            neon.read_columns(&plane, layout, Drives::new(&codes[..batch * 128], batch), &mut out);
+            kernel.read_columns(
+                &plane,
+                layout,
+                Drives::new(&codes[..batch * 128], batch),
+                &mut out,
+            );
             out
         });
         assert_eq!(a, b, "a transposed read of {batch} samples");
         let stride = 4 * batch;
         let gates: Vec<_> = bytes(2, 16 * stride).into_iter().map(u8::cast_signed).collect();
-        let [a, b] = both.map(|neon| {
+        let [a, b] = both.each_ref().map(|kernel| {
             let mut sums = [7; HALF_CELLS];
-            neon.accumulate(&bytes(3, 64 * stride), stride, &gates, &mut sums);
+            kernel.accumulate(&bytes(3, 64 * stride), stride, &gates, &mut sums);
             sums
         });
         assert_eq!(a, b, "sums of {stride} samples");

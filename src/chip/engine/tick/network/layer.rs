@@ -1,8 +1,10 @@
 //! The tiles of a layer, in step.
 //!
 //! ```text
-//! tiles[(target * down + tile row) * across + tile column]
+//! tiles[(plane * down + tile row) * across + tile column]        a plane is a pair of banks of a target
 //! ```
+//!
+//! A target's first plane has the heads of its columns: what all its planes read is added up there.
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
 use std::ops::Range;
@@ -10,7 +12,7 @@ use std::ops::Range;
 use super::super::tile::{BankEvents, Command, Launch, Tile, TileEvents, TileSize};
 use crate::chip::hardware::timing::tree_levels;
 use crate::chip::hardware::{DitherPattern, Hardware, Timing, WriteScheme};
-use crate::chip::layer::Layer;
+use crate::chip::layer::{Delivery, DrivenBy, Layer};
 use crate::chip::ledger::During;
 use crate::chip::periphery;
 use crate::chip::population::{Stream, Wiring};
@@ -33,14 +35,16 @@ pub(super) struct TickLayer {
     pub(super) tiles: Vec<Tile>,
     pub(super) inputs: usize,
     pub(super) columns: usize,
-    pub(super) width: usize,
+    pub(super) delivery: Delivery,
+    pub(super) weight_max_log2: i32,
     pub(super) memory: Memory,
-    /// Accumulator and activity of stream p by sample, of what was read last.
-    pub(super) outputs: Vec<(i64, u8)>,
+    /// Accumulator and activity by target stream and sample, of what was read last.
+    pub(super) outputs: [Vec<(i64, u8)>; 2],
     pub(super) backward: Vec<i64>,
     index: u16,
     wiring: Wiring,
-    first: bool,
+    planes: Vec<(Stream, [usize; 2])>,
+    driven_by: DrivenBy,
     constant_row: bool,
     rows: usize,
     /// Tiles down and across, and the size of one.
@@ -69,20 +73,24 @@ impl TickLayer {
         let grid = layer.tiles(hardware);
         let tile = [hardware.tile.rows, hardware.tile.columns];
         let (rows, columns) = (layer.layout.rows, layer.layout.columns);
+        let wiring = layer.spec.wiring;
+        let added = [grid[0] * wiring.pairs(Stream::P).len(), grid[1]];
         let mut this = Self {
             tiles: vec![],
             inputs: layer.spec.inputs,
             columns,
-            width: layer.taps.width,
+            delivery: layer.delivery.clone(),
+            weight_max_log2: layer.spec.weight_max_log2,
             memory: Memory {
                 dac_bits: hardware.drive.dac_bits.into(),
                 residual_bits: hardware.write.residual_bits.get().into(),
             },
-            outputs: vec![(0, 0); slots * columns],
+            outputs: [vec![(0, 0); slots * columns], vec![(0, 0); slots * columns]],
             backward: vec![],
             index: layer.index,
-            wiring: layer.spec.wiring,
-            first: layer.index == 0,
+            wiring,
+            planes: wiring.planes().collect(),
+            driven_by: layer.spec.driven_by,
             constant_row: layer.spec.constant_row,
             rows,
             grid,
@@ -96,11 +104,11 @@ impl TickLayer {
             seed,
             writes: layer.writes.first().copied().unwrap_or(0),
             tree: vec![],
-            delay: grid.map(|tiles| timing.beat * tree_levels(tiles as u64)),
+            delay: added.map(|tiles| timing.beat * tree_levels(tiles as u64)),
         };
         let lut = layer.lut.activity.iter().zip(&layer.lut.derivative);
         let table: Vec<[u8; 2]> = lut.map(|(&a, &slope)| [a, slope]).collect();
-        for &target in layer.spec.wiring.targets() {
+        for (target, _) in wiring.planes() {
             for down in 0..grid[0] {
                 for across in 0..grid[1] {
                     let (rows, columns) = (this.tile_rows(down), this.tile_columns(across));
@@ -141,34 +149,45 @@ impl TickLayer {
         across * self.tile[1]..((across + 1) * self.tile[1]).min(self.columns)
     }
 
-    /// Tile of a target at a place of the grid.
-    fn at(&self, target: Stream, down: usize, across: usize) -> usize {
-        (target.index() * self.grid[0] + down) * self.grid[1] + across
+    /// Tile of a plane at a place of the grid.
+    const fn at(&self, plane: usize, down: usize, across: usize) -> usize {
+        (plane * self.grid[0] + down) * self.grid[1] + across
     }
 
-    /// Targets, tiles down, tiles across.
+    /// Plane of a tile.
+    const fn plane(&self, tile: usize) -> usize {
+        tile / (self.grid[0] * self.grid[1])
+    }
+
+    /// The plane that has the heads of a target's columns.
+    fn heads(&self, target: Stream) -> usize {
+        self.planes.iter().position(|plane| plane.0 == target).expect("targets have banks")
+    }
+
+    /// Planes, tiles down, tiles across.
     pub(super) fn grid(&self) -> [usize; 3] {
-        [self.wiring.targets().len(), self.grid[0], self.grid[1]]
+        [self.planes.len(), self.grid[0], self.grid[1]]
     }
 
     /// The tile at a place of the grid, if there is one.
     pub(super) fn tile_at(&self, at: &super::TileAt) -> Option<&Tile> {
-        let [targets, downs, acrosses] = self.grid();
-        let inside = at.target < targets && at.down < downs && at.across < acrosses;
+        let [planes, downs, acrosses] = self.grid();
+        let inside = at.target < planes && at.down < downs && at.across < acrosses;
         inside.then(|| &self.tiles[(at.target * downs + at.down) * acrosses + at.across])
     }
 
-    /// Target and bank of an array.
-    fn bank(&self, array: usize) -> (Stream, usize) {
-        let target = self.wiring.pathways()[array].target;
-        (target, usize::from(self.wiring.banks(target)[1] == array))
+    /// Plane and bank of an array.
+    fn bank(&self, array: usize) -> (usize, usize) {
+        let plane = self.planes.iter().position(|plane| plane.1.contains(&array));
+        let plane = plane.expect("every array is a bank");
+        (plane, usize::from(self.planes[plane].1[1] == array))
     }
 
     /// Tile, bank, row and column of a cell of an array.
     fn cell(&self, array: usize, cell: usize) -> (usize, usize, usize, usize) {
         let (row, column) = (cell / self.columns, cell % self.columns);
-        let (target, bank) = self.bank(array);
-        let tile = self.at(target, row / self.tile[0], column / self.tile[1]);
+        let (plane, bank) = self.bank(array);
+        let tile = self.at(plane, row / self.tile[0], column / self.tile[1]);
         (tile, bank, row % self.tile[0], column % self.tile[1])
     }
 
@@ -196,15 +215,21 @@ impl TickLayer {
         self.wiring.targets().to_vec()
     }
 
-    /// Pathway codes of the banks of a target.
-    pub(super) fn codes(&self, target: Stream) -> [u8; 2] {
-        self.wiring.banks(target).map(|at| self.wiring.pathways()[at].code)
+    /// Pathway codes of the banks of a plane.
+    pub(super) fn codes(&self, plane: usize) -> [u8; 2] {
+        self.planes[plane].1.map(|at| self.wiring.pathways()[at].code)
+    }
+
+    /// The code at which the units of a target are counted.
+    pub(super) fn unit_code(&self, target: Stream) -> u8 {
+        self.codes(self.heads(target))[0]
     }
 
     pub(super) fn set_adc_shifts(&mut self, layer: &Layer) {
         let each = self.grid[0] * self.grid[1];
         for (tile, tick) in self.tiles.iter_mut().enumerate() {
-            if let Some(shifts) = layer.adc_shifts.get(tile / each) {
+            let (target, _) = self.planes[tile / each];
+            if let Some(shifts) = layer.adc_shifts.get(target.index()) {
                 tick.set_adc_shifts(shifts);
             }
         }
@@ -220,19 +245,21 @@ impl TickLayer {
     }
 
     /// Source of the rows of a bank.
-    fn source(&self, target: Stream, bank: usize) -> Stream {
-        self.wiring.pathways()[self.wiring.banks(target)[bank]].source
+    fn source(&self, plane: usize, bank: usize) -> Stream {
+        self.wiring.pathways()[self.planes[plane].1[bank]].source
     }
 
-    /// Puts a drive code on a row of every bank that `stream` drives (all of them in the first layer).
+    /// Puts a drive code on a row of every bank that `stream` drives: of all of them where they share their drives,
+    /// or where no stream is named.
     fn load_drive(&mut self, stream: Option<Stream>, slot: usize, row: usize, code: u8) {
-        for target in self.targets() {
+        let shared = self.driven_by == DrivenBy::Shared;
+        for plane in 0..self.planes.len() {
             for bank in 0..2 {
-                if stream.is_some_and(|stream| stream != self.source(target, bank)) {
+                if stream.is_some_and(|stream| !shared && stream != self.source(plane, bank)) {
                     continue;
                 }
                 for across in 0..self.grid[1] {
-                    let tile = self.at(target, row / self.tile[0], across);
+                    let tile = self.at(plane, row / self.tile[0], across);
                     self.tiles[tile].load_drive(bank, slot, row % self.tile[0], code);
                 }
             }
@@ -255,7 +282,9 @@ impl TickLayer {
     }
 
     pub(super) fn load_activities(&mut self, stream: Stream, slot: usize, values: &[u8]) {
-        assert!(!self.first, "the first layer is driven by data");
+        if self.driven_by == DrivenBy::Shared && stream != Stream::P {
+            return;
+        }
         for (row, &value) in values.iter().enumerate() {
             self.load_drive(Some(stream), slot, row, periphery::drive(value, self.drive_bits));
         }
@@ -265,36 +294,40 @@ impl TickLayer {
     /// Activities of a stream.
     pub(super) fn values(&self, target: Stream, slot: usize) -> Vec<u8> {
         let value = |column| {
-            let head = &self.tiles[self.at(target, 0, column / self.tile[1])];
+            let head = &self.tiles[self.at(self.heads(target), 0, column / self.tile[1])];
             head.value(slot, column % self.tile[1])
         };
         (0..self.columns).map(value).collect()
     }
 
     pub(super) fn keep_outputs(&mut self, sample: usize) {
-        let values = self.values(Stream::P, sample);
-        for (column, value) in values.into_iter().enumerate() {
-            let head = &self.tiles[self.at(Stream::P, 0, column / self.tile[1])];
-            let sum = head.out(column % self.tile[1]);
-            self.outputs[sample * self.columns + column] = (sum, value);
+        for target in self.targets() {
+            let values = self.values(target, sample);
+            for (column, value) in values.into_iter().enumerate() {
+                let head = self.at(self.heads(target), 0, column / self.tile[1]);
+                let sum = self.tiles[head].out(column % self.tile[1]);
+                self.outputs[target.index()][sample * self.columns + column] = (sum, value);
+            }
         }
     }
 
-    pub(super) fn keep_backward(&mut self, sample: usize) {
-        self.backward.truncate(sample * self.inputs);
+    /// Keeps what the last transposed read of a sample, of so many, gave.
+    pub(super) fn keep_backward(&mut self, sample: usize, samples: usize) {
+        self.backward.resize(samples * self.inputs, 0);
         for row in 0..self.inputs {
-            let head = &self.tiles[self.at(Stream::P, row / self.tile[0], 0)];
-            self.backward.push(head.backward_sum(row % self.tile[0]));
+            let head = &self.tiles[self.at(self.heads(Stream::P), row / self.tile[0], 0)];
+            self.backward[sample * self.inputs + row] = head.backward_sum(row % self.tile[0]);
         }
     }
 
     /// Gates go down from the heads of the columns.
     pub(super) fn share_gates(&mut self, slot: usize) {
-        for target in self.targets() {
+        for (plane, (target, _)) in self.planes.clone().into_iter().enumerate() {
             for across in 0..self.grid[1] {
-                let gates = self.tiles[self.at(target, 0, across)].gates(slot).to_vec();
-                for down in 1..self.grid[0] {
-                    let tile = self.at(target, down, across);
+                let head = self.at(self.heads(target), 0, across);
+                let gates = self.tiles[head].gates(slot).to_vec();
+                for down in 0..self.grid[0] {
+                    let tile = self.at(plane, down, across);
                     self.tiles[tile].set_gates(slot, &gates);
                 }
             }
@@ -309,10 +342,11 @@ impl TickLayer {
     /// Whether a command concerns a tile: words go to heads, transposed reads to target p.
     fn concerns(&self, command: &Command<'_>, tile: usize) -> bool {
         let down = tile / self.grid[1] % self.grid[0];
-        let target = tile / (self.grid[0] * self.grid[1]);
+        let plane = self.plane(tile);
+        let target = self.planes[plane].0;
         match command {
-            Command::Error { .. } => down == 0,
-            Command::Columns { .. } => target == Stream::P.index(),
+            Command::Error { .. } => down == 0 && plane == self.heads(target),
+            Command::Columns { .. } => target == Stream::P,
             _ => true,
         }
     }
@@ -366,9 +400,11 @@ impl TickLayer {
         let mut heads: Vec<(usize, bool, Launch)> = Vec::new();
         for tile in 0..self.tiles.len() {
             let Some((launch, columns)) = self.tiles[tile].take_launch() else { continue };
-            let each = self.grid[0] * self.grid[1];
             let head = match columns {
-                false => tile / each * each + tile % self.grid[1],
+                false => {
+                    let heads = self.heads(self.planes[self.plane(tile)].0);
+                    self.at(heads, 0, tile % self.grid[1])
+                }
                 true => tile / self.grid[1] * self.grid[1],
             };
             match heads.iter_mut().find(|other| other.0 == head) {
@@ -406,21 +442,21 @@ impl TickLayer {
         [arrays, converters, in_tree, lanes, bus, multipliers, accumulators, writers]
     }
 
-    /// What was counted since the last call, by target: banks, and what is beside them.
+    /// What was counted since the last call, by plane: banks, and what is beside them.
     pub(super) fn take_events(&mut self) -> Vec<(Stream, [BankEvents; 2], TileEvents)> {
         let mut all = Vec::new();
-        for target in self.targets() {
+        for plane in 0..self.planes.len() {
             let mut banks = [BankEvents::default(); 2];
             let mut events = TileEvents::default();
             for down in 0..self.grid[0] {
                 for across in 0..self.grid[1] {
-                    let tile = self.at(target, down, across);
+                    let tile = self.at(plane, down, across);
                     let (tile_banks, tile_events) = self.tiles[tile].take_events();
                     banks.iter_mut().zip(&tile_banks).for_each(|(sum, more)| sum.merge(more));
                     events.merge(&tile_events, across == 0);
                 }
             }
-            all.push((target, banks, events));
+            all.push((self.planes[plane].0, banks, events));
         }
         all
     }

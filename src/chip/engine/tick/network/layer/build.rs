@@ -29,7 +29,7 @@ pub(super) fn config(
             TileAdc::Current { bits: bits.get(), shift: first }
         }
     };
-    let taps = &layer.taps;
+    let taps = &layer.delivery.taps;
     let own = taps.words.chunks_exact(taps.per_unit).skip(columns.start).take(columns.len());
     let own = own.map(|words| words.iter().map(|&word| usize::from(word)).collect());
     TileConfig {

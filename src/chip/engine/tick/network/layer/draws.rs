@@ -11,13 +11,12 @@ impl TickLayer {
     pub(super) fn draws(&self, tile: usize, bank: usize) -> Vec<u16> {
         let across = tile % self.grid[1];
         let down = tile / self.grid[1] % self.grid[0];
-        let target = self.targets()[tile / (self.grid[0] * self.grid[1])];
         let row = down * self.tile[0] + self.tiles[tile].dither_row();
         let place = Place {
             seed: self.seed,
             site: Site::WriteDither,
             layer: self.index,
-            pathway: self.codes(target)[bank],
+            pathway: self.codes(self.plane(tile))[bank],
             sub: 0,
             count: self.writes,
         };
@@ -46,7 +45,6 @@ impl TickLayer {
     pub(super) fn firing(&self, tile: usize, bank: usize, slot: u32) -> (Vec<bool>, Vec<bool>) {
         let across = tile % self.grid[1];
         let down = tile / self.grid[1] % self.grid[0];
-        let target = self.targets()[tile / (self.grid[0] * self.grid[1])];
         let this = &self.tiles[tile];
         let (shift, sample) = this.writing();
         // the probability of a slot is 2^-(k + log2 slots) of drive times gate, half of it each line's
@@ -56,7 +54,7 @@ impl TickLayer {
                 seed: self.seed,
                 site,
                 layer: self.index,
-                pathway: self.codes(target)[bank],
+                pathway: self.codes(self.plane(tile))[bank],
                 sub: slot,
                 count: self.writes,
             };

@@ -1,0 +1,88 @@
+//! What a back end does: a table with a function an operation.
+//!
+//! An operation is declared here, once. A back end's table has its own functions and takes all others from the table it
+//! builds on: that of the law, or of a smaller back end. What an operation does, and what has been checked of its
+//! arguments, is said at the method of [`Kernel`](super::Kernel) that bears its name.
+//!
+//! Functions are `unsafe` to call, because they are compiled for features of the processor, and some need tiles in their
+//! shape. Only a token hands out its table, and only a kernel that holds what the token stands for calls from it.
+//!
+//! What gives a `bool` or an `Option` may decline: then nothing was done, and the kernel composes it of other operations.
+#![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
+
+use std::ops::Range;
+
+use super::{
+    Banks, Cells, Conversion, Dither, Draws, Drives, Ends, Extremes, Half, Image, LookUp, Peaks,
+    Scratch, Single, Sums, Write, WriteCounts,
+};
+use crate::chip::crossbar::layout::Layout;
+use crate::num::fixed::ErrorBits;
+
+/// The operations of a back end.
+#[derive(Debug)]
+pub(super) struct Ops {
+    pub(super) read: unsafe fn(&[u8], Drives<'_>, Range<usize>, &mut [i32]),
+    pub(super) read_conv:
+        unsafe fn(&[u8], Image<'_>, (Range<usize>, Range<usize>), &mut [i32]) -> bool,
+    /// Of whole groups of [`TOGETHER`](super::TOGETHER) samples.
+    pub(super) read_converted:
+        unsafe fn(&Banks<'_>, Range<usize>, &mut Scratch, &mut [i16]) -> Option<[u64; 2]>,
+    pub(super) convert: unsafe fn([&[i32]; 2], Conversion, usize, &mut [i16]) -> [u64; 2],
+    pub(super) look_up: unsafe fn(&[i32], &LookUp, usize, &mut [u8], &mut [u8]) -> u64,
+    pub(super) difference: unsafe fn([&[i32]; 2], &mut [i32]),
+    pub(super) latch: unsafe fn(&[i16], usize, &[u16], &mut [i16]),
+    pub(super) gate: unsafe fn(&[i16], &[u8], bool, ErrorBits, usize, &mut [i8]) -> u64,
+    pub(super) turn: unsafe fn(&[u8], usize, &mut [u8]),
+    pub(super) read_columns: unsafe fn(&[u8], Layout, Drives<'_>, &mut [i32]),
+    /// Of as many samples as gates say, of rows that lie a stride apart.
+    pub(super) accumulate: unsafe fn(&[u8], usize, &[i8], &mut Half<i32>),
+    pub(super) accumulate_drawn: unsafe fn(
+        (&[u8], usize),
+        &[i8],
+        &mut Half<i32>,
+        (&Draws, (usize, usize)),
+        &mut Half<u8>,
+        &Half<u8>,
+    ) -> bool,
+    pub(super) dither: unsafe fn(&Draws, usize, usize, &mut Half<u8>),
+    pub(super) dither_words: unsafe fn(&Draws, usize, usize, &mut Half<u16>),
+    pub(super) loud: unsafe fn(Sums<'_>, &Write, u32) -> u16,
+    pub(super) pulses:
+        unsafe fn(Sums<'_>, &Write, Dither<'_>, &mut Cells<'_>, &mut Half<i8>) -> WriteCounts,
+    pub(super) levels: unsafe fn(&mut Cells<'_>, &Half<i8>, Ends, u16) -> u64,
+    /// Both at once, for writes as they usually are.
+    pub(super) fused:
+        unsafe fn(&mut Cells<'_>, &Half<i32>, &Write, Dither<'_>) -> Option<WriteCounts>,
+    pub(super) single: unsafe fn(Single<'_>) -> Option<WriteCounts>,
+    pub(super) peaks: unsafe fn(&Extremes) -> Peaks,
+    pub(super) peak: unsafe fn(usize) -> u64,
+}
+
+/// Compiles the twins of a write's steps for features of the processor.
+macro_rules! twins {
+    ($features:literal) => {
+        #[target_feature(enable = $features)]
+        fn loud(sums: Sums<'_>, write: &Write, bits: u32) -> u16 {
+            crate::chip::crossbar::kernel::pulses::loud_twin(sums, write, bits)
+        }
+
+        #[target_feature(enable = $features)]
+        fn pulses(
+            sums: Sums<'_>,
+            write: &Write,
+            dither: Dither<'_>,
+            cells: &mut Cells<'_>,
+            out: &mut Half<i8>,
+        ) -> WriteCounts {
+            crate::chip::crossbar::kernel::pulses::twin(sums, write, dither, cells, out)
+        }
+
+        #[target_feature(enable = $features)]
+        fn levels(cells: &mut Cells<'_>, pulses: &Half<i8>, ends: Ends, groups: u16) -> u64 {
+            crate::chip::crossbar::kernel::levels::twin(cells, pulses, ends, groups)
+        }
+    };
+}
+
+pub(super) use twins;

@@ -1,0 +1,141 @@
+//! The error unit, cycle by cycle: output words of errors, and the words of layers that do not hear those as they are.
+#![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
+
+use super::{Command, Event, Interval, Network, Order, Span};
+use crate::chip::engine::{Centre, ErrorUnit};
+use crate::chip::hardware::Hardware;
+use crate::chip::layer::WordSource;
+use crate::chip::ledger::During;
+use crate::chip::population::Stream;
+use crate::num::fixed::{rsh, sat};
+
+/// What the unit is, and what it remembers.
+#[derive(Debug)]
+pub(super) struct Unit {
+    centre: Centre,
+    means: Vec<i64>,
+    error_bits: u32,
+    level_bits: u32,
+}
+
+impl Unit {
+    pub(super) fn new(hardware: &Hardware) -> Self {
+        Self {
+            centre: Centre::None,
+            means: vec![],
+            error_bits: hardware.digital.error_bits.get(),
+            level_bits: hardware.cell.level_bits.get(),
+        }
+    }
+}
+
+impl Network {
+    /// Puts an error unit in its present state beside the output layer.
+    pub fn set_error_unit(&mut self, unit: &ErrorUnit) {
+        self.unit.centre = unit.centre();
+        self.unit.means = unit.means().to_vec();
+    }
+
+    /// Running means of the error unit.
+    #[must_use]
+    pub fn means(&self) -> &[i64] {
+        &self.unit.means
+    }
+
+    /// Some cycles of the error unit alone.
+    fn unit_works(&mut self, interval: Interval, name: &'static str, beats: u64) {
+        let start = self.clock;
+        for _ in 0..self.timing.beat * beats {
+            self.begin(interval);
+            self.end();
+        }
+        self.watch.span(Span { layer: None, name, sample: None, start, end: self.clock });
+    }
+
+    /// Makes output words of the errors of the loaded samples.
+    pub fn output_words(&mut self, errors: &[i32]) -> Vec<i16> {
+        let last = self.layers.len() - 1;
+        let outputs = self.layers[last].columns;
+        let (bits, samples) = (self.unit.error_bits, errors.len() / outputs);
+        let errors: Vec<i64> = errors.iter().map(|&e| e.into()).collect();
+        let mut sums = vec![0; outputs];
+        if self.unit.centre == Centre::Batch {
+            // an error a beat, then a mean a beat
+            self.unit_works(Interval::Centre, "mean", (errors.len() + outputs) as u64);
+            errors.iter().enumerate().for_each(|(at, e)| sums[at % outputs] += e);
+        }
+        let mut words = Vec::new();
+        for (at, &e) in errors.iter().enumerate() {
+            let output = at % outputs;
+            let exact = match self.unit.centre {
+                Centre::None => rsh(e, 9 - bits),
+                Centre::Batch => {
+                    let m = (samples as i64) << (9 - bits);
+                    (2 * (samples as i64 * e - sums[output]) + m).div_euclid(2 * m)
+                }
+                Centre::Running => {
+                    let off = (e << 8) - self.unit.means[output];
+                    self.unit.means[output] += rsh(off, 8);
+                    rsh(off, 17 - bits)
+                }
+            };
+            words.push(self.bounded(last, exact));
+        }
+        words
+    }
+
+    /// A word inside its rail; one that is not is counted.
+    fn bounded(&mut self, layer: usize, exact: i64) -> i16 {
+        let (word, saturated) = sat(exact, self.unit.error_bits);
+        let code = self.layers[layer].unit_code(Stream::P);
+        let count = u64::from(saturated);
+        self.charge(layer, code, During::Error, Event::SaturatedErrors, count);
+        i16::try_from(word).expect("at most 9 bits")
+    }
+
+    /// The words a layer's bus carries for a sample; what the error unit has to add takes its beats now.
+    pub(super) fn layer_words(&mut self, order: &Order<'_>, sample: usize) -> Vec<i16> {
+        let layer = order.layer;
+        if !matches!(order.command, Command::Error { .. }) {
+            return vec![];
+        }
+        let delivery = self.layers[layer].delivery.clone();
+        let width = delivery.taps.width;
+        let sum_of = |word: usize| -> i64 {
+            match &delivery.source {
+                WordSource::Signed { signs, .. } => {
+                    let signs = signs.iter().skip(word).step_by(width);
+                    let terms = order.words.iter().zip(signs);
+                    terms.map(|(&s, &sign)| i64::from(s) * i64::from(sign)).sum()
+                }
+                _ => order.words.iter().map(|&s| i64::from(s)).sum(),
+            }
+        };
+        let exact: Vec<i64> = match delivery.source {
+            WordSource::Output => return order.words.to_vec(),
+            WordSource::Sum { shift, .. } | WordSource::Signed { shift, .. } => {
+                // one term after the other, as many a beat as there are lanes
+                let terms = order.words.len() * width;
+                let beats = (0..terms).step_by(usize::try_from(self.timing.lanes).expect("few"));
+                self.unit_works(Interval::Error, "words", beats.count() as u64);
+                if matches!(delivery.source, WordSource::Signed { .. }) {
+                    let code = self.layers[layer].unit_code(Stream::P);
+                    self.charge(layer, code, During::Error, Event::Multiplies, terms as u64);
+                }
+                (0..width).map(|word| rsh(sum_of(word), shift)).collect()
+            }
+            WordSource::Above => {
+                let above = &self.layers[layer + 1];
+                let sums = &above.backward[sample * above.inputs..][..above.inputs];
+                let worth = i64::from(self.unit.level_bits) - i64::from(above.weight_max_log2);
+                let shift = worth + 8 - i64::from(self.unit.error_bits);
+                let scaled = |&d: &i64| match u32::try_from(shift) {
+                    Ok(right) => rsh(d, right),
+                    Err(_) => d << shift.unsigned_abs(),
+                };
+                sums.iter().map(scaled).collect()
+            }
+        };
+        exact.into_iter().map(|exact| self.bounded(layer, exact)).collect()
+    }
+}
