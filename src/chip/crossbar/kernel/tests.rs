@@ -226,7 +226,7 @@ fn check_program(levels: &Half<u8>, sums: &Half<i32>, write: &Write, seed: u64) 
     residual.reverse();
     residual.iter_mut().for_each(|left| *left &= (1 << write.residual_bits) - 1);
     let high = levels.map(|level| level.rotate_left(3) & 15);
-    let gone = |at: usize| u64::from(words[at / 64]) * 0x8000_4000_2001 >> (at % 64) & 1 == 1;
+    let gone = |at: usize| (u64::from(words[at / 64]) * 0x8000_4000_2001) >> (at % 64) & 1 == 1;
     let pruned = std::array::from_fn(|at| if gone(at) { Cells::GONE } else { 0 });
     let (pulses, counts) = ([0; HALF_CELLS], WriteCounts::default());
     let fresh = State { low: *levels, high, residual, pruned, pulses, counts };
