@@ -21,7 +21,9 @@
 #![cfg_attr(
     not(feature = "internals"),
     expect(
+        dead_code,
         unreachable_pub,
+        unused_imports,
         reason = "wings are public to the tests of this repository alone: feature `internals`"
     )
 )]
