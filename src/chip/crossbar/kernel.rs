@@ -59,7 +59,7 @@ pub use self::{
     conv::{ConvPlan, ConvScratch, ConvShape, ConvTurned, Image, Pixels},
     data::{
         Banks, Cells, Conversion, Dither, Drives, Ends, Extremes, Greatest, Half, LookUp, Peaks,
-        Pulsed, Scratch, Single, TOGETHER, Write, WriteCounts, is_driven,
+        Pulsed, Rails, Scratch, Single, TOGETHER, Write, WriteCounts, is_driven,
     },
     sums::Sums,
     team::Team,
@@ -123,7 +123,7 @@ impl Kernel {
     }
 
     /// Reads one panel of two banks tile by tile, converts each and adds `code_E - code_I` to `codes` (32 a
-    /// sample). Returns the conversions that saturated, by bank. The plan proves that codes add up inside 16 bits.
+    /// sample). Returns the conversions that met their rail. The plan proves that codes add up inside 16 bits.
     ///
     /// # Panics
     /// When the sizes do not match.
@@ -133,7 +133,7 @@ impl Kernel {
         samples: Range<usize>,
         scratch: &mut Scratch,
         codes: &mut [i16],
-    ) -> [u64; 2] {
+    ) -> Rails {
         let blocks = banks.drives[0].blocks();
         for (cells, drives) in banks.cells.iter().zip(banks.drives) {
             assert_eq!(cells.len(), blocks * BLOCK_CELLS, "every block has cells");
@@ -145,16 +145,15 @@ impl Kernel {
         assert!(banks.conversion.shift <= Conversion::SHIFT_MAX, "half a step fits");
         assert_eq!(samples.len() * PANEL_COLUMNS, codes.len(), "32 codes a sample");
         if codes.is_empty() {
-            return [0; 2];
+            return Rails::default();
         }
         let whole = samples.len() / TOGETHER * TOGETHER;
         let (these, rest) = codes.split_at_mut(whole * PANEL_COLUMNS);
         let middle = samples.start + whole;
         match call!(self, read_converted(banks, samples.start..middle, scratch, these)) {
-            Some(mut saturated) => {
-                let counts = self.read_apart(banks, middle..samples.end, scratch, rest);
-                saturated.iter_mut().zip(counts).for_each(|(sum, count)| *sum += count);
-                saturated
+            Some(mut rails) => {
+                rails += self.read_apart(banks, middle..samples.end, scratch, rest);
+                rails
             }
             None => self.read_apart(banks, samples, scratch, codes),
         }
@@ -167,8 +166,8 @@ impl Kernel {
         samples: Range<usize>,
         scratch: &mut Scratch,
         codes: &mut [i16],
-    ) -> [u64; 2] {
-        let mut saturated = [0; 2];
+    ) -> Rails {
+        let mut rails = Rails::default();
         let blocks = banks.drives[0].blocks();
         let groups = samples.clone().step_by(TOGETHER);
         for (start, codes) in groups.zip(codes.chunks_mut(Scratch::SUMS)) {
@@ -182,11 +181,10 @@ impl Kernel {
                     self.read(cells, drives, group.clone(), &mut out[..codes.len()]);
                 }
                 let [e, i] = [0, 1].map(|bank| &scratch.currents[bank][..codes.len()]);
-                let counts = call!(self, convert([e, i], banks.conversion, banks.live, codes));
-                saturated.iter_mut().zip(counts).for_each(|(sum, count)| *sum += count);
+                rails += call!(self, convert([e, i], banks.conversion, banks.live, codes));
             }
         }
-        saturated
+        rails
     }
 
     /// Looks up accumulators (`[sample][32]`, the first `live` of them): `values` and `derivatives` lie

@@ -22,7 +22,7 @@ use self::fused::TileBank;
 use self::product::{Walk, half_block, levels_by_drives, levels_by_gates, pair};
 use super::avx512::{self, Avx512};
 use super::ops::Ops;
-use super::{Banks, Draws, Drives, Half, Image, Packed, Scratch, TOGETHER, peak};
+use super::{Banks, Draws, Drives, Half, Image, Packed, Rails, Scratch, TOGETHER, peak};
 use crate::chip::crossbar::layout::{BLOCK_CELLS, BLOCK_ROWS, HALF_CELLS, Layout};
 
 /// Sums of the first four tile registers start at 0.
@@ -252,15 +252,16 @@ unsafe fn read_converted(
     samples: Range<usize>,
     scratch: &mut Scratch,
     codes: &mut [i16],
-) -> Option<[u64; 2]> {
+) -> Option<Rails> {
     // SAFETY: the caller says so.
     let tiles = unsafe { Tiles::here() };
     let blocks = banks.drives[0].blocks();
-    let mut saturated = [0; 2];
+    let mut rails = Rails::default();
     let sums = &mut scratch.currents;
     for (group, codes) in codes.as_chunks_mut::<{ Scratch::SUMS }>().0.iter_mut().enumerate() {
         let first = (samples.start + group * TOGETHER) * BLOCK_ROWS;
-        let mut packed = Packed { codes: [0; Scratch::SUMS], saturated: [[0; 32]; 2] };
+        let (saturated, reached) = ([[0; 32]; 2], [[0; 32]; 2]);
+        let mut packed = Packed { codes: [0; Scratch::SUMS], saturated, reached };
         let tile = |tile: &Range<usize>, bank: usize| {
             let drives = banks.drives[bank];
             let size = drives.samples() * BLOCK_ROWS;
@@ -283,7 +284,7 @@ unsafe fn read_converted(
             let blocks = from..(from + banks.tile_blocks).min(blocks);
             let [e, i] = &mut *sums;
             if at == 0 {
-                // nothing to convert yet: zeros are code 0, and no conversion of them saturates
+                // nothing to convert yet: zeros are code 0, which is no rail
                 i.fill(0);
             }
             fused::converting_inhibition(
@@ -303,10 +304,9 @@ unsafe fn read_converted(
                 &mut packed,
             );
         }
-        let counts = avx512::settle(&sums[1], banks.conversion, banks.live, &mut packed, codes);
-        saturated.iter_mut().zip(counts).for_each(|(sum, count)| *sum += count);
+        rails += avx512::settle(&sums[1], banks.conversion, banks.live, &mut packed, codes);
     }
-    Some(saturated)
+    Some(rails)
 }
 
 /// # Safety

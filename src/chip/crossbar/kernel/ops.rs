@@ -14,7 +14,7 @@ use std::ops::Range;
 
 use super::{
     Banks, Cells, Conversion, Dither, Draws, Drives, Ends, Extremes, Half, Image, LookUp, Peaks,
-    Scratch, Single, Sums, Write, WriteCounts,
+    Rails, Scratch, Single, Sums, Write, WriteCounts,
 };
 use crate::chip::crossbar::layout::Layout;
 use crate::num::fixed::ErrorBits;
@@ -27,8 +27,8 @@ pub(super) struct Ops {
         unsafe fn(&[u8], Image<'_>, (Range<usize>, Range<usize>), &mut [i32]) -> bool,
     /// Of whole groups of [`TOGETHER`](super::TOGETHER) samples.
     pub(super) read_converted:
-        unsafe fn(&Banks<'_>, Range<usize>, &mut Scratch, &mut [i16]) -> Option<[u64; 2]>,
-    pub(super) convert: unsafe fn([&[i32]; 2], Conversion, usize, &mut [i16]) -> [u64; 2],
+        unsafe fn(&Banks<'_>, Range<usize>, &mut Scratch, &mut [i16]) -> Option<Rails>,
+    pub(super) convert: unsafe fn([&[i32]; 2], Conversion, usize, &mut [i16]) -> Rails,
     pub(super) look_up: unsafe fn(&[i32], &LookUp, usize, &mut [u8], &mut [u8]) -> u64,
     pub(super) difference: unsafe fn([&[i32]; 2], &mut [i32]),
     pub(super) latch: unsafe fn(&[i16], usize, &[u16], &mut [i16]),
