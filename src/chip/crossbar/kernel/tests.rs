@@ -9,6 +9,7 @@ use crate::chip::crossbar::layout::{HALF_CELLS, HALF_COLUMNS, in_half};
 use crate::num::draw::{BLOCK_BYTES, Place, Site};
 
 mod reads;
+mod steps;
 
 /// Bytes from a seed, or only the greatest when the seed says so.
 fn bytes(seed: u64, len: usize) -> Vec<u8> {
@@ -198,10 +199,10 @@ struct State {
 }
 
 /// The state after a write. `wide` levels have a high byte; with `absorbs` the floor keeps cells.
-fn programmed(
+fn programmed<'a>(
     kernel: &Kernel,
     mut state: State,
-    sums: &Half<i32>,
+    sums: impl Into<Sums<'a>>,
     write: &Write,
     dither: Dither<'_>,
     [wide, absorbs]: [bool; 2],
@@ -226,7 +227,7 @@ fn check_program(levels: &Half<u8>, sums: &Half<i32>, write: &Write, seed: u64) 
     residual.reverse();
     residual.iter_mut().for_each(|left| *left &= (1 << write.residual_bits) - 1);
     let high = levels.map(|level| level.rotate_left(3) & 15);
-    let gone = |at: usize| u64::from(words[at / 64]) * 0x8000_4000_2001 >> (at % 64) & 1 == 1;
+    let gone = |at: usize| (u64::from(words[at / 64]) * 0x8000_4000_2001) >> (at % 64) & 1 == 1;
     let pruned = std::array::from_fn(|at| if gone(at) { Cells::GONE } else { 0 });
     let (pulses, counts) = ([0; HALF_CELLS], WriteCounts::default());
     let fresh = State { low: *levels, high, residual, pruned, pulses, counts };
