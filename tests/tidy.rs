@@ -20,7 +20,7 @@ use source::{is_word, module_of, reaches, tokens};
 const HOUSE: [(&str, &[&str]); 6] = [
     ("num", &["fixed", "draw", "tables"]),
     ("chip", &["hardware", "ledger", "periphery", "crossbar", "population", "layer", "engine"]),
-    ("learn", &["error", "route", "statistics", "rule", "driver"]),
+    ("learn", &["error", "route", "statistics", "rule", "driver", "network"]),
     ("task", &["classify"]),
     ("lab", &["data", "config", "store", "price", "table", "report", "run", "wave", "sweep"]),
     (

@@ -237,7 +237,11 @@ pub fn check(specs: &[LayerSpec], hardware: &Hardware) -> Result<(), PlanError> 
     let mut by_layer = Vec::new();
     for (layer, spec) in specs.iter().enumerate() {
         let layout =
-            Layout { rows: spec.inputs + usize::from(spec.constant_row), columns: spec.units };
+            // a sum that saturates is refused as too many
+            Layout {
+                rows: spec.inputs.saturating_add(usize::from(spec.constant_row)),
+                columns: spec.units,
+            };
         let Layout { rows, columns } = layout;
         if !(1..=SIDE_MAX).contains(&rows) || !(1..=SIDE_MAX).contains(&columns) {
             return Err(PlanError::Size { layer, rows, columns, max: SIDE_MAX });

@@ -6,8 +6,8 @@ use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressStyle};
 
+use crate::lab::run::Progress;
 use crate::lab::store::record::EpochRecord;
-use crate::task::classify::Progress;
 
 /// Seconds between plain lines within an epoch.
 const LINE_SECONDS: u64 = 10;
@@ -29,7 +29,7 @@ impl Meter {
         let now = Instant::now();
         let bar = (!quiet && std::io::stderr().is_terminal()).then(|| {
             let bar = ProgressBar::new(0);
-            let template = "{prefix} {bar:30} {pos}/{len} images  {msg}";
+            let template = "{prefix} {bar:30} {pos}/{len} samples  {msg}";
             bar.set_style(ProgressStyle::with_template(template).expect("a valid template"));
             bar
         });
@@ -38,7 +38,7 @@ impl Meter {
 
     /// Notes a batch.
     pub(super) fn batch(&mut self, progress: Progress) {
-        let Progress { epoch, samples, samples_total, correct } = progress;
+        let Progress { epoch, done: samples, total: samples_total, answers } = progress;
         let done = u64::from(epoch) * samples_total as u64 + samples as u64;
         if self.samples == 0 {
             // a continued run has a past that this process did not spend time on
@@ -53,8 +53,9 @@ impl Meter {
         let total = u64::from(self.epochs) * samples_total as u64;
         let left =
             Duration::from_secs_f64(((total - done.min(total)) as f64 / rate.max(1.0)).min(1e9));
-        let right = 100.0 * correct as f64 / samples as f64;
-        let message = format!("train {right:.2} %  {rate:.0} images/s  {} to go", clock(left));
+        let right = answers.map(|score| format!("train {:.2} %  ", 100.0 * score.fraction()));
+        let right = right.unwrap_or_default();
+        let message = format!("{right}{rate:.0} samples/s  {} to go", clock(left));
         if let Some(bar) = &self.bar {
             bar.set_length(samples_total as u64);
             bar.set_prefix(format!("epoch {:>3}/{}", epoch + 1, self.epochs));
@@ -63,7 +64,7 @@ impl Meter {
         } else if self.last_line.elapsed() >= Duration::from_secs(LINE_SECONDS) {
             self.last_line = Instant::now();
             eprintln!(
-                "epoch {}/{}: {samples}/{samples_total} images, {message}",
+                "epoch {}/{}: {samples}/{samples_total} samples, {message}",
                 epoch + 1,
                 self.epochs
             );
@@ -87,8 +88,8 @@ impl Meter {
             "epoch {:>3}/{}  train {:>8}  validation {:>8}  floor {:>5.1} %  {:>7.2} s  {}",
             record.epoch,
             self.epochs,
-            percent(record.train),
-            percent(record.validation),
+            percent(record.train()),
+            percent(record.validation()),
             100.0 * floor as f64 / cells.max(1) as f64,
             seconds,
             &record.state_hash[..12],

@@ -11,7 +11,7 @@ use super::progress::Meter;
 use super::{Done, Failure, Shared, configuration, environment, say, usage};
 use crate::lab::run::{self, Event, Machine, Outcome, RunError, Verdict};
 use crate::lab::store::index::{INDEX, Store};
-use crate::lab::store::record::TestRecord;
+use crate::lab::store::record::{TestOutcome, TestRecord};
 use crate::lab::sweep::{self, Sampled};
 
 #[derive(Debug, Args)]
@@ -66,7 +66,7 @@ impl From<RunError> for Failure {
     fn from(error: RunError) -> Self {
         let code = match error {
             RunError::Stopped { .. } => 3,
-            RunError::Config(_) | RunError::Plan(_) => 2,
+            RunError::Config(_) | RunError::Network(_) => 2,
             _ => 1,
         };
         Self { code, message: error.to_string() }
@@ -166,13 +166,14 @@ pub(super) fn train(args: &TrainArgs) -> Done {
 fn done(run: &str, outcome: &Outcome) -> serde_json::Value {
     let (receipt, seconds) = (&outcome.receipt, outcome.timing.train_seconds());
     let last = outcome.records.last();
-    let images: u64 = outcome.records.iter().filter_map(|r| r.train).map(|score| score.total).sum();
+    let images: u64 =
+        outcome.records.iter().filter_map(|r| r.train()).map(|score| score.total).sum();
     json!({
         "event": "done",
         "run": run,
-        "test_accuracy": receipt.test.as_ref().map(|test| test.score.fraction()),
-        "test_epoch": receipt.test.as_ref().map(|test| test.epoch),
-        "validation_accuracy": last.and_then(|r| r.validation).map(|score| score.fraction()),
+        "test_accuracy": receipt.classified().map(|test| test.score.fraction()),
+        "test_epoch": receipt.test.as_ref().map(TestOutcome::epoch),
+        "validation_accuracy": last.and_then(|r| r.validation()).map(|score| score.fraction()),
         "state_hash": last.map(|record| record.state_hash.clone()),
         "epochs": last.map(|record| record.epoch),
         "cycles": outcome.cost.cycles,
@@ -187,7 +188,7 @@ fn done(run: &str, outcome: &Outcome) -> serde_json::Value {
 pub(super) fn eval(args: &EvalArgs) -> Done {
     let shared = &args.shared;
     let (test, state_hash) = run::evaluate(&args.run, &shared.data_root(), shared.machine()?)?;
-    let TestRecord { epoch, ref select, score, .. } = test;
+    let TestOutcome::Classify(TestRecord { epoch, ref select, score, .. }) = test;
     if shared.json {
         say(&json!({
             "event": "done",

@@ -7,7 +7,9 @@
 mod check;
 mod chip;
 mod data;
+mod experiment;
 pub mod file;
+mod given;
 mod hardware;
 mod layers;
 mod quantity;
@@ -48,6 +50,9 @@ pub enum ConfigError {
         /// What was found and what is allowed.
         error: crate::num::fixed::OutOfRange,
     },
+    /// A network that does not fit together, or not on the chip.
+    #[error(transparent)]
+    Network(#[from] crate::learn::network::NetworkError),
     /// A value that does not fit with the others.
     #[error("`{key}` {found}; {allowed}")]
     Value {

@@ -3,11 +3,13 @@
 //! A [`Session`] is a training in memory that makes records; [`train`] keeps it in a folder, [`verify()`] compares it with
 //! one. Neither prints: callers get [`Event`]s.
 
+mod classify;
 mod profile;
 mod proof;
 mod report;
 mod repriced;
 mod session;
+mod task;
 mod train;
 mod verify;
 
@@ -15,15 +17,26 @@ pub use profile::{Act, Profile, profile};
 pub use proof::records;
 pub use report::{ReportMade, report};
 pub use repriced::{Prices, Repriced, reprice, reprice_as};
-pub use session::{Machine, Session};
+pub use session::Session;
+pub use task::Progress;
 pub use train::{Event, Keeping, Outcome, address_of, carry_on, evaluate, resume, train};
 pub use verify::{Verdict, verify};
 
-use crate::chip::layer::PlanError;
+use crate::chip::crossbar::kernel::Backend;
 use crate::lab::config::ConfigError;
 use crate::lab::data::DataError;
 use crate::lab::store::checkpoint::CheckpointError;
 use crate::lab::store::folder::FolderError;
+use crate::learn::network::NetworkError;
+
+/// What a run is carried out with; none of it changes a result.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Machine {
+    /// Which loops run.
+    pub backend: Backend,
+    /// Threads.
+    pub threads: usize,
+}
 
 /// Why a run could not be carried out.
 #[derive(Debug, thiserror::Error)]
@@ -34,9 +47,9 @@ pub enum RunError {
     /// The data.
     #[error(transparent)]
     Data(#[from] DataError),
-    /// The network does not fit the chip.
+    /// The network does not fit together, or not on the chip.
     #[error(transparent)]
-    Plan(#[from] PlanError),
+    Network(#[from] NetworkError),
     /// The folder.
     #[error(transparent)]
     Folder(#[from] FolderError),

@@ -18,7 +18,6 @@
 pub mod address;
 pub mod checkpoint;
 pub mod folder;
-pub mod given;
 pub mod hash;
 pub mod index;
 pub mod ledger;

@@ -69,9 +69,9 @@ pub fn record(
     after.keep_tape();
     after.updates(look.update)?;
     let tape = after.take_tape();
-    let samples = samples_of(&tape, before.trainer().driver().engine().layers()[0].spec.inputs);
+    let samples = samples_of(&tape, before.engines()[0].layers()[0].spec.inputs);
 
-    let engine = before.trainer().driver().engine();
+    let engine = before.engines()[0];
     let mut network = Network::new(&config.hardware, config.seed, engine.layers(), samples);
     network.set_learning(engine.mantissa(), engine.potentiation_only());
     network.set_error_unit(engine.error_unit());
@@ -92,7 +92,7 @@ pub fn record(
     });
     network.play_tape(&tape);
 
-    let reached = after.trainer().driver().engine();
+    let reached = after.engines()[0];
     for (at, layer) in reached.layers().iter().enumerate() {
         for (array, cells) in layer.arrays.iter().enumerate() {
             let same = cells.levels().eq(network.levels(at, array));

@@ -11,13 +11,13 @@ use crate::chip::state::{Section, State, StateError, Visitor, visit_counts};
 
 /// How a network learns.
 #[derive(Debug, Clone)]
-pub struct Learning {
+pub(crate) struct Learning {
     /// The rule.
-    pub rule: Rule,
+    pub(crate) rule: Rule,
     /// When a batch is written.
-    pub mode: UpdateMode,
+    pub(crate) mode: UpdateMode,
     /// Shifts of each layer: `(first update, k)`, in order.
-    pub shifts: Vec<Vec<(u64, u32)>>,
+    pub(crate) shifts: Vec<Vec<(u64, u32)>>,
 }
 
 /// Learning in progress on an engine.
@@ -29,9 +29,9 @@ pub struct Driver {
 }
 
 impl Driver {
-    /// Starts learning on an engine.
+    /// Starts learning on an engine whose layers `learning` fits: the network builder sees to that.
     #[must_use]
-    pub fn new(mut engine: Engine, learning: Learning, unit: ErrorUnit) -> Self {
+    pub(crate) fn new(mut engine: Engine, learning: Learning, unit: ErrorUnit) -> Self {
         engine.set_error_unit(unit);
         Self { engine, learning, updates: 0 }
     }

@@ -41,7 +41,7 @@ pub enum Route {
 impl Route {
     /// How the words of `outputs` channels reach a hidden layer of `units`. Random routes are drawn by seed and layer.
     #[must_use]
-    pub fn delivery(self, units: usize, outputs: usize, seed: u64, layer: u16) -> Delivery {
+    pub(crate) fn delivery(self, units: usize, outputs: usize, seed: u64, layer: u16) -> Delivery {
         let place = Place { layer, ..Place::global(seed, Site::Route, 0) };
         let outputs_u32 = u32::try_from(outputs).expect("checked by the plan");
         let word = |w: usize| u16::try_from(w).expect("checked by the plan");

@@ -4,16 +4,20 @@
 //! lut_a[i] = floor(255 f + 1/2), lut_d[i] = floor(255 f' / peak + 1/2), both at z = i * 2^lsh units, clamped to 0..=255
 //! unit     = weight_max / ( 2^level_bits * (2^drive_bits - 1) )                        of z
 //! lsh      = least shift >= 0 with 2^(lut_bits - 1 + lsh) units >= 4 alpha (sigmoid), 4 (ReLU, identity)
+//! exact    : units are rational, so tables of ReLU and identity, and their lsh, are computed in integers:
+//!            lut_a[i] = floor( (2 * 255 * i * 2^p + D) / (2 D) ),  p = lsh + log2(weight_max) - level_bits,  D = 2^drive_bits - 1
 //! k        = integer nearest to -log2( rate / (B m) * 2^error_bits
-//!            / ( (2^drive_bits - 1) (2^(error_bits-1) - 1) 255 * 2 alpha ) * 2^level_bits / weight_max )
+//!            / ( (2^drive_bits - 1) (2^(error_bits-1) - 1) 255 * 2 alpha ) * 2^level_bits / weight_max ),  0..=30
 //! ```
 //!
-//! Only `+ - * /` and the functions of the `libm` crate (pure Rust, pinned) are used, so the integers are the
+//! Elsewhere only `+ - * /` and the functions of the `libm` crate (pure Rust, pinned) are used, so the integers are the
 //! same on every machine. See docs/MODEL.md, 2 and 3.
 #![expect(clippy::float_arithmetic, reason = "floats become integers here and nowhere else")]
 #![deny(clippy::disallowed_types, clippy::disallowed_methods)]
 
-use super::fixed::{Batch, DriveBits, ErrorBits, LevelBits, LutBits, RateMantissa};
+use super::fixed::{
+    Batch, DriveBits, ErrorBits, LevelBits, LutBits, OutOfRange, RateMantissa, log2_ceil,
+};
 
 /// A finite number above 0, given by the user: a width, a rate, a factor.
 #[derive(Debug, Clone, Copy, PartialEq, PartialOrd)]
@@ -54,31 +58,11 @@ pub enum Activation {
 }
 
 impl Activation {
-    /// `z` at which the table ends.
-    fn range(self) -> f64 {
-        match self {
-            Self::Sigmoid(alpha) => 4.0 * alpha.0,
-            Self::Relu | Self::Identity => 4.0,
-        }
-    }
-
     /// `1 / peak` of the derivative.
     fn steepness(self) -> f64 {
         match self {
             Self::Sigmoid(alpha) => 2.0 * alpha.0,
             Self::Relu | Self::Identity => 1.0,
-        }
-    }
-
-    /// Value, and derivative as a fraction of its peak.
-    fn at(self, z: f64) -> (f64, f64) {
-        match self {
-            Self::Sigmoid(alpha) => {
-                let y = 1.0 / (1.0 + libm::exp(-2.0 * z / alpha.0));
-                (y, 4.0 * y * (1.0 - y))
-            }
-            Self::Relu => (z, if z > 0.0 { 1.0 } else { 0.0 }),
-            Self::Identity => (z, 1.0),
         }
     }
 }
@@ -117,20 +101,50 @@ impl Lut {
     /// Builds the table of `2^bits` entries.
     #[must_use]
     pub fn new(activation: Activation, bits: LutBits, unit: Unit) -> Self {
-        let half = i32::try_from(1u32 << (bits.get() - 1)).expect("at most 2^13");
+        match activation {
+            Activation::Sigmoid(alpha) => Self::sigmoid(alpha, bits, unit),
+            Activation::Relu => Self::linear(bits, unit, |i| i > 0),
+            Activation::Identity => Self::linear(bits, unit, |_| true),
+        }
+    }
+
+    fn sigmoid(alpha: Positive, bits: LutBits, unit: Unit) -> Self {
+        let half = 1i32 << (bits.get() - 1);
         let span = f64::from(half) * unit.of_z();
         let mut shift = 0;
-        while span * libm::exp2(f64::from(shift)) < activation.range() {
+        while span * libm::exp2(f64::from(shift)) < 4.0 * alpha.0 {
             shift += 1;
         }
         let step = unit.of_z() * libm::exp2(f64::from(shift));
         let (activity, derivative) = (-half..half)
             .map(|i| {
-                let (value, slope) = activation.at(f64::from(i) * step);
-                (code(value), code(slope))
+                let z = f64::from(i) * step;
+                let y = 1.0 / (1.0 + libm::exp(-2.0 * z / alpha.0));
+                (code(y), code(4.0 * y * (1.0 - y)))
             })
             .unzip();
         Self { activity, derivative, shift }
+    }
+
+    /// `z` in 0..=1, in integers; the derivative is 1 where `slope` says so of an index, else 0.
+    fn linear(bits: LutBits, unit: Unit, slope: impl Fn(i64) -> bool) -> Self {
+        let half = 1i64 << (bits.get() - 1);
+        let codes = i64::from(unit.drive_bits.code_max());
+        let log2 = i64::from(unit.weight_max_log2) - i64::from(unit.level_bits.get());
+        // 2^(bits - 1 + lsh + log2) >= 4 (2^drive_bits - 1)
+        let least = i64::from(log2_ceil(4 * codes.unsigned_abs()));
+        let shift = (least - i64::from(bits.get() - 1) - log2).max(0);
+        // z = i 2^p / codes, so 255 z + 1/2 = (2 255 i 2^p + codes) / (2 codes)
+        let p = shift + log2;
+        let (factor, divisor) =
+            if p >= 0 { (255i64 << p, codes) } else { (255, codes << p.unsigned_abs()) };
+        let activity = (-half..half).map(|i| {
+            let rounded = (2 * factor * i + divisor).div_euclid(2 * divisor);
+            u8::try_from(rounded.clamp(0, 255)).expect("clamped to a byte")
+        });
+        let derivative = (-half..half).map(|i| if slope(i) { 255 } else { 0 });
+        let shift = u32::try_from(shift).expect("at most a few dozen");
+        Self { activity: activity.collect(), derivative: derivative.collect(), shift }
     }
 }
 
@@ -184,11 +198,43 @@ impl Rate {
         -libm::log2(self.rate.0 / samples * scale * levels)
     }
 
+    /// `k` before any decay: the integer nearest to the exact shift.
+    ///
+    /// # Errors
+    /// When it lies outside `0..=SHIFT_MAX`: no shift stands for such a rate.
+    pub fn shift(self) -> Result<u32, OutOfRange> {
+        let nearest = libm::floor(self.shift_exact() + 0.5);
+        #[expect(clippy::cast_possible_truncation, reason = "a logarithm: some hundreds at most")]
+        let found = nearest as i64;
+        let k = u32::try_from(found).ok().filter(|&k| k <= SHIFT_MAX);
+        k.ok_or(OutOfRange { name: "k", found, min: 0, max: SHIFT_MAX.into() })
+    }
+
+    /// The rate that `k` and the mantissa really give: within a factor of `sqrt(2)` of the one asked for.
+    ///
+    /// # Errors
+    /// As of [`Rate::shift`].
+    pub fn effective(self) -> Result<Positive, OutOfRange> {
+        let k = self.shift()?;
+        let rail = f64::from((1u32 << (self.error_bits.get() - 1)) - 1);
+        let codes = f64::from(self.unit.drive_bits.code_max());
+        let samples = f64::from(self.batch.get()) * f64::from(self.mantissa.get());
+        let log2 = self.unit.weight_max_log2;
+        let bits = self.unit.level_bits.get() + self.error_bits.get() + k;
+        let scale = libm::exp2(f64::from(log2) - f64::from(bits));
+        // whole numbers but for alpha: scaled by a power of two last
+        Ok(Positive(samples * codes * rail * 255.0 * self.activation.steepness() * scale))
+    }
+
     /// The shifts over `updates` updates: `(first update, k)`, in order; k changes at each entry.
     ///
-    /// The decay is applied before rounding: `k(t) = nearest(k - log2(decay(t)))`, at most 30.
-    #[must_use]
-    pub fn shifts(self, decay: Decay, updates: u64) -> Vec<(u64, u32)> {
+    /// The decay is applied before rounding, `k(t) = nearest(k* - log2(decay(t)))`, and the table ends at
+    /// `SHIFT_MAX`: a rate that has fallen further stays there.
+    ///
+    /// # Errors
+    /// When the shift before any decay lies outside `0..=SHIFT_MAX`.
+    pub fn shifts(self, decay: Decay, updates: u64) -> Result<Vec<(u64, u32)>, OutOfRange> {
+        self.shift()?;
         let exact = self.shift_exact();
         let mut table: Vec<(u64, u32)> = Vec::new();
         for update in 0..updates.max(1) {
@@ -202,7 +248,7 @@ impl Rate {
             };
             let nearest = libm::floor(exact - libm::log2(factor) + 0.5);
             #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0..=30")]
-            let k = nearest.clamp(0.0, f64::from(SHIFT_MAX)) as u32;
+            let k = nearest.min(f64::from(SHIFT_MAX)) as u32;
             if table.last().is_none_or(|&(_, last)| last != k) {
                 table.push((update, k));
             }
@@ -210,7 +256,7 @@ impl Rate {
                 break;
             }
         }
-        table
+        Ok(table)
     }
 }
 
@@ -278,9 +324,9 @@ mod tests {
     fn a_mantissa_and_a_batch_divide_the_rate() {
         // 13.24 of the known recipe, + log2(3), + log2(4)
         let three = Rate { mantissa: RateMantissa::new(3).unwrap(), ..rate(20.0, 6.0) };
-        assert_eq!(three.shifts(Decay::Constant, 1), [(0, 15)]);
+        assert_eq!(three.shifts(Decay::Constant, 1).unwrap(), [(0, 15)]);
         let large = Rate { batch: Batch::new(128).unwrap(), ..rate(20.0, 6.0) };
-        assert_eq!(large.shifts(Decay::Constant, 1), [(0, 15)]);
+        assert_eq!(large.shifts(Decay::Constant, 1).unwrap(), [(0, 15)]);
     }
 
     #[test]
@@ -299,6 +345,43 @@ mod tests {
     }
 
     #[test]
+    fn exact_halves_of_a_linear_table_go_up() {
+        // floats once put them just below: entry 5 at z = 5/6, where 255 z is 212 1/2; entry 33 at 16 1/2
+        for (bits, drive_bits, entry, code) in [(6, 2, 5, 213), (12, 8, 33, 17)] {
+            for activation in [Activation::Relu, Activation::Identity] {
+                let lut_bits = LutBits::new(bits).unwrap();
+                let lut = Lut::new(activation, lut_bits, unit(0, 8, drive_bits));
+                assert_eq!((lut.shift, lut.activity[(1 << (bits - 1)) + entry]), (7, code));
+            }
+        }
+    }
+
+    #[test]
+    fn a_linear_table_is_the_rational_function_rounded_and_just_reaches_its_end() {
+        for (weight_max_log2, level_bits, drive_bits, bits) in
+            [(8, 1, 1, 2), (-8, 12, 8, 14), (4, 4, 3, 9), (8, 1, 8, 14), (0, 5, 5, 5)]
+        {
+            let lut_bits = LutBits::new(bits).unwrap();
+            let lut =
+                Lut::new(Activation::Relu, lut_bits, unit(weight_max_log2, level_bits, drive_bits));
+            let scaled = |v: i128| v << 40;
+            // one accumulator unit is `top / (bottom 2^40)` of z
+            let top = scaled(1) >> level_bits << (weight_max_log2 + 8) >> 8;
+            let bottom = (1i128 << drive_bits) - 1;
+            let half = 1i128 << (bits - 1);
+            let reaches = |shift: u32| (half << shift) * top >= 4 * scaled(bottom);
+            assert!(reaches(lut.shift) && (lut.shift == 0 || !reaches(lut.shift - 1)));
+            for (i, &code) in (-half..half).zip(&lut.activity) {
+                // code <= 255 z + 1/2 < code + 1, unless an end is nearer
+                let twice = 2 * 255 * (i << lut.shift) * top + scaled(bottom);
+                let code = i128::from(code);
+                assert!(code == 0 || 2 * code * scaled(bottom) <= twice, "{i}");
+                assert!(code == 255 || twice < 2 * (code + 1) * scaled(bottom), "{i}");
+            }
+        }
+    }
+
+    #[test]
     fn relu_and_identity_end_at_full_code() {
         let bits = LutBits::new(10).unwrap();
         let relu = Lut::new(Activation::Relu, bits, unit(0, 8, 8));
@@ -311,12 +394,25 @@ mod tests {
     #[test]
     fn the_known_recipe_has_the_known_shift() {
         // rate 20, B = 32, alpha = 6, weight_max = 4, 8 bits: k = 13 with 8-bit gates
-        assert_eq!(rate(20.0, 6.0).shifts(Decay::Constant, 1000), [(0, 13)]);
+        assert_eq!(rate(20.0, 6.0).shifts(Decay::Constant, 1000).unwrap(), [(0, 13)]);
+        // 13.2404 is rounded to 13, so the rate is 20 x 2^0.2404
+        let effective = rate(20.0, 6.0).effective().unwrap().get();
+        assert_eq!(effective, 255.0 * 127.0 * 255.0 * 12.0 * 32.0 * 4.0 / 65536.0 / 8192.0);
+        assert!((23.62..23.63).contains(&effective), "{effective}");
+    }
+
+    #[test]
+    fn shifts_outside_0_to_30_are_refused_with_what_they_would_be() {
+        // a factor of 2^k moves the shift by k; 20 at 13.2404
+        let k = |times: f64| rate(20.0 * times, 6.0).shift().map_err(|error| error.found);
+        assert_eq!([k(8192.0), k(8192.0 * 1.8)], [Ok(0), Err(-1)]);
+        assert_eq!([k(1.0 / 131_072.0), k(0.8 / 131_072.0)], [Ok(30), Err(31)]);
+        assert!(rate(1e-6, 6.0).shifts(Decay::Constant, 1).is_err());
     }
 
     #[test]
     fn a_cosine_starts_at_the_constant_shift_and_only_rises() {
-        let table = rate(20.0, 6.0).shifts(Decay::Cosine, 1000);
+        let table = rate(20.0, 6.0).shifts(Decay::Cosine, 1000).unwrap();
         // 13.2404 - log2( (1 + cos(pi t / 1000)) / 2 ) passes 13.5, 14.5 and 15.5 there
         assert_eq!(table[..4], [(0, 13), (267, 14), (553, 15), (698, 16)]);
         assert!(table.is_sorted() && table.last().unwrap().1 <= SHIFT_MAX);

@@ -148,7 +148,7 @@ def tables(act, alpha, lsh, unit, lut_bits):
             for f in (fa, fd):       # no entry so near a half that the last bit of exp could matter
                 assert abs(f - math.floor(f) - 0.5) > 1e-9 or i == 0, (i, f)
             a, d = math.floor(fa + 0.5), math.floor(fd + 0.5)
-        elif act == "relu":
+        elif act == "relu":        # rational: no float is near
             a, d = math.floor(255 * max(z, Fr(0)) + Fr(1, 2)), 255 if z > 0 else 0
         else:
             a, d = math.floor(255 * z + Fr(1, 2)), 255
@@ -165,6 +165,7 @@ def rate_shift(rate, batch, mantissa, eb, db, lb, weight_max, act, alpha):
     assert abs(v - math.floor(v) - 0.5) > 1e-9
     # exact: nearest integer means 2^-(k+1/2) < x < 2^-(k-1/2), squared to stay rational
     assert Fr(2) ** (-2 * k - 1) < x * x < Fr(2) ** (-2 * k + 1)
+    assert 0 <= k <= 30, k          # others are refused
     return k
 
 
@@ -591,6 +592,8 @@ CASES = [
     ("drive4_error4", "4-bit drives and errors, mantissa 15: the shift may lie below the dither width", dict(drive_bits=4, error_bits=4, rate=[60, 20, 5], mantissa=3, hidden=[40, 17], seed=19)),
     ("drive4_error4_fast", "4-bit drives and errors: shifts below the dither width", dict(drive_bits=4, error_bits=4, rate=40, seed=26)),
     ("relu_hidden", "ReLU in the hidden layer, sigmoid at the output", dict(act=["relu", "sigmoid"], alpha=4, weight_max=[2, 4], rate=[2, 10], seed=27)),
+    ("relu_exact_halves", "ReLU in the hidden layer, by a table of 12 bits with entries at exact halves", dict(act=["relu", "sigmoid"], lut_bits=12, weight_max=[1, 4], rate=[2, 10], seed=30)),
+    ("identity_hidden", "identity in the hidden layer, 12 bits", dict(act=["identity", "sigmoid"], lut_bits=12, weight_max=[1, 4], rate=[2, 10], seed=31)),
     ("table_saturation", "alpha 1/2 and weight_max 8: accumulators leave the table; 7-bit table index", dict(alpha=[0.5, 1], weight_max=[8, 8], lut_bits=7, centre="none", rate=5, seed=20)),
     ("adc6_digital_explicit", "6-bit converters, explicit shift 3, 2-bit slices, row tiles of 32", dict(adc="finite", adc_bits=6, adc_range=3, dac_bits=2, tile_rows=32, subtract="digital", rate=10, seed=21)),
     ("adc6_current_explicit", "the same with current subtraction and 3-bit slices (the last has two bits)", dict(adc="finite", adc_bits=6, adc_range=5, dac_bits=3, tile_rows=32, subtract="current", hidden=[40, 17], rate=[20, 10, 5], seed=22)),
@@ -631,7 +634,10 @@ def micro():
     getcontext().prec = 40
     for act, alpha, wm, lb, db, lut in [("sigmoid", 4, 4, 8, 8, 10), ("sigmoid", 6, 4, 8, 8, 10), ("sigmoid", 4, 2, 8, 8, 10), ("sigmoid", 6, 1, 8, 8, 10),
                                         ("sigmoid", 4, 4, 2, 8, 10), ("sigmoid", 4, 4, 12, 8, 10), ("sigmoid", 4, 4, 8, 4, 10), ("sigmoid", 4, 4, 8, 8, 6),
-                                        ("sigmoid", 0.5, 8, 8, 8, 7), ("sigmoid", 1, 8, 8, 8, 7), ("relu", 4, 4, 8, 8, 10), ("identity", 4, 4, 8, 8, 10)]:
+                                        ("sigmoid", 0.5, 8, 8, 8, 7), ("sigmoid", 1, 8, 8, 8, 7), ("relu", 4, 4, 8, 8, 10), ("identity", 4, 4, 8, 8, 10),
+                                        # entries at exact halves, which floating point may put on either side
+                                        ("relu", 4, 1, 8, 8, 12), ("identity", 4, 1, 8, 8, 14), ("relu", 4, 1, 8, 2, 6), ("identity", 4, Fr(1, 256), 12, 6, 9),
+                                        ("relu", 4, 1, 8, 4, 11), ("relu", 4, 256, 1, 1, 2)]:
         lsh, unit = table_shift(act, alpha, wm, lb, db, lut)
         ta, td = tables(act, alpha, lsh, unit, lut)
         if act == "sigmoid":        # forty digits agree with the double everywhere
@@ -641,7 +647,7 @@ def micro():
                 y = 1 / (1 + (-(Decimal(z.numerator) / Decimal(z.denominator))).exp())
                 assert int(255 * y + Decimal("0.5")) == ta[i + half] and int(255 * 4 * y * (1 - y) + Decimal("0.5")) == td[i + half]
         sha = lambda t: hashlib.sha256(t.astype("u1").tobytes()).hexdigest()
-        luts.append(dict(activation=act, alpha=alpha, weight_max=wm, level_bits=lb, drive_bits=db, lut_bits=lut, lsh=lsh,
+        luts.append(dict(activation=act, alpha=alpha, weight_max_log2=Fr(wm).numerator.bit_length() - Fr(wm).denominator.bit_length(), level_bits=lb, drive_bits=db, lut_bits=lut, lsh=lsh,
                          lut_a_sha256=sha(ta), lut_d_sha256=sha(td), lut_a_sum=int(ta.sum()), lut_d_sum=int(td.sum()),
                          lut_a_middle=ta[len(ta) // 2 - 4:len(ta) // 2 + 4].tolist(), lut_d_middle=td[len(td) // 2 - 4:len(td) // 2 + 4].tolist()))
     inits = []

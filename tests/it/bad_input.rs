@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::program::{Ran, SMALL, dalean, run, train, trained};
+use super::program::{Ran, SMALL, dalean, run, train, train_plain, trained};
 
 /// An error of the program itself: code 1 or 2, one message, no panic.
 fn refused(ran: &Ran, words: &[&str]) {
@@ -49,6 +49,17 @@ fn a_configuration_is_refused_with_key_value_and_range() {
         ("learning.batch=4097", &["1..=4096"]),
         ("learning.taps=5", &["`learning.taps` is 5", "1..=4"]),
         ("learning.mode=online", &["one sample has no mean"]),
+        ("learning.batch=1", &["`learning.centre`", "a batch of one"]),
+        ("learning.rule=dfa", &["`learning.taps` is 3", "take the key out"]),
+        ("learning.route=random_sparse", &["`learning.taps` is 3", "route = \"random_sparse\""]),
+        ("learning.taps=1", &["`learning.tap_shift` is 2", "no sum to shift"]),
+        ("learning.tap_shift=17", &["`learning.tap_shift` is 17", "at most 16"]),
+        ("learning.rate=2e-5", &["layer 0 a k of 31", "raise learning.rate", "2^1 times"]),
+        (
+            "hw.write={dither_bits=0, dither=\"separable\"}",
+            &["`hw.write.dither`", "nothing is drawn"],
+        ),
+        ("data.classes=10", &["`data.classes` is given without data.format"]),
         ("learning.rule=kaneko", &["two classes", "xor"]),
         ("learning.rate=0", &["`learning.rate` is 0"]),
         ("learning.shift_pixels=9", &["only images larger than the shift"]),
@@ -61,7 +72,7 @@ fn a_configuration_is_refused_with_key_value_and_range() {
         assert_eq!(ran.last()["event"], "error", "{setting}");
         assert_eq!(files(out.path()), Vec::<String>::new(), "{setting} left something behind");
     }
-    let ran = run(train(out.path()).args(["--hw", "prime", "--set", "learning.rule=bp"]));
+    let ran = run(train_plain(out.path()).args(["--hw", "prime", "--set", "learning.rule=bp"]));
     refused(&ran, &["transposed_read"]);
     refused(&run(dalean().args(["train", "nothing.toml"])), &["cannot read nothing.toml"]);
     refused(&run(train(out.path()).args(["--threads", "0"])), &["1..=1024"]);

@@ -67,7 +67,7 @@ fn every_experiment_learns_two_batches() {
         let machine = Machine { backend: Backend::best(), threads: 1 };
         let mut session =
             Session::new(&config, loaded, machine).unwrap_or_else(|e| panic!("{name}: {e}"));
-        let updates = session.trainer().experiment().updates_per_epoch(session.train_len());
+        let (_, updates) = session.epoch_size();
         session.updates(updates.min(2)).unwrap_or_else(|error| panic!("{name}: {error}"));
     }
 }

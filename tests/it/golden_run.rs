@@ -73,7 +73,7 @@ fn additions_move_no_hash_no_address_and_no_verdict() {
     assert!(matches!(verdict, Verdict::Same { epochs: 3, test: true, .. }), "{verdict:?}");
     let (test, state) = run::evaluate(&kept, &root, machine()).unwrap();
     assert_eq!(Some(&test), receipt.test.as_ref());
-    assert_eq!(state, receipt.epoch_hashes[test.epoch as usize]);
+    assert_eq!(state, receipt.epoch_hashes[test.epoch() as usize]);
 }
 
 const SWEEP: &str = "base.data.set = 'xor'\nbase.network.hidden = [3]\nbase.learning.epochs = 1\n\

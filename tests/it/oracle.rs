@@ -12,10 +12,11 @@ use dalean::chip::layer::{DrivenBy, LayerSpec};
 use dalean::chip::ledger::{During, Event};
 use dalean::chip::population::Wiring;
 use dalean::learn::error::Centre;
+use dalean::learn::network::NetworkSpec;
 use dalean::learn::route::Route;
 use dalean::learn::rule::{Rule, UpdateMode};
 use dalean::num::fixed::*;
-use dalean::num::tables::{Activation, Decay, Positive};
+use dalean::num::tables::{Activation, Decay, Lut, Positive, Unit};
 use dalean::task::classify::{Examples, Experiment, Trainer};
 use serde_json::Value;
 use sha2::{Digest, Sha256};
@@ -125,19 +126,17 @@ fn experiment(s: &Value) -> Experiment {
                 units: pair[1] as usize,
                 wiring: if last { Wiring::DualReadout } else { Wiring::Dual },
                 driven_by: if l == 0 { DrivenBy::Shared } else { DrivenBy::Streams },
-                activation: match text(&s["act"][l]) {
-                    "relu" => Activation::Relu,
-                    _ => Activation::Sigmoid(positive(&s["alpha"][l])),
-                },
+                activation: activation(&s["act"][l], &s["alpha"][l]),
                 weight_max_log2: int(&s["weight_max"][l]).ilog2() as i32,
                 gain_64ths: if last { [64, 64] } else { [96, 32] },
                 constant_row: false,
             }
         })
         .collect();
-    Experiment {
-        seed: text(&s["seed_decimal"]).parse().unwrap(),
-        hardware: hardware(s),
+    let taps = int(&s["taps"]) as usize;
+    // one tap has no sum to shift
+    let shift = (taps > 1).then(|| int(&s["tap_shift"]) as u32);
+    let network = NetworkSpec {
         layers,
         rule: Rule::Ed,
         mode: match text(&s["mode"]) {
@@ -150,16 +149,26 @@ fn experiment(s: &Value) -> Experiment {
             "batch" => Centre::Batch,
             _ => Centre::Running,
         },
-        route: Route::Modulo {
-            taps: int(&s["taps"]) as usize,
-            shift: Some(int(&s["tap_shift"]) as u32),
-        },
+        route: Some(Route::Modulo { taps, shift }),
         batch: Batch::new(int(&s["batch"])).unwrap(),
         mantissa: RateMantissa::new(int(&s["mantissa"])).unwrap(),
         rates: s["rate"].as_array().unwrap().iter().map(positive).collect(),
         decay: Decay::Constant,
+    };
+    Experiment {
+        seed: text(&s["seed_decimal"]).parse().unwrap(),
+        hardware: hardware(s),
+        network,
         epochs: int(&s["epochs"]) as u32,
         augment: None,
+    }
+}
+
+fn activation(name: &Value, alpha: &Value) -> Activation {
+    match text(name) {
+        "relu" => Activation::Relu,
+        "identity" => Activation::Identity,
+        _ => Activation::Sigmoid(positive(alpha)),
     }
 }
 
@@ -268,6 +277,26 @@ fn run(case: &Value, backend: Backend) {
     let predictions: Vec<i64> =
         trainer.evaluate(&data).predictions.iter().map(|&p| i64::from(p)).collect();
     assert_eq!(predictions, ints(&case["prediction"]["classes"]), "{name}: predictions");
+}
+
+#[test]
+fn tables_equal_the_oracle() {
+    let golden = golden();
+    let tables = golden["micro"]["luts"].as_array().unwrap();
+    assert!(tables.len() >= 18);
+    for want in tables {
+        let unit = Unit {
+            weight_max_log2: int(&want["weight_max_log2"]) as i32,
+            level_bits: LevelBits::new(int(&want["level_bits"])).unwrap(),
+            drive_bits: DriveBits::new(int(&want["drive_bits"])).unwrap(),
+        };
+        let bits = LutBits::new(int(&want["lut_bits"])).unwrap();
+        let lut = Lut::new(activation(&want["activation"], &want["alpha"]), bits, unit);
+        assert_eq!(i64::from(lut.shift), int(&want["lsh"]), "{want}");
+        for (table, name) in [(&lut.activity, "lut_a_sha256"), (&lut.derivative, "lut_d_sha256")] {
+            assert_eq!(hex(&Sha256::digest(table)), text(&want[name]), "{name} of {want}");
+        }
+    }
 }
 
 #[test]

@@ -47,6 +47,9 @@ pub(crate) fn run(command: &mut Command) -> Ran {
 /// The configuration of small runs: two epochs of the built-in digits on 24 hidden units.
 pub(crate) const SMALL: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/golden/small.toml");
 
+/// The same without what belongs to one rule or route.
+const PLAIN: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/golden/plain.toml");
+
 /// `dalean train` of the small run into `out`.
 pub(crate) fn train(out: &Path) -> Command {
     let mut command = dalean();
@@ -54,9 +57,21 @@ pub(crate) fn train(out: &Path) -> Command {
     command
 }
 
+/// `dalean train` of a small run into `out` that says nothing of rule and route.
+pub(crate) fn train_plain(out: &Path) -> Command {
+    let mut command = dalean();
+    command.args(["train", PLAIN, "--json", "--out"]).arg(out);
+    command
+}
+
 /// A finished small run: its folder and its last event.
 pub(crate) fn trained(out: &Path, more: &[&str]) -> (PathBuf, Value) {
-    let ran = run(train(out).args(more));
+    finished(train(out).args(more))
+}
+
+/// A run that is carried out: its folder and its last event.
+pub(crate) fn finished(command: &mut Command) -> (PathBuf, Value) {
+    let ran = run(command);
     assert_eq!(ran.code, Some(0), "{ran:?}");
     let done = ran.last();
     assert_eq!(done["event"], "done");

@@ -1,6 +1,6 @@
 //! The rules learn what they should, on data that is built in.
 
-use super::program::{run, train, trained};
+use super::program::{finished, run, train, train_plain, trained};
 
 #[test]
 fn every_rule_mode_and_chip_learns_the_built_in_digits() {
@@ -25,11 +25,12 @@ fn every_rule_mode_and_chip_learns_the_built_in_digits() {
         (&["hw.adc.bits=8", "hw.adc.range=calibrated", "hw.adc.recalibrate=epoch"], 0.85),
         (&["network.bias=rows"], 0.85),
     ] {
-        let mut all = vec!["--set", "learning.epochs=4"];
+        let mut command = train_plain(out.path());
+        command.args(["--set", "learning.epochs=4"]);
         for setting in settings {
-            all.extend(["--set", setting]);
+            command.args(["--set", setting]);
         }
-        let (_, done) = trained(out.path(), &all);
+        let (_, done) = finished(&mut command);
         let accuracy = done["test_accuracy"].as_f64().unwrap();
         assert!(accuracy >= least, "{settings:?}: {accuracy}");
     }

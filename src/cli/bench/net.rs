@@ -33,7 +33,7 @@ impl<'a> Net<'a> {
         let experiment = chance::config(&all)
             .experiment(examples.features(), examples.classes(), None)
             .expect("a bench's networks fit their data");
-        let batch = experiment.batch.get() as usize;
+        let batch = experiment.network.batch.get() as usize;
         let seeded =
             experiment.build(backend, examples.len()).expect("a bench's networks fit their chip");
         let mut trainer = Trainer::new(experiment, seeded);
@@ -78,7 +78,7 @@ impl<'a> Net<'a> {
     /// Multiply-accumulates of an update: each array read once and written once, by sample; with back-propagation each
     /// array above the first layer is also read from its columns.
     pub(super) fn products(&self) -> f64 {
-        let backward = self.trainer.experiment().rule == Rule::Bp;
+        let backward = self.trainer.experiment().network.rule == Rule::Bp;
         let layers = self.trainer.driver().engine().layers().iter().enumerate();
         let passes = layers.map(|(at, layer)| {
             let times = if backward && at > 0 { 3 } else { 2 };

@@ -84,8 +84,7 @@ pub(super) fn resolve(file: &mut HardwareFile, prefix: &str) -> Result<Hardware,
             return Err(wrong(&key("write.dither_bits"), format!("is {other}"), allowed));
         }
     };
-    let patterns = [("per_cell", DitherPattern::PerCell), ("separable", DitherPattern::Separable)];
-    let dither_pattern = word(&key("write.dither"), &mut write.dither, "per_cell", &patterns)?;
+    let dither_pattern = dither_pattern(write, dither_bits, &key)?;
     let bits = *write.residual_bits.get_or_insert(0);
     let residual_bits = range(&key("write.residual_bits"), ResidualBits::new(bits))?;
 
@@ -107,6 +106,23 @@ pub(super) fn resolve(file: &mut HardwareFile, prefix: &str) -> Result<Hardware,
 /// A number of things, which the chip checks further.
 fn count(key: &str, found: i64) -> Result<usize, ConfigError> {
     usize::try_from(found).map_err(|_| wrong(key, format!("is {found}"), "it must lie above 0"))
+}
+
+/// Where dither words come from, if any are drawn.
+fn dither_pattern(
+    write: &mut WriteFile,
+    bits: DitherBits,
+    key: &dyn Fn(&str) -> String,
+) -> Result<DitherPattern, ConfigError> {
+    let patterns = [("per_cell", DitherPattern::PerCell), ("separable", DitherPattern::Separable)];
+    match (&write.dither, bits) {
+        (None, DitherBits::Zero) => Ok(DitherPattern::PerCell),
+        (Some(pattern), DitherBits::Zero) => {
+            let allowed = "with write.dither_bits = 0 nothing is drawn: take the key out, or use 8 or 16 bits";
+            Err(wrong(&key("write.dither"), format!("is \"{pattern}\""), allowed))
+        }
+        _ => word(&key("write.dither"), &mut write.dither, "per_cell", &patterns),
+    }
 }
 
 fn scheme(

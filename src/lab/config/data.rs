@@ -2,8 +2,57 @@
 
 use std::path::PathBuf;
 
+use super::check::wrong;
+use super::file::DataFile;
 use super::{Config, ConfigError};
 use crate::lab::data::{FileSet, PartFile, Source};
+
+/// Checks that every key of `[data]` means something there, and writes defaults back.
+pub(super) fn resolve(data: &mut DataFile) -> Result<DataFile, ConfigError> {
+    if data.set.is_none() && data.format.is_none() {
+        data.set = Some("optdigits".into());
+    }
+    const ANY: &[&str] = &["idx", "npz", "csv"];
+    let of_files = [
+        ("train", data.train.is_some(), ANY),
+        ("train_labels", data.train_labels.is_some(), &["idx"]),
+        ("validation", data.validation.is_some(), ANY),
+        ("validation_labels", data.validation_labels.is_some(), &["idx"]),
+        ("test", data.test.is_some(), ANY),
+        ("test_labels", data.test_labels.is_some(), &["idx"]),
+        ("full_scale", data.full_scale.is_some(), ANY),
+        ("classes", data.classes.is_some(), ANY),
+        ("label_column", data.label_column.is_some(), &["csv"]),
+        ("examples_array", data.examples_array.is_some(), &["npz"]),
+        ("labels_array", data.labels_array.is_some(), &["npz"]),
+    ];
+    for (key, given, formats) in of_files {
+        let format = data.format.as_deref();
+        // a format that nobody knows is refused for itself
+        let known = format.is_none_or(|format| ANY.contains(&format));
+        if given && known && !format.is_some_and(|format| formats.contains(&format)) {
+            let found = match format {
+                Some(format) => format!("is given beside data.format = \"{format}\""),
+                None => "is given without data.format".into(),
+            };
+            let allowed =
+                format!("it belongs to files of the format {}; take it out", formats.join(", "));
+            return Err(wrong(&format!("data.{key}"), found, allowed));
+        }
+    }
+    let parts = [
+        ("validation", &data.validation, &data.validation_labels),
+        ("test", &data.test, &data.test_labels),
+    ];
+    for (part, values, labels) in parts {
+        if values.is_none() && labels.is_some() {
+            let allowed = format!("give data.{part} too, or take it out");
+            let found = format!("is given without data.{part}");
+            return Err(wrong(&format!("data.{part}_labels"), found, allowed));
+        }
+    }
+    Ok(data.clone())
+}
 
 impl Config {
     /// Where the examples come from.

@@ -39,22 +39,35 @@ pub(super) struct Figure {
 /// Draws a figure, or nothing where the run has nothing to show.
 pub(super) type Draw = for<'a, 'b> fn(&'a RunView<'b>) -> Option<Figure>;
 
-/// All figures, in the order of the page.
-pub(super) const ALL: [Draw; 13] = [
-    accuracy::draw,
-    confusion::draw,
-    mistakes::draw,
-    timelines::draw,
-    histogram::draw,
-    fields::draw,
-    heat::draw,
-    writes::draw,
-    saturation::draw,
-    time::draw,
-    energy::draw,
-    pathways::draw,
-    configuration::draw,
+/// The task that a figure belongs to; `None`: to all.
+type Of = Option<&'static str>;
+
+/// Figures of classification.
+const CLASSIFY: Of = Some("classify");
+
+/// All figures, in the order of the page, each with the task that it belongs to.
+pub(super) const ALL: [(Of, Draw); 13] = [
+    (CLASSIFY, accuracy::draw),
+    (CLASSIFY, confusion::draw),
+    (CLASSIFY, mistakes::draw),
+    (None, timelines::draw),
+    (None, histogram::draw),
+    (None, fields::draw),
+    (None, heat::draw),
+    (None, writes::draw),
+    (None, saturation::draw),
+    (None, time::draw),
+    (None, energy::draw),
+    (None, pathways::draw),
+    (None, configuration::draw),
 ];
+
+/// The figures of a run.
+pub(super) fn of(view: &RunView<'_>) -> impl Iterator<Item = Figure> {
+    let task = view.last().map(|record| record.outcome.task());
+    let belongs = move |of: &Of| of.is_none_or(|of| task.is_none_or(|task| task == of));
+    ALL.iter().filter(move |(of, _)| belongs(of)).filter_map(move |(_, draw)| draw(view))
+}
 
 /// Pathways of one layer in one record.
 fn of_layer(record: &EpochRecord, layer: usize) -> impl Iterator<Item = &PathwayRecord> {

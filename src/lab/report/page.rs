@@ -5,13 +5,14 @@ use super::number::{
 };
 use super::{RunView, figures};
 use crate::lab::price::{Cost, prefixed};
+use crate::lab::store::record::TestOutcome;
 
 const STYLE: &str = concat!(include_str!("page.css"), include_str!("chart.css"));
 const SCRIPT: &str = include_str!("page.js");
 
 /// The whole page.
 pub(super) fn render(view: &RunView<'_>) -> String {
-    let figures = figures::ALL.iter().filter_map(|draw| draw(view));
+    let figures = figures::of(view);
     let mut contents = String::new();
     let mut body = String::new();
     for (number, figure) in (1..).zip(figures) {
@@ -76,7 +77,7 @@ fn shape(view: &RunView<'_>) -> Vec<usize> {
 }
 
 fn headline(view: &RunView<'_>) -> String {
-    let Some(test) = &view.receipt.test else {
+    let Some(test) = view.receipt.classified() else {
         let status = escape(&view.receipt.status);
         return format!(
             "<div class=\"big none\">–</div><div class=\"what\">test accuracy</div><p>The test set has not \
@@ -112,10 +113,10 @@ fn keys(view: &RunView<'_>) -> String {
         return key("epochs", "–", "no record yet");
     };
     // Validation of the state that was tested, or else of the last.
-    let tested = view.receipt.test.as_ref().map(|test| test.epoch);
+    let tested = view.receipt.test.as_ref().map(TestOutcome::epoch);
     let read = view.epochs.iter().find(|record| Some(record.epoch) == tested).unwrap_or(last);
     let validation =
-        read.validation.and_then(|score| Some((quotient(score.correct, score.total)?, score)));
+        read.validation().and_then(|score| Some((quotient(score.correct, score.total)?, score)));
     let mut out = match validation {
         Some((fraction, score)) => key(
             "validation",

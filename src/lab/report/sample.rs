@@ -6,7 +6,8 @@ use super::{Heat, Picture, RunView};
 use crate::lab::price::Cost;
 use crate::lab::store::ledger::LedgerRecord;
 use crate::lab::store::record::{
-    DataRecord, EpochRecord, LayerRecord, PathwayRecord, Receipt, Score, TestRecord, TimingRecord,
+    ClassifyOutcome, DataRecord, EpochRecord, LayerRecord, Outcome, PathwayRecord, Receipt, Score,
+    TestOutcome, TestRecord, TimingRecord,
 };
 
 /// An invented run: layers as rows, columns and names of pathways.
@@ -121,8 +122,10 @@ fn record(layers: &[(usize, usize, &[&str])], epoch: u32) -> EpochRecord {
     EpochRecord {
         epoch,
         updates: 77 * e,
-        train: (epoch > 0).then_some(Score { correct: 800 + e, total: 1000 }),
-        validation: Some(Score { correct: 80 + e, total: 100 }),
+        outcome: Outcome::Classify(ClassifyOutcome {
+            train: (epoch > 0).then_some(Score { correct: 800 + e, total: 1000 }),
+            validation: Some(Score { correct: 80 + e, total: 100 }),
+        }),
         state_hash: format!("{:064x}", 0xabcdef + e),
         layers: layers.collect(),
         pathways,
@@ -165,7 +168,7 @@ fn receipt(records: &[EpochRecord], classes: usize) -> Receipt {
         best: None,
         states: true,
         epoch_hashes: records.iter().map(|record| record.state_hash.clone()).collect(),
-        test: Some(test),
+        test: Some(TestOutcome::Classify(test)),
         notes: vec![],
     }
 }

@@ -5,6 +5,7 @@ use super::{Picture, html, page, text};
 use crate::lab::config::Kind;
 use crate::lab::price::{Cost, Group, Missing, Share};
 use crate::lab::store::ledger::{CyclesRecord, LayerCycles, LedgerRecord};
+use crate::lab::store::record::{ClassifyOutcome, Outcome, TestOutcome};
 
 const DALE: &[&str] = &["pp", "np", "nn", "pn"];
 const READOUT: &[&str] = &["pp", "np"];
@@ -66,8 +67,8 @@ fn samples() -> Vec<Sample> {
     let mut hollow = dense();
     for record in &mut hollow.epochs {
         record.events.clear();
-        record.train = None;
-        record.validation = None;
+        let none = ClassifyOutcome { train: None, validation: None };
+        record.outcome = Outcome::Classify(none);
         record.layers.iter_mut().for_each(|layer| layer.levels = [0, 0]);
         for one in &mut record.pathways {
             (one.cells, one.floor, one.zero, one.levels) = (0, 0, 0, 0);
@@ -262,7 +263,7 @@ fn what_a_chip_does_not_say_is_not_on_the_page() {
 #[test]
 fn wrong_answers_stand_with_their_confusion_the_most_frequent_first() {
     let mut sample = Sample::new(&[(64, 20, DALE)], 2, 4);
-    let test = sample.receipt.test.as_mut().unwrap();
+    let Some(TestOutcome::Classify(test)) = &mut sample.receipt.test else { panic!("a test") };
     (test.confusion[2][3], test.confusion[1][0]) = (9, 5);
     assert_eq!(test.confusions()[..3], [(9, 2, 3), (5, 1, 0), (1, 0, 1)]);
     let one = sample.pictures[0].clone();

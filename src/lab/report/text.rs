@@ -139,9 +139,9 @@ fn accuracies(out: &mut String, view: &RunView<'_>, last: &EpochRecord) {
             );
         }
     };
-    score("train", last.train, &format!("while learning in epoch {}", last.epoch));
-    score("validation", last.validation, &format!("after epoch {}", last.epoch));
-    if let Some(test) = &view.receipt.test {
+    score("train", last.train(), &format!("while learning in epoch {}", last.epoch));
+    score("validation", last.validation(), &format!("after epoch {}", last.epoch));
+    if let Some(test) = view.receipt.classified() {
         let why = test.select.replace('_', " ");
         score("test", Some(test.score), &format!("after epoch {} ({why})", test.epoch));
     }

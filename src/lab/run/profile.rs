@@ -46,17 +46,16 @@ pub struct Profile {
 /// When the configuration does not fit the data or the chip, or the data cannot be read.
 pub fn profile(config: &Config, root: &DataRoot, machine: Machine) -> Result<Profile, RunError> {
     let mut session = Session::new(config, data::load(&config.source()?, root)?, machine)?;
-    let ledger =
-        |session: &Session, phase| session.trainer().driver().engine().ledger(phase).clone();
+    let ledger = |session: &Session, phase| session.engines()[0].ledger(phase).clone();
     let before = ledger(&session, Phase::Training);
     session.updates(1)?;
-    let engine = session.trainer().driver().engine();
+    let engine = session.engines()[0];
     let step = LedgerRecord::since(engine, Phase::Training, &before);
     let plan = Plan::of_layers(engine.layers());
-    let samples = (session.train_len() as u64).min(u64::from(config.batch.get()));
+    let samples = (session.epoch_size().0 as u64).min(u64::from(config.batch.get()));
     let before = ledger(&session, Phase::Evaluation);
-    session.read_one();
-    let engine = session.trainer().driver().engine();
+    session.infer();
+    let engine = session.engines()[0];
     let inference = LedgerRecord::since(engine, Phase::Evaluation, &before);
     let act = |name, samples, phase: Phase, ledger: LedgerRecord| {
         let slices = u64::from(config.hardware.slices());

@@ -26,7 +26,7 @@ pub(super) fn receipt(
         run: session.run().into(),
         config: hash::bytes(text),
         data: session.data().clone(),
-        tables: hash::tables(session.trainer().driver()),
+        tables: hash::tables(&session.networks()),
         metrics: hash::bytes(folder::metrics_text(records)),
         ledger: None,
         checkpoint,
@@ -51,7 +51,7 @@ pub(super) fn inputs(receipt: &Receipt, session: &Session, text: &str) -> Result
     for (what, wanted, found) in [
         ("bytes of config.toml have", &receipt.config, &hash::bytes(text)),
         ("address of the run is", &receipt.run, &session.run().to_owned()),
-        ("activation tables have", &receipt.tables, &hash::tables(session.trainer().driver())),
+        ("activation tables have", &receipt.tables, &hash::tables(&session.networks())),
     ] {
         if wanted != found {
             let (found, wanted) = (found.clone(), wanted.clone());

@@ -206,8 +206,11 @@ impl Parts<'_> {
             return vec![];
         };
         let mut places: Vec<[u64; 3]> = vec![];
-        for place in
-            self.receipt.test.iter().flat_map(|test| test.mistakes.iter().chain(&test.confused))
+        for place in self
+            .receipt
+            .classified()
+            .into_iter()
+            .flat_map(|test| test.mistakes.iter().chain(&test.confused))
         {
             if !places.contains(place) {
                 places.push(*place);

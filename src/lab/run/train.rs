@@ -8,17 +8,16 @@ use std::path::Path;
 use std::time::{Duration, Instant};
 
 use super::session::chosen;
-use super::{Machine, RunError, Session, proof};
+use super::{Machine, Progress, RunError, Session, proof};
 use crate::lab::config::{self, Config, Select, Sources};
 use crate::lab::data::{self, DataRoot, ImageShape, Loaded};
 use crate::lab::price::Cost;
 use crate::lab::store::folder::{self, FolderError, RunFolder, names};
 use crate::lab::store::ledger::LedgerRecord;
 use crate::lab::store::record::{
-    BestRecord, DataRecord, EpochRecord, Receipt, TestRecord, TimingRecord,
+    BestRecord, DataRecord, EpochRecord, Receipt, TestOutcome, TimingRecord,
 };
-use crate::lab::store::{address, given, hash};
-use crate::task::classify::Progress;
+use crate::lab::store::{address, hash};
 
 /// What happens while a run is carried out.
 #[derive(Debug)]
@@ -158,9 +157,7 @@ pub(super) fn read_config(path: &Path) -> Result<(Config, String), RunError> {
 /// When the configuration is missing, damaged, or does not fit the data.
 pub fn address_of(path: &Path, data: &DataRecord) -> Result<String, RunError> {
     let (config, _) = read_config(path)?;
-    let experiment = config.experiment(data.features, data.classes, data.image)?;
-    let given = given::given(&experiment, config.train_on, config.select);
-    Ok(address::key(given, &data.hash))
+    Ok(address::key(config.given(data.features, data.classes, data.image)?, &data.hash))
 }
 
 fn restore(session: &mut Session, path: &Path, name: &str) -> Result<Vec<u8>, RunError> {
@@ -180,7 +177,7 @@ pub fn evaluate(
     path: &Path,
     data_root: &DataRoot,
     machine: Machine,
-) -> Result<(TestRecord, String), RunError> {
+) -> Result<(TestOutcome, String), RunError> {
     let (config, text) = read_config(path)?;
     let mut session = Session::new(&config, data::load(&config.source()?, data_root)?, machine)?;
     let receipt = folder::read_receipt(path)?;
@@ -195,9 +192,10 @@ pub fn evaluate(
     let name = &*name;
     let bytes = restore(&mut session, path, name)?;
     let state = session.state_hash();
-    let epoch = session.trainer().epoch();
+    let epoch = session.epoch();
     proof::checkpoint(path, name, &receipt, epoch, (&bytes, &state))?;
-    let test = session.test();
+    let hint = "there is nothing to evaluate on";
+    let test = session.test().ok_or(RunError::Empty { part: "test", hint })?;
     if receipt.test.as_ref().is_some_and(|kept| *kept != test) {
         let found = "has another test result than its own state gives".into();
         return Err(FolderError::Content { path: path.join(names::RECEIPT), found }.into());
@@ -282,7 +280,7 @@ impl<'a> Run<'a> {
             return Ok(());
         }
         let bytes = restore(&mut self.session, &path, names::CHECKPOINT)?;
-        let (epoch, state) = (self.session.trainer().epoch(), self.session.state_hash());
+        let (epoch, state) = (self.session.epoch(), self.session.state_hash());
         proof::checkpoint(&path, names::CHECKPOINT, &receipt, epoch, (&bytes, &state))?;
         // a kill may have come between the receipt and the checkpoint it speaks of
         let last = records.len() == epoch as usize + 1;
@@ -327,16 +325,16 @@ impl<'a> Run<'a> {
             folder: &path,
             data: &self.description,
             warnings: &self.session.warnings(),
-            epoch: self.session.trainer().epoch(),
+            epoch: self.session.epoch(),
             epochs,
         });
         if self.records.is_empty() {
             let record = self.session.start();
             self.keep(record, 0.0)?;
         }
-        while self.session.trainer().epoch() < epochs {
-            let epoch = self.session.trainer().epoch();
-            let learnt = self.session.epoch(&mut |progress| on_event(Event::Batch(progress)));
+        while self.session.epoch() < epochs {
+            let epoch = self.session.epoch();
+            let learnt = self.session.advance(&mut |progress| on_event(Event::Batch(progress)));
             let Some((record, seconds)) = learnt else {
                 return Err(RunError::Stopped { epoch, path: path.display().to_string() });
             };
@@ -354,7 +352,7 @@ impl<'a> Run<'a> {
     fn keep(&mut self, record: EpochRecord, seconds: f64) -> Result<(), RunError> {
         self.records.push(record);
         self.timing.epoch_seconds.push(seconds);
-        let epoch = self.session.trainer().epoch();
+        let epoch = self.session.epoch();
         let best = chosen(self.config.select, &self.records);
         let is_best = self.config.select == Select::BestValidation && best == Some(epoch);
         let due = self.written.elapsed() >= self.keeping.every;
@@ -394,7 +392,7 @@ impl<'a> Run<'a> {
         status: &str,
         ledger: Option<&str>,
         checkpoint: String,
-        test: Option<TestRecord>,
+        test: Option<TestOutcome>,
     ) -> Receipt {
         let Self { session, records, best, text, .. } = self;
         let receipt = proof::receipt(session, text, records, checkpoint, best.clone());
@@ -413,13 +411,13 @@ impl<'a> Run<'a> {
             self.flush(&state)?;
         }
         let checkpoint = hash::bytes(&state);
-        let ledger = LedgerRecord::of(self.session.trainer().driver().engine());
+        let ledger = LedgerRecord::of(&self.session.engines());
         let ledger_text = ledger.to_json();
         self.folder.write_metrics(&self.records)?;
         self.folder.write_timing(&self.timing)?;
         self.folder.write(names::LEDGER, ledger_text.as_bytes())?;
         let cost = super::report::cost(self.config, &ledger, &self.records);
-        let epoch = self.session.trainer().epoch();
+        let epoch = self.session.epoch();
         let path = self.folder.path().to_path_buf();
         match self.best.clone() {
             Some(best) if best.epoch != epoch => {
@@ -442,7 +440,7 @@ impl<'a> Run<'a> {
             _ => {}
         }
         let read = self.session.checkpoint();
-        let test = (!self.session.test_examples().is_empty()).then(|| self.session.test());
+        let test = self.session.test();
         let receipt = self.receipt("finished", Some(&ledger_text), checkpoint, test);
         let page = super::report::Parts {
             config: self.config,
@@ -452,7 +450,7 @@ impl<'a> Run<'a> {
             records: &self.records,
             counted: Some((&ledger, &cost)),
             state: self.keeping.states.then_some(&read),
-            examples: self.image.map(|image| (self.session.test_examples(), image)),
+            examples: self.session.examples().zip(self.image),
         };
         let page = page.draw();
         self.folder.write(names::REPORT, page.html.as_bytes())?;

@@ -8,15 +8,14 @@ use serde_json::Value;
 use super::proof::{self, Difference};
 use super::session::chosen;
 use super::train::read_config;
-use super::{Machine, RunError, Session};
+use super::{Machine, Progress, RunError, Session};
 use crate::lab::config::Select;
 use crate::lab::data::{self, DataRoot};
 use crate::lab::store::checkpoint;
 use crate::lab::store::folder::{self, FolderError, RunFolder, names};
 use crate::lab::store::hash;
 use crate::lab::store::ledger::LedgerRecord;
-use crate::lab::store::record::{BestRecord, EpochRecord, Receipt, TestRecord};
-use crate::task::classify::Progress;
+use crate::lab::store::record::{BestRecord, EpochRecord, Receipt, TestOutcome};
 
 /// What doing a run again showed.
 #[derive(Debug, Clone, PartialEq)]
@@ -117,7 +116,7 @@ fn compare(
 
     let mut records: Vec<EpochRecord> = Vec::new();
     let mut seen = false;
-    let mut best: Option<(BestRecord, Option<TestRecord>)> = None;
+    let mut best: Option<(BestRecord, Option<TestOutcome>)> = None;
     for (kept, line) in kept[..last].iter().zip(&lines) {
         let epoch = kept.epoch;
         let record = if epoch == 0 {
@@ -125,7 +124,7 @@ fn compare(
         } else {
             let path = path.display().to_string();
             let stopped = || RunError::Stopped { epoch: epoch - 1, path };
-            session.epoch(on_batch).ok_or_else(stopped)?.0
+            session.advance(on_batch).ok_or_else(stopped)?.0
         };
         let _ = session.note(&record);
         let state_differs = record.state_hash != kept.state_hash;
@@ -147,7 +146,7 @@ fn compare(
             files.best(&state, epoch)?;
             // reading the test set charges a ledger, which is part of the state
             let tested = whole && finished && receipt.test.is_some();
-            let test = tested.then(|| session.test());
+            let test = tested.then(|| session.test()).flatten();
             if test.is_some() {
                 session
                     .restore(&state)
@@ -166,20 +165,16 @@ fn compare(
 
     let state = session.checkpoint();
     files.last(&state, seen)?;
-    let (best, mut test) = best.map_or((None, None), |(best, test)| (Some(best), test));
+    let (best, test) = best.map_or((None, None), |(best, test)| (Some(best), test));
     let mut expected = proof::receipt(&session, &text, &records, hash::bytes(&state), best);
     if finished {
-        let ledger = LedgerRecord::of(session.trainer().driver().engine());
+        let ledger = LedgerRecord::of(&session.engines());
         if let Some(kept) = &files.ledger {
             same(names::LEDGER, kept, &ledger)?;
         }
         expected.ledger.clone_from(&receipt.ledger);
         expected.status.clone_from(&receipt.status);
-        let untested = test.is_none() && !session.test_examples().is_empty();
-        if untested {
-            test = Some(session.test());
-        }
-        expected.test = test;
+        expected.test = test.or_else(|| session.test());
     }
     // compared number by number; their bytes are those that the receipt names
     expected.metrics.clone_from(&receipt.metrics);

@@ -85,11 +85,11 @@ pub fn state(state: &mut dyn State) -> String {
     hash.finalize().to_hex().to_string()
 }
 
-/// Hash of all activation tables, layer by layer.
+/// Hash of all activation tables, layer by layer through all networks.
 #[must_use]
-pub fn tables(driver: &Driver) -> String {
+pub fn tables(networks: &[&Driver]) -> String {
     let mut hash = blake3::Hasher::new();
-    for layer in driver.engine().layers() {
+    for layer in networks.iter().flat_map(|driver| driver.engine().layers()) {
         hash.update(&layer.lut.shift.to_le_bytes());
         hash.update(&layer.lut.activity).update(&layer.lut.derivative);
     }

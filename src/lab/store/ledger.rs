@@ -70,13 +70,24 @@ impl From<&Cycles> for CyclesRecord {
     }
 }
 
+impl CyclesRecord {
+    /// Takes the cycles of another network along, whose layers follow.
+    fn join(&mut self, other: Self) {
+        self.elapsed += other.elapsed;
+        for (stage, cycles) in other.stages {
+            *self.stages.entry(stage).or_default() += cycles;
+        }
+        self.layers.extend(other.layers);
+    }
+}
+
 impl LedgerRecord {
-    /// All ledgers of an engine.
+    /// All ledgers of engines whose layers are numbered through.
     #[must_use]
-    pub fn of(engine: &Engine) -> Self {
+    pub fn of(engines: &[&Engine]) -> Self {
         let mut record = Self::default();
         for phase in Phase::ALL {
-            record.add(engine, phase, None);
+            engines.iter().for_each(|engine| record.add(engine, phase, None));
         }
         record
     }
@@ -96,7 +107,8 @@ impl LedgerRecord {
             if count == 0 {
                 continue;
             }
-            let pathways = engine.layers()[layer].spec.wiring.pathways();
+            let this = &engine.layers()[layer];
+            let (layer, pathways) = (usize::from(this.index), this.spec.wiring.pathways());
             let name = pathways.iter().find(|p| p.code == code).map_or("-", |p| p.name);
             self.counts.push(CountRecord {
                 phase: phase.name().into(),
@@ -112,7 +124,13 @@ impl LedgerRecord {
             None => cycles.clone(),
             Some(before) => cycles.since(before),
         };
-        self.cycles.get_or_insert_default().insert(phase.name().into(), (&passed).into());
+        let passed = CyclesRecord::from(&passed);
+        let phases = self.cycles.get_or_insert_default();
+        match phases.get_mut(phase.name()) {
+            // networks take turns: a chip does one thing at a time
+            Some(before) => before.join(passed),
+            None => drop(phases.insert(phase.name().into(), passed)),
+        }
     }
 
     /// Events of one name over everything.

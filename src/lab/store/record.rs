@@ -80,7 +80,68 @@ pub struct LayerRecord {
     pub rate_shift: u32,
 }
 
-/// Everything about one epoch. Epoch 0 is the state before the first update.
+/// What a task says of an epoch.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "task", rename_all = "snake_case")]
+#[non_exhaustive]
+pub enum Outcome {
+    /// Classification.
+    Classify(ClassifyOutcome),
+}
+
+/// What classification says of an epoch.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ClassifyOutcome {
+    /// Answers given while learning; `null` before the first epoch.
+    #[serde(deserialize_with = "Option::deserialize")]
+    pub train: Option<Score>,
+    /// Validation score.
+    #[serde(deserialize_with = "Option::deserialize")]
+    pub validation: Option<Score>,
+}
+
+impl Outcome {
+    /// Name of the task.
+    #[must_use]
+    pub const fn task(&self) -> &'static str {
+        match self {
+            Self::Classify(_) => "classify",
+        }
+    }
+
+    /// What the best state is chosen by: more is better.
+    #[must_use]
+    pub fn merit(&self) -> u64 {
+        match self {
+            Self::Classify(outcome) => outcome.validation.map_or(0, |score| score.correct),
+        }
+    }
+}
+
+impl EpochRecord {
+    /// What classification says of it; nothing of another task.
+    #[must_use]
+    pub const fn classify(&self) -> Option<&ClassifyOutcome> {
+        match &self.outcome {
+            Outcome::Classify(outcome) => Some(outcome),
+        }
+    }
+
+    /// Answers given while learning.
+    #[must_use]
+    pub fn train(&self) -> Option<Score> {
+        self.classify()?.train
+    }
+
+    /// Validation score.
+    #[must_use]
+    pub fn validation(&self) -> Option<Score> {
+        self.classify()?.validation
+    }
+}
+
+/// Everything about one epoch: what the chip did and holds, and what the task says of it. Epoch 0 is the state before the first update.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct EpochRecord {
@@ -88,12 +149,8 @@ pub struct EpochRecord {
     pub epoch: u32,
     /// Updates done.
     pub updates: u64,
-    /// Answers given while learning; `null` before the first epoch.
-    #[serde(deserialize_with = "Option::deserialize")]
-    pub train: Option<Score>,
-    /// Validation score.
-    #[serde(deserialize_with = "Option::deserialize")]
-    pub validation: Option<Score>,
+    /// What the task says of it.
+    pub outcome: Outcome,
     /// BLAKE3 of state and counters.
     pub state_hash: String,
     /// Layers, in order.
@@ -109,6 +166,33 @@ pub struct EpochRecord {
     #[cfg(feature = "grown")]
     #[serde(default)]
     pub grown: u64,
+}
+
+/// What a task says of the final test.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "task", rename_all = "snake_case")]
+#[non_exhaustive]
+pub enum TestOutcome {
+    /// Classification.
+    Classify(TestRecord),
+}
+
+impl TestOutcome {
+    /// After which epoch the state stood that was tested.
+    #[must_use]
+    pub const fn epoch(&self) -> u32 {
+        match self {
+            Self::Classify(test) => test.epoch,
+        }
+    }
+
+    /// What classification says of it; nothing of another task.
+    #[must_use]
+    pub const fn classify(&self) -> Option<&TestRecord> {
+        match self {
+            Self::Classify(test) => Some(test),
+        }
+    }
 }
 
 /// The final reading of the test set, once.
@@ -274,9 +358,17 @@ pub struct Receipt {
     pub epoch_hashes: Vec<String>,
     /// The final test, when finished.
     #[serde(deserialize_with = "Option::deserialize")]
-    pub test: Option<TestRecord>,
+    pub test: Option<TestOutcome>,
     /// What the run showed.
     pub notes: Vec<Note>,
+}
+
+impl Receipt {
+    /// What classification says of the final test; nothing of another task, or when there was none.
+    #[must_use]
+    pub fn classified(&self) -> Option<&TestRecord> {
+        self.test.as_ref()?.classify()
+    }
 }
 
 /// What depends on machine and time: shown to people, marked as such, and part of no hash.

@@ -262,8 +262,8 @@ impl<'a> Crew<'a> {
             self.options.keeping,
             &mut |event| {
                 if let run::Event::Batch(progress) = event {
-                    let seen = f64::from(progress.epoch) * progress.samples_total as f64
-                        + progress.samples as f64;
+                    let seen =
+                        f64::from(progress.epoch) * progress.total as f64 + progress.done as f64;
                     let done = seen - before.replace(seen).unwrap_or(0.0);
                     (self.on_event)(Event::Work(task.work * done / samples));
                 }

@@ -10,9 +10,9 @@ use super::{Point, Sweep, SweepError};
 use crate::lab::config::{self, Config, Overlay, Sources};
 use crate::lab::data::{self, DataRoot, Loaded};
 use crate::lab::run::{Machine, Prices, RunError, Session};
+use crate::lab::store::address;
 use crate::lab::store::index::{PointRecord, SweepRecord};
 use crate::lab::store::record::DataRecord;
-use crate::lab::store::{address, given};
 
 /// Runs whose speed is measured for an estimate.
 const PROBES: usize = 8;
@@ -177,14 +177,15 @@ fn check(config: &Config, data: &Loaded) -> Result<(String, f64), RunError> {
     let record = DataRecord::of(data);
     let experiment = config.experiment(record.features, record.classes, record.image)?;
     experiment.check()?;
-    let key = address::key(given::given(&experiment, config.train_on, config.select), &record.hash);
+    let key =
+        address::key(config.given(record.features, record.classes, record.image)?, &record.hash);
     let cells = |layer: &crate::chip::layer::LayerSpec| {
         layer.wiring.pathways().len() as f64 * layer.inputs as f64 * layer.units as f64
     };
     // levels of more than a byte take about twice the time
     let planes = if config.hardware.cell.level_bits.get() > 8 { 2.0 } else { 1.0 };
     let samples = train.len() as f64 * f64::from(config.epochs);
-    Ok((key, experiment.layers.iter().map(cells).sum::<f64>() * planes * samples))
+    Ok((key, experiment.network.layers.iter().map(cells).sum::<f64>() * planes * samples))
 }
 
 impl Plan {
@@ -241,7 +242,7 @@ pub fn estimate(plan: &Plan, tasks: &[&Task], machine: Machine) -> Result<Estima
         let started = Instant::now();
         let mut session = Session::new(&task.config, data.clone(), machine)?;
         let start = started.elapsed().as_secs_f64();
-        let updates = session.trainer().experiment().updates_per_epoch(session.train_len());
+        let (samples, updates) = session.epoch_size();
         let measured = PROBE_UPDATES.min(updates);
         let started = Instant::now();
         session.updates(measured)?;
@@ -250,7 +251,7 @@ pub fn estimate(plan: &Plan, tasks: &[&Task], machine: Machine) -> Result<Estima
         // reading without learning takes about a third
         let split = &data.split;
         let read = split.validation.len() as f64 * (epochs + 1.0) + split.test.len() as f64;
-        let reads = read / session.train_len() as f64 * updates as f64 / 3.0;
+        let reads = read / samples as f64 * updates as f64 / 3.0;
         seconds += start + update * (updates as f64 * epochs + reads);
         work += task.work;
     }

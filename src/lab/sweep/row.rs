@@ -9,7 +9,7 @@ use super::SweepError;
 use crate::lab::price::Cost;
 use crate::lab::run::{self, Prices, RunError, reprice_as};
 use crate::lab::store::folder;
-use crate::lab::store::record::{EpochRecord, Receipt, Score};
+use crate::lab::store::record::{EpochRecord, Receipt, Score, TestOutcome};
 use crate::lab::table::Unit;
 
 /// What the numbers of a column are made of.
@@ -34,6 +34,8 @@ pub struct ResultColumn {
     pub unit: Unit,
     /// What its numbers are made of.
     pub kind: ResultKind,
+    /// The task whose runs have it; `None`: all.
+    pub task: Option<&'static str>,
     of: fn(&Facts<'_>) -> Option<Number>,
 }
 
@@ -75,19 +77,28 @@ fn share(score: Option<Score>) -> Option<Number> {
     score.and_then(|score| over(score.correct, score.total))
 }
 
+macro_rules! task {
+    () => {
+        None
+    };
+    ($task:literal) => {
+        Some($task)
+    };
+}
+
 macro_rules! results {
-    ($($(#[cfg($cfg:meta)])? $name:literal, $label:literal, $unit:ident, $kind:ident, $of:expr;)*) => {
-        &[$($(#[cfg($cfg)])? ResultColumn { name: $name, label: $label, unit: Unit::$unit, kind: ResultKind::$kind, of: $of },)*]
+    ($($(#[cfg($cfg:meta)])? $name:literal, $label:literal, $unit:ident, $kind:ident $(of $task:literal)?, $of:expr;)*) => {
+        &[$($(#[cfg($cfg)])? ResultColumn { name: $name, label: $label, unit: Unit::$unit, kind: ResultKind::$kind, task: task!($($task)?), of: $of },)*]
     };
 }
 
 /// All results, in the order of the table.
 #[rustfmt::skip]
 pub const RESULTS: &[ResultColumn] = results![
-    "test_accuracy", "test accuracy", Fraction, Quotient, |f| share(f.receipt.test.as_ref().map(|test| test.score));
-    "validation_accuracy", "validation accuracy", Fraction, Quotient, |f| share(f.read.validation);
-    "train_accuracy", "accuracy while learning", Fraction, Quotient, |f| share(f.last.train);
-    "test_epoch", "epoch of the state that was tested", Plain, Whole, |f| f.receipt.test.as_ref().map(|test| test.epoch.into());
+    "test_accuracy", "test accuracy", Fraction, Quotient of "classify", |f| share(f.receipt.classified().map(|test| test.score));
+    "validation_accuracy", "validation accuracy", Fraction, Quotient of "classify", |f| share(f.read.validation());
+    "train_accuracy", "accuracy while learning", Fraction, Quotient of "classify", |f| share(f.last.train());
+    "test_epoch", "epoch of the state that was tested", Plain, Whole, |f| f.receipt.test.as_ref().map(|test| test.epoch().into());
     "epochs", "epochs", Plain, Whole, |f| Some(f.last.epoch.into());
     "updates", "updates", Count, Whole, |f| Some(f.last.updates.into());
     "cells", "cells", Count, Whole, |f| Some(f.pathways(|p| p.cells).into());
@@ -177,10 +188,12 @@ pub fn row_as(path: &Path, prices: Option<Prices>) -> Result<(Row, f64), SweepEr
     if receipt.status != "finished" {
         return Err(damaged("is not finished").into());
     }
-    let tested = receipt.test.as_ref().map(|test| test.epoch);
+    let tested = receipt.test.as_ref().map(TestOutcome::epoch);
     let read = records.iter().find(|record| Some(record.epoch) == tested).unwrap_or(last);
     let facts = Facts { receipt: &receipt, last, read, cost: priced.cost() };
-    let results = RESULTS.iter().filter_map(|column| {
+    let task = last.outcome.task();
+    let columns = RESULTS.iter().filter(|column| column.task.is_none_or(|of| of == task));
+    let results = columns.filter_map(|column| {
         let value = (column.of)(&facts)?;
         Some((column.name.to_owned(), Value::Number(value)))
     });

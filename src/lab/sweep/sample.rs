@@ -3,9 +3,8 @@
 use super::row::row;
 use super::{Row, SweepError};
 use crate::lab::data::DataRoot;
-use crate::lab::run::{self, Machine, Verdict};
+use crate::lab::run::{self, Machine, Progress, Verdict};
 use crate::lab::store::index::Store;
-use crate::task::classify::Progress;
 
 /// A run that was done again.
 #[derive(Debug)]

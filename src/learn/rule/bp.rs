@@ -4,7 +4,8 @@ use super::{Step, UpdateMode, writes};
 
 pub(super) fn steps(mode: UpdateMode, layers: usize, samples: usize) -> Vec<Step> {
     let error = |layer| Step::Error { layer, samples: 0..samples };
-    let mut steps = vec![error(layers - 1)];
+    let Some(last) = layers.checked_sub(1) else { return vec![] };
+    let mut steps = vec![error(last)];
     for layer in (1..layers).rev() {
         steps.push(Step::ReadColumns { layer });
         steps.push(error(layer - 1));

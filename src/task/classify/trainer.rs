@@ -122,7 +122,7 @@ impl Trainer {
         let mut codes = Vec::new();
         let mut shifts = shifts;
         self.driver.engine_mut().set_phase(Phase::Training);
-        for batch in order.chunks(self.experiment.batch.get() as usize) {
+        for batch in order.chunks(self.experiment.network.batch.get() as usize) {
             codes.clear();
             for &example in batch {
                 let start = codes.len();

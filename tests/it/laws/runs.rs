@@ -7,6 +7,7 @@ use dalean::chip::population::Wiring;
 use dalean::lab::store::checkpoint::{self, Identity};
 use dalean::lab::store::hash;
 use dalean::learn::error::Centre;
+use dalean::learn::network::NetworkSpec;
 use dalean::learn::route::Route;
 use dalean::learn::rule::{Rule, UpdateMode};
 use dalean::num::fixed::{Batch, RateMantissa};
@@ -39,15 +40,23 @@ fn rule() -> impl Strategy<Value = Rule> {
     prop::sample::select(vec![Rule::Ed, Rule::Ed, Rule::Kaneko, Rule::Dfa, Rule::Bp])
 }
 
-fn route(raw: [u8; 2], outputs: usize) -> Route {
+fn route(raw: [u8; 2], outputs: usize, rule: Rule) -> Option<Route> {
     let taps = 1 + usize::from(raw[1]) % outputs.min(4);
-    match raw[0] % 6 {
+    Some(match raw[0] % 6 {
+        _ if rule == Rule::Bp => return None,
+        _ if rule == Rule::Dfa => Route::RandomDense { shift: None },
         0 => Route::RandomSparse,
         1 => Route::ScalarBroadcast,
         2 => Route::RandomDense { shift: None },
-        3 => Route::Modulo { taps, shift: Some(0) },
+        3 if taps > 1 => Route::Modulo { taps, shift: Some(0) },
         _ => Route::Modulo { taps, shift: None },
-    }
+    })
+}
+
+/// Examples of `values` values as images that can be moved by a pixel, if there is such a shape.
+fn moved(values: usize) -> Option<Augment> {
+    let height = (2..=values / 2).find(|height| values.is_multiple_of(*height))?;
+    Some(Augment { pixels: 1, height, width: values / height, channels: 1 })
 }
 
 fn run() -> impl Strategy<Value = Run> {
@@ -73,56 +82,64 @@ fn run() -> impl Strategy<Value = Run> {
         prop::sample::select(vec![Decay::Constant, Decay::Cosine]),
     );
     let times = (any::<u64>(), 2u32..=3, 0u32..=2, any::<bool>());
-    (chip, learning, times).prop_map(|((sides, mut hardware, layers), learning, times)| {
-        let (rule, mode, mut centre, raw, batch, mantissa, decay) = learning;
-        let (seed, epochs, stop, moved) = times;
-        let outputs = *sides.last().unwrap();
-        if mode == UpdateMode::Online && centre == Centre::Batch {
-            centre = Centre::None;
-        }
-        if rule == Rule::Bp {
-            let both_sides = |h: &mut HardwareSpec| {
-                (h.adc, h.tile.transposed_read) = (Adc::Ideal, true);
-            };
-            hardware = hardware.with(both_sides).unwrap();
-        }
-        let count = layers.len();
-        let rates = [1.0, 20.0, 300.0, 5000.0];
-        let rates = layers.iter().map(|layer| Positive::new(rates[layer.3]).unwrap()).collect();
-        let specs =
-            layers.into_iter().enumerate().map(|(at, (activation, weight, row, _))| LayerSpec {
-                inputs: sides[at],
-                units: sides[at + 1],
-                wiring: match rule {
-                    Rule::Dfa | Rule::Bp => Wiring::Single,
-                    _ if at + 1 == count => Wiring::DualReadout,
-                    _ => Wiring::Dual,
-                },
-                driven_by: if at == 0 { DrivenBy::Shared } else { DrivenBy::Streams },
-                activation,
-                weight_max_log2: weight,
-                gain_64ths: [96, 32],
-                constant_row: row,
+    (chip, learning, times)
+        .prop_map(|((mut sides, mut hardware, layers), learning, times)| {
+            let (rule, mode, mut centre, raw, batch, mantissa, decay) = learning;
+            let (seed, epochs, stop, image) = times;
+            if rule == Rule::Kaneko {
+                *sides.last_mut().unwrap() = 1;
+            }
+            let outputs = *sides.last().unwrap();
+            if (mode == UpdateMode::Online || batch == 1) && centre == Centre::Batch {
+                centre = Centre::None;
+            }
+            if rule == Rule::Bp {
+                let both_sides = |h: &mut HardwareSpec| {
+                    (h.adc, h.tile.transposed_read) = (Adc::Ideal, true);
+                };
+                hardware = hardware.with(both_sides).unwrap();
+            }
+            let count = layers.len();
+            let rates = [1.0, 20.0, 300.0, 5000.0];
+            let rates = layers.iter().map(|layer| Positive::new(rates[layer.3]).unwrap()).collect();
+            let specs = layers.into_iter().enumerate().map(|(at, (activation, weight, row, _))| {
+                LayerSpec {
+                    inputs: sides[at],
+                    units: sides[at + 1],
+                    wiring: match rule {
+                        Rule::Dfa | Rule::Bp => Wiring::Single,
+                        _ if at + 1 == count => Wiring::DualReadout,
+                        _ => Wiring::Dual,
+                    },
+                    driven_by: if at == 0 { DrivenBy::Shared } else { DrivenBy::Streams },
+                    activation,
+                    weight_max_log2: weight,
+                    gain_64ths: [96, 32],
+                    constant_row: row,
+                }
             });
-        let image = Augment { pixels: 1, height: 1, width: sides[0], channels: 1 };
-        let experiment = Experiment {
-            seed,
-            hardware,
-            layers: specs.collect(),
-            rule,
-            mode,
-            centre,
-            route: route(raw, outputs),
-            batch: Batch::new(batch).unwrap(),
-            mantissa: RateMantissa::new(mantissa).unwrap(),
-            rates,
-            decay,
-            epochs,
-            augment: moved.then_some(image),
-        };
-        let data = examples(seed, sides[0], outputs.max(2));
-        Run { experiment, data, stop: stop.min(epochs) }
-    })
+            let network = NetworkSpec {
+                layers: specs.collect(),
+                rule,
+                mode,
+                centre,
+                route: route(raw, outputs, rule),
+                batch: Batch::new(batch).unwrap(),
+                mantissa: RateMantissa::new(mantissa).unwrap(),
+                rates,
+                decay,
+            };
+            let augment = image.then(|| moved(sides[0])).flatten();
+            let experiment = Experiment { seed, hardware, network, epochs, augment };
+            let data = examples(seed, sides[0], outputs.max(2));
+            Run { experiment, data, stop: stop.min(epochs) }
+        })
+        .prop_filter("a rate that no shift stands for", |run| {
+            let checked = run.experiment.check();
+            let rate = checked.as_ref().err().map(|error| error.key());
+            assert!(matches!(rate, None | Some("learning.rate")), "{checked:?}");
+            checked.is_ok()
+        })
 }
 
 const IDENTITY: Identity<'_> = Identity { run: "run", data: "data" };

@@ -17,10 +17,10 @@ pub(super) fn draw(view: &RunView<'_>) -> Option<Figure> {
         scores.collect::<Vec<_>>()
     };
     let mut all = vec![
-        Series::new("train", "var(--c)", curve(|record| record.train)).dashed(true),
-        Series::new("validation", "var(--a)", curve(|record| record.validation)),
+        Series::new("train", "var(--c)", curve(|record| record.train())).dashed(true),
+        Series::new("validation", "var(--a)", curve(|record| record.validation())),
     ];
-    if let Some(test) = &view.receipt.test {
+    if let Some(test) = view.receipt.classified() {
         let at = (f64::from(test.epoch), 100.0 * test.score.fraction());
         all.push(Series::new("test", "var(--b)", vec![at]).marked());
     }
@@ -47,7 +47,7 @@ pub(super) fn draw(view: &RunView<'_>) -> Option<Figure> {
     let best = view
         .epochs
         .iter()
-        .filter_map(|record| Some((record.validation.filter(|score| score.total > 0)?, record)))
+        .filter_map(|record| Some((record.validation().filter(|score| score.total > 0)?, record)))
         .min_by(|(a, _), (b, _)| b.fraction().total_cmp(&a.fraction()));
     let mut caption = match best {
         Some((score, record)) => format!(
@@ -58,7 +58,8 @@ pub(super) fn draw(view: &RunView<'_>) -> Option<Figure> {
         None => "No validation split.".into(),
     };
     let start = view.epochs.first().filter(|record| record.epoch == 0 && last > 0);
-    if let Some(score) = start.and_then(|record| record.validation).filter(|score| score.total > 0)
+    if let Some(score) =
+        start.and_then(|record| record.validation()).filter(|score| score.total > 0)
     {
         caption += &format!(" Before the first update it was {}.", percent(score.fraction(), 2));
     }

@@ -13,13 +13,13 @@ const CLASSES_WRITTEN: usize = 20;
 const NAMED: usize = 6;
 
 pub(super) fn draw(view: &RunView<'_>) -> Option<Figure> {
-    let matrix = &view.receipt.test.as_ref()?.confusion;
+    let matrix = &view.receipt.classified()?.confusion;
     let classes = matrix.len();
     if classes == 0 || matrix.iter().any(|row| row.len() != classes) {
         return None;
     }
     let drawing = if classes <= CLASSES_WRITTEN { squares(view, matrix) } else { image(matrix)? };
-    let test = view.receipt.test.as_ref()?;
+    let test = view.receipt.classified()?;
     let most: String = test
         .confusions()
         .into_iter()

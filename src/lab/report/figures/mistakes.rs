@@ -14,13 +14,17 @@ const EACH: usize = 4;
 const OTHERS: [usize; 2] = [12, 36];
 
 pub(super) fn draw(view: &RunView<'_>) -> Option<Figure> {
-    let confusions = view.receipt.test.as_ref().map(|test| test.confusions()).unwrap_or_default();
+    let confusions = view.receipt.classified().map(|test| test.confusions()).unwrap_or_default();
     let mut drawn: Vec<u64> = Vec::new();
     let mut pairs = String::new();
     let mut of_pairs = 0;
     for (n, truth, guess) in confusions.into_iter().take(PAIRS) {
-        let of_class =
-            view.receipt.test.iter().flat_map(|test| test.confusion.get(truth)).flatten();
+        let of_class = view
+            .receipt
+            .classified()
+            .into_iter()
+            .flat_map(|test| test.confusion.get(truth))
+            .flatten();
         let of_class: u64 = of_class.sum();
         let (truth, guess) = (truth as u64, guess as u64);
         let of_pair = view.pictures.iter().filter(|p| p.truth == truth && p.guess == guess);

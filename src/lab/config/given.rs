@@ -5,13 +5,14 @@
 //! program later changes no list of a run that does not use it. [`FROZEN`] is never edited, only added to: when what
 //! users get by saying nothing changes, the key is written into the resolved configuration instead.
 
+use super::{Config, ConfigError, Select, TrainOn};
 use crate::chip::hardware::{
     Adc, AdcRange, CellSpec, DigitalSpec, DitherBits, DitherPattern, DriveSpec, FloorKind,
     HardwareSpec, PulseCode, Subtract, TileSpec, Timing, WriteScheme, WriteSpec,
 };
 use crate::chip::layer::{DrivenBy, LayerSpec};
-use crate::lab::config::{Select, TrainOn};
 use crate::learn::error::Centre;
+use crate::learn::network::NetworkSpec;
 use crate::learn::route::Route;
 use crate::learn::rule::{Rule, UpdateMode};
 use crate::num::tables::{Activation, Decay};
@@ -72,25 +73,27 @@ const FROZEN: &[(&str, &str)] = &[
 /// Key and word.
 type Given = (String, String);
 
+impl Config {
+    /// What the core is given for data of this shape, but the data: key and word, without frozen defaults.
+    ///
+    /// # Errors
+    /// When the configuration does not fit such data.
+    pub fn given(
+        &self,
+        features: usize,
+        classes: usize,
+        image: Option<[usize; 3]>,
+    ) -> Result<Vec<(String, String)>, ConfigError> {
+        let experiment = self.experiment(features, classes, image)?;
+        Ok(classify(&experiment, self.train_on, self.select))
+    }
+}
+
 /// Everything a classification run was given, the data aside.
-#[must_use]
-pub fn given(experiment: &Experiment, train_on: TrainOn, select: Select) -> Vec<Given> {
+fn classify(experiment: &Experiment, train_on: TrainOn, select: Select) -> Vec<Given> {
     // without `..`, here and below: what a run is given is listed or does not compile
-    let Experiment {
-        seed,
-        hardware,
-        layers,
-        rule,
-        mode,
-        centre,
-        route,
-        batch,
-        mantissa,
-        rates,
-        decay,
-        epochs,
-        augment,
-    } = experiment;
+    let Experiment { seed, hardware, network, epochs, augment } = experiment;
+    let NetworkSpec { layers, rule, mode, centre, route, batch, mantissa, rates, decay } = network;
     let mut list = List::default();
     list.put("task", "classify");
     list.put("seed", seed);
@@ -127,10 +130,11 @@ pub fn given(experiment: &Experiment, train_on: TrainOn, select: Select) -> Vec<
     list.put(
         "learning.route",
         match route {
-            Route::Modulo { taps, shift } => format!("modulo {taps}{}", shifted(shift)),
-            Route::RandomSparse => "random_sparse".into(),
-            Route::ScalarBroadcast => "scalar_broadcast".into(),
-            Route::RandomDense { shift } => format!("random_dense{}", shifted(shift)),
+            None => "none".into(),
+            Some(Route::Modulo { taps, shift }) => format!("modulo {taps}{}", shifted(shift)),
+            Some(Route::RandomSparse) => "random_sparse".into(),
+            Some(Route::ScalarBroadcast) => "scalar_broadcast".into(),
+            Some(Route::RandomDense { shift }) => format!("random_dense{}", shifted(shift)),
         },
     );
     list.put("learning.batch", batch.get());

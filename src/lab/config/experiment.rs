@@ -1,0 +1,114 @@
+//! What a configuration makes of data: the network with its sizes, and the experiment around it.
+
+use super::check::wrong;
+use super::{Config, ConfigError};
+use crate::chip::layer::{DrivenBy, LayerSpec};
+use crate::chip::population::Wiring;
+use crate::learn::network::NetworkSpec;
+use crate::learn::rule::Rule;
+use crate::num::tables::{Activation, divergence_index};
+use crate::task::classify::{Augment, Experiment};
+
+impl Config {
+    /// The experiment for examples of `features` values and `classes` classes.
+    ///
+    /// # Errors
+    /// When it does not fit the data or the chip, or its parts do not fit together.
+    pub fn experiment(
+        &self,
+        features: usize,
+        classes: usize,
+        image: Option<[usize; 3]>,
+    ) -> Result<Experiment, ConfigError> {
+        let default = if self.rule == Rule::Kaneko && classes == 2 { 1 } else { classes };
+        let outputs = self.outputs.unwrap_or(default);
+        if outputs != classes && !(outputs == 1 && classes == 2) {
+            let allowed =
+                format!("the data has {classes} classes: use {classes}, or 1 for two classes");
+            return Err(wrong("network.outputs", format!("is {outputs}"), allowed));
+        }
+        let augment = match (self.shift_pixels, image) {
+            (0, _) => None,
+            (pixels, Some([height, width, channels])) => {
+                Some(Augment { pixels, height, width, channels })
+            }
+            (pixels, None) => {
+                let allowed = "the data holds no images; leave the key out";
+                return Err(wrong("learning.shift_pixels", format!("is {pixels}"), allowed));
+            }
+        };
+        let experiment = Experiment {
+            seed: self.seed,
+            hardware: self.hardware.clone(),
+            network: self.network(features, outputs),
+            epochs: self.epochs,
+            augment,
+        };
+        experiment.check()?;
+        Ok(experiment)
+    }
+
+    /// The network between so many inputs and outputs.
+    fn network(&self, inputs: usize, outputs: usize) -> NetworkSpec {
+        let mut sizes = vec![inputs];
+        sizes.extend(&self.hidden);
+        sizes.push(outputs);
+        let layers = (0..self.hidden.len() + 1).map(|layer| {
+            let last = layer == self.hidden.len();
+            let wiring = match (self.rule.is_dalean(), last) {
+                (true, false) => Wiring::Dual,
+                (true, true) => Wiring::DualReadout,
+                (false, _) => Wiring::Single,
+            };
+            LayerSpec {
+                inputs: sizes[layer],
+                units: sizes[layer + 1],
+                wiring,
+                driven_by: if layer == 0 { DrivenBy::Shared } else { DrivenBy::Streams },
+                activation: self.activations[layer],
+                weight_max_log2: self.weight_max_log2[layer],
+                gain_64ths: self.gain_64ths[usize::from(last)],
+                constant_row: self.bias_rows,
+            }
+        });
+        NetworkSpec {
+            layers: layers.collect(),
+            rule: self.rule,
+            mode: self.mode,
+            centre: self.centre,
+            route: self.route,
+            batch: self.batch,
+            mantissa: self.mantissa,
+            rates: self.rates.clone(),
+            decay: self.decay,
+        }
+    }
+
+    /// The rule as it was written.
+    #[must_use]
+    pub fn rule_name(&self) -> &str {
+        self.resolved.learning.as_ref().and_then(|l| l.rule.as_deref()).unwrap_or("ed")
+    }
+
+    /// What may go wrong with these numbers, before anything runs.
+    #[must_use]
+    pub fn warnings(&self) -> Vec<String> {
+        let mut warnings = Vec::new();
+        for (layer, (rate, activation)) in self.rates.iter().zip(&self.activations).enumerate() {
+            let Activation::Sigmoid(alpha) = *activation else { continue };
+            let width = self.hidden.get(layer).copied().unwrap_or(0);
+            let index = divergence_index(*rate, width, alpha);
+            if index >= 320 {
+                warnings.push(format!(
+                    "layer {layer}: rate x width / alpha^2 is {index}; nets above about 320 to 570 diverge. Lower \
+                     learning.rate or raise network.alpha"
+                ));
+            }
+        }
+        warnings.extend(self.constants.complaints());
+        for (what, how) in &self.not_simulated {
+            warnings.push(format!("not simulated: {what} ({how})"));
+        }
+        warnings
+    }
+}

@@ -1,0 +1,202 @@
+//! Classification as a task: epochs over examples, scores, and the final reading of the test set.
+#![expect(
+    clippy::disallowed_types,
+    reason = "wall-clock seconds are shown to people, never compared"
+)]
+
+use std::time::Instant;
+
+use super::task::{GoOn, Progress, Task, Told};
+use super::{Machine, RunError};
+use crate::chip::engine::Currents;
+use crate::chip::hardware::{Adc, AdcRange};
+use crate::chip::state::State;
+use crate::lab::config::{Config, Select, TrainOn};
+use crate::lab::store::record::{
+    ClassifyOutcome, DataRecord, Note, Outcome, Score, TestOutcome, TestRecord,
+};
+use crate::learn::driver::Driver;
+use crate::learn::statistics::PathwayStatistics;
+use crate::task::classify::{self, Evaluation, Examples, Split, Trainer};
+
+/// Wrong answers kept for the report.
+const MISTAKES: usize = 24;
+/// Confusions of which wrong answers are kept, and how many of each.
+const CONFUSIONS: [usize; 2] = [6, 4];
+
+/// A training on labelled examples.
+#[derive(Debug)]
+pub(super) struct Classify {
+    trainer: Trainer,
+    train: Examples,
+    validation: Examples,
+    test: Examples,
+    select: Select,
+    notes: Vec<Note>,
+}
+
+impl Classify {
+    /// Builds the network, loads its initial levels and calibrates its converters.
+    pub(super) fn new(
+        config: &Config,
+        split: Split,
+        data: &DataRecord,
+        machine: Machine,
+    ) -> Result<Self, RunError> {
+        if split.train.is_empty() {
+            let hint = "give it at least one example";
+            return Err(RunError::Empty { part: "training", hint });
+        }
+        let experiment = config.experiment(data.features, data.classes, data.image)?;
+        let (train, validation) = match config.train_on {
+            TrainOn::Train => (split.train, split.validation),
+            TrainOn::All => (split.train.joined(&split.validation), split.validation.split_at(0).0),
+        };
+        if config.select == Select::BestValidation && validation.is_empty() {
+            let hint = "choose the last epoch with learning.select = \"last\"";
+            return Err(RunError::Empty { part: "validation", hint });
+        }
+        let seeded = experiment.build(machine.backend, train.len())?;
+        let mut trainer = Trainer::new(experiment, seeded);
+        trainer.driver_mut().engine_mut().set_threads(machine.threads);
+        let codes = trainer.calibrate(&train).map(|calibration| calibration.code_max);
+        let low = codes.into_iter().flatten().enumerate().filter(|&(_, code_max)| code_max <= 3);
+        let notes = low.map(|(layer, code_max)| Note::LowCodes { layer, code_max }).collect();
+        Ok(Self { trainer, train, validation, test: split.test, select: config.select, notes })
+    }
+
+    fn told(&mut self, train: Option<Score>, seconds: f64) -> Told {
+        let (validation, currents) = self.validate();
+        Told {
+            outcome: Outcome::Classify(ClassifyOutcome { train, validation }),
+            currents,
+            seconds,
+        }
+    }
+
+    fn validate(&mut self) -> (Option<Score>, Vec<Currents>) {
+        let Self { trainer, validation, .. } = self;
+        if validation.is_empty() {
+            return (None, vec![[[0; 2]; 2]; trainer.driver().engine().layers().len()]);
+        }
+        let Evaluation { correct, currents, .. } = trainer.evaluate(validation);
+        (Some(Score { correct, total: validation.len() as u64 }), currents)
+    }
+}
+
+impl Task for Classify {
+    fn start(&mut self) -> Told {
+        self.told(None, 0.0)
+    }
+
+    fn advance(&mut self, go_on: GoOn<'_>) -> Option<Told> {
+        let started = Instant::now();
+        let again = matches!(
+            self.trainer.experiment().hardware.adc,
+            Adc::Finite { range: AdcRange::Calibrated { every_epoch: true, .. }, .. }
+        );
+        let Self { trainer, train, .. } = self;
+        if again && trainer.epoch() > 0 {
+            let _ = trainer.calibrate(train);
+        }
+        let learnt = trainer.learn(train, &mut |classify::Progress {
+                                                    epoch,
+                                                    samples,
+                                                    samples_total,
+                                                    correct,
+                                                }| {
+            let answers = Some(Score { correct, total: samples as u64 });
+            go_on(Progress { epoch, done: samples, total: samples_total, answers })
+        });
+        let (correct, total) = (learnt.ok()?, train.len() as u64);
+        let seconds = started.elapsed().as_secs_f64();
+        Some(self.told(Some(Score { correct, total }), seconds))
+    }
+
+    fn state(&mut self) -> &mut dyn State {
+        &mut self.trainer
+    }
+
+    fn test(&mut self) -> Option<TestOutcome> {
+        if self.test.is_empty() {
+            return None;
+        }
+        let Self { trainer, test, .. } = self;
+        let found = trainer.evaluate(test);
+        let classes = test.classes();
+        let mut confusion = vec![vec![0; classes]; classes];
+        let mut wrong = Vec::new();
+        for (example, (&guess, &truth)) in found.predictions.iter().zip(test.labels()).enumerate() {
+            confusion[usize::from(truth)][usize::from(guess)] += 1;
+            if guess != truth {
+                wrong.push((found.margins[example], example as u64, truth, guess));
+            }
+        }
+        wrong.sort_by_key(|&(margin, example, ..)| (std::cmp::Reverse(margin), example));
+        let wrong = wrong.into_iter().map(|(_, e, t, g)| [e, u64::from(t), u64::from(g)]);
+        let wrong: Vec<[u64; 3]> = wrong.collect();
+        let mut record = TestRecord {
+            epoch: self.trainer.epoch(),
+            select: match self.select {
+                Select::BestValidation => "best_validation".into(),
+                Select::Last => "last".into(),
+            },
+            score: Score { correct: found.correct, total: self.test.len() as u64 },
+            confusion,
+            mistakes: wrong.iter().copied().take(MISTAKES).collect(),
+            confused: vec![],
+        };
+        let [pairs, each] = CONFUSIONS;
+        for (_, truth, guess) in record.confusions().into_iter().take(pairs) {
+            let of_pair = |one: &&[u64; 3]| one[1..] == [truth as u64, guess as u64];
+            record.confused.extend(wrong.iter().filter(of_pair).take(each));
+        }
+        Some(TestOutcome::Classify(record))
+    }
+
+    fn epoch(&self) -> u32 {
+        self.trainer.epoch()
+    }
+
+    fn networks(&self) -> Vec<&Driver> {
+        vec![self.trainer.driver()]
+    }
+
+    fn networks_mut(&mut self) -> Vec<&mut Driver> {
+        vec![self.trainer.driver_mut()]
+    }
+
+    fn statistics(&self) -> Vec<PathwayStatistics> {
+        self.trainer.statistics()
+    }
+
+    fn notes(&self) -> Vec<Note> {
+        self.notes.clone()
+    }
+
+    fn epoch_size(&self) -> (usize, u64) {
+        let samples = self.train.len();
+        (samples, self.trainer.experiment().updates_per_epoch(samples))
+    }
+
+    fn updates(&mut self, updates: u64) -> u64 {
+        let Self { trainer, train, .. } = self;
+        let mut done = 0;
+        if updates > 0 {
+            let _ = trainer.learn(train, &mut |_| {
+                done += 1;
+                done < updates
+            });
+        }
+        done
+    }
+
+    fn infer(&mut self) {
+        let (first, _) = self.train.clone().split_at(1);
+        let _ = self.trainer.evaluate(&first);
+    }
+
+    fn examples(&self) -> Option<&Examples> {
+        Some(&self.test)
+    }
+}

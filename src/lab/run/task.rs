@@ -1,0 +1,98 @@
+//! The seam between carrying out a run and what is learnt in it.
+//!
+//! A task starts, advances by an epoch, holds a state and is tested; everything else about a run (folder, records of the
+//! chip, checkpoints, receipt, verifying, prices, pages) is the same for all of them. Which tasks there are is known to
+//! the configuration and to [`build`] alone.
+
+use std::fmt;
+
+use super::classify::Classify;
+use super::{Machine, RunError};
+use crate::chip::engine::Currents;
+use crate::chip::state::State;
+use crate::lab::config::Config;
+use crate::lab::data::Loaded;
+use crate::lab::store::record::{DataRecord, Note, Outcome, Score, TestOutcome};
+use crate::learn::driver::Driver;
+use crate::learn::statistics::PathwayStatistics;
+use crate::task::classify::Examples;
+
+/// How far an epoch is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Progress {
+    /// Epoch in progress, from 0.
+    pub epoch: u32,
+    /// Samples learnt from in this epoch.
+    pub done: usize,
+    /// Samples of an epoch.
+    pub total: usize,
+    /// Answers given before learning from them, of tasks that give any.
+    pub answers: Option<Score>,
+}
+
+/// Asked after every update; false stops the run.
+pub(super) type GoOn<'a> = &'a mut (dyn FnMut(Progress) -> bool + Send);
+
+/// What a task tells of an epoch.
+#[derive(Debug)]
+pub(super) struct Told {
+    /// What came of it.
+    pub(super) outcome: Outcome,
+    /// Bank currents of the evaluation, layer by layer through all networks.
+    pub(super) currents: Vec<Currents>,
+    /// Wall-clock seconds of learning.
+    pub(super) seconds: f64,
+}
+
+/// One thing that can be learnt.
+pub(super) trait Task: fmt::Debug {
+    /// Looks at the state before the first update.
+    fn start(&mut self) -> Told;
+
+    /// Learns for an epoch and looks at what came of it. `None` when `go_on` said to stop; the state then lies inside an
+    /// epoch.
+    fn advance(&mut self, go_on: GoOn<'_>) -> Option<Told>;
+
+    /// Everything that decides what comes next.
+    fn state(&mut self) -> &mut dyn State;
+
+    /// The final test with the present state, if there is anything to test on.
+    fn test(&mut self) -> Option<TestOutcome>;
+
+    /// Epochs finished.
+    fn epoch(&self) -> u32;
+
+    /// Networks, whose layers are numbered through.
+    fn networks(&self) -> Vec<&Driver>;
+
+    /// The same, to set what changes no result and to record operations.
+    fn networks_mut(&mut self) -> Vec<&mut Driver>;
+
+    /// Statistics of every pathway of every network.
+    fn statistics(&self) -> Vec<PathwayStatistics>;
+
+    /// What building the task showed.
+    fn notes(&self) -> Vec<Note>;
+
+    /// Samples and updates of an epoch.
+    fn epoch_size(&self) -> (usize, u64);
+
+    /// Learns so many updates of the first epoch and stops inside it; how many were done.
+    fn updates(&mut self, updates: u64) -> u64;
+
+    /// Reads one sample as an inference does.
+    fn infer(&mut self);
+
+    /// Test examples, where mistakes can be shown as pictures.
+    fn examples(&self) -> Option<&Examples>;
+}
+
+/// Builds what a configuration asks to be learnt.
+pub(super) fn build(
+    config: &Config,
+    data: Loaded,
+    machine: Machine,
+) -> Result<Box<dyn Task>, RunError> {
+    let record = DataRecord::of(&data);
+    Ok(Box::new(Classify::new(config, data.split, &record, machine)?))
+}

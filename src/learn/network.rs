@@ -1,0 +1,221 @@
+//! The network builder: what a network is made of and how it learns, checked as a whole and built with its initial
+//! levels.
+//!
+//! A [`NetworkSpec`] is plain data. [`NetworkSpec::check`] says of everything that does not fit together where it is,
+//! what was found, what is allowed and what to try; nothing else in this wing can be built from outside. A run may hold
+//! several networks: [`NetworkPlace`] numbers their layers through, so that no draw of one is a draw of another. See
+//! docs/MODEL.md, 1, 3.5 and 3.6.
+#![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
+
+mod check;
+#[cfg(test)]
+mod tests;
+
+pub use check::{GAIN_64THS, WEIGHT_MAX_LOG2};
+
+use super::driver::{Driver, Learning};
+use super::error::{Centre, ErrorUnit};
+use super::route::Route;
+use super::rule::{Rule, UpdateMode};
+use crate::chip::crossbar::kernel::Backend;
+use crate::chip::crossbar::{initial_levels, initial_scale};
+use crate::chip::engine::{Engine, Operation};
+use crate::chip::hardware::Hardware;
+use crate::chip::layer::{self, Delivery, Layer, LayerSpec, PlanError};
+use crate::chip::population::Polarity;
+use crate::num::draw::{Place, Site};
+use crate::num::fixed::{Batch, RateMantissa};
+use crate::num::tables::{Decay, Positive, Rate};
+
+/// A network and how it learns.
+#[derive(Debug, Clone, PartialEq)]
+pub struct NetworkSpec {
+    /// The layers, input to output.
+    pub layers: Vec<LayerSpec>,
+    /// The rule.
+    pub rule: Rule,
+    /// When a batch is written.
+    pub mode: UpdateMode,
+    /// What is subtracted from errors.
+    pub centre: Centre,
+    /// How errors reach hidden layers; `None` for back-propagation, whose errors come down through the layers above.
+    pub route: Option<Route>,
+    /// Configured batch.
+    pub batch: Batch,
+    /// Small factor of the rate.
+    pub mantissa: RateMantissa,
+    /// Rate of each layer, multiplier included.
+    pub rates: Vec<Positive>,
+    /// How the rate falls.
+    pub decay: Decay,
+}
+
+/// Where a network stands in a run.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct NetworkPlace {
+    /// Seed of all draws of the run.
+    pub seed: u64,
+    /// Number of its first layer in draws: the layers of the networks before it.
+    pub first_layer: u16,
+    /// Updates of the whole run, over which the rate falls.
+    pub updates: u64,
+}
+
+/// A network that does not fit together, or not on the chip.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum NetworkError {
+    /// The plan of arrays and tiles.
+    #[error(transparent)]
+    Plan(#[from] PlanError),
+    /// A part that does not fit with the others.
+    #[error("`{key}` {found}; {allowed}")]
+    Misfit {
+        /// The key that says it in an experiment, such as `learning.taps`.
+        key: &'static str,
+        /// What was found.
+        found: String,
+        /// What is allowed and what to try.
+        allowed: String,
+    },
+}
+
+impl NetworkError {
+    /// A part that does not fit with the others; tasks say so of what they add to a network.
+    pub fn misfit(
+        key: &'static str,
+        found: impl std::fmt::Display,
+        allowed: impl std::fmt::Display,
+    ) -> Self {
+        Self::Misfit { key, found: found.to_string(), allowed: allowed.to_string() }
+    }
+
+    /// The key that says it in an experiment: stable, for callers that keep several networks under several names.
+    #[must_use]
+    pub const fn key(&self) -> &'static str {
+        match self {
+            Self::Plan(PlanError::Tiles { .. }) => "hw.tile.count",
+            Self::Plan(PlanError::Size { .. } | PlanError::Layers { .. }) => "network.hidden",
+            Self::Misfit { key, .. } => key,
+        }
+    }
+}
+
+impl NetworkSpec {
+    /// Checks that everything fits together and on the chip.
+    ///
+    /// # Errors
+    /// When something does not, with the key that says it.
+    pub fn check(&self, hardware: &Hardware) -> Result<(), NetworkError> {
+        check::check(self, hardware)
+    }
+
+    /// The rate that each layer really has: `k` is a whole number, so a rate becomes another one.
+    ///
+    /// # Errors
+    /// When the network does not fit together.
+    pub fn rates_effective(&self, hardware: &Hardware) -> Result<Vec<Positive>, NetworkError> {
+        self.check(hardware)?;
+        let rates = self.rates(hardware).enumerate();
+        rates.map(|(at, rate)| rate.effective().map_err(|e| check::no_shift(at, &e))).collect()
+    }
+
+    /// What the rate of each layer is made of.
+    fn rates(&self, hardware: &Hardware) -> impl Iterator<Item = Rate> {
+        self.layers.iter().zip(&self.rates).map(|(spec, &rate)| Rate {
+            rate,
+            batch: self.batch,
+            mantissa: self.mantissa,
+            error_bits: hardware.digital.error_bits,
+            activation: spec.activation,
+            unit: layer::unit(spec, hardware),
+        })
+    }
+
+    /// Builds the network, loads its initial levels and stands ready to learn.
+    ///
+    /// # Errors
+    /// When it does not fit together, not on the chip, or not behind so many other layers.
+    ///
+    /// # Panics
+    /// Never: what could panic was checked.
+    pub fn build(
+        &self,
+        hardware: &Hardware,
+        backend: Backend,
+        place: NetworkPlace,
+    ) -> Result<Driver, NetworkError> {
+        self.check(hardware)?;
+        let numbers = self.numbers(place)?;
+        let layers = self.layers.iter().zip(self.deliveries(place.seed, &numbers)).zip(&numbers);
+        let layers = layers.map(|((spec, delivery), &number)| {
+            Layer::new(number, spec.clone(), delivery, hardware)
+        });
+        let layers: Vec<_> = layers.collect();
+        let shifts = self.rates(hardware).enumerate().map(|(at, rate)| {
+            rate.shifts(self.decay, place.updates).map_err(|e| check::no_shift(at, &e))
+        });
+        let shifts = shifts.collect::<Result<_, _>>()?;
+        let mut engine = Engine::new(hardware.clone(), backend, place.seed, layers);
+        engine.set_potentiation_only(self.rule == Rule::Kaneko);
+        engine.set_mantissa(self.mantissa.get());
+        load_initial_levels(&mut engine, place.seed);
+        let unit = ErrorUnit::new(self.centre, hardware.digital.error_bits, self.outputs());
+        let learning = Learning { rule: self.rule, mode: self.mode, shifts };
+        Ok(Driver::new(engine, learning, unit))
+    }
+
+    /// Units of the last layer: error words of a sample. Only asked of a network that has layers.
+    fn outputs(&self) -> usize {
+        self.layers.last().map_or(0, |layer| layer.units)
+    }
+
+    /// Numbers of the layers in draws.
+    fn numbers(&self, place: NetworkPlace) -> Result<Vec<u16>, NetworkError> {
+        let first = usize::from(place.first_layer);
+        let numbers = (first..first + self.layers.len()).map(u16::try_from);
+        numbers.collect::<Result<_, _>>().map_err(|_| {
+            let found = format!("of {} layers comes behind {first} others", self.layers.len());
+            let allowed = "the layers of a run are numbered 0..=65535 in draws; use fewer";
+            NetworkError::misfit("network.hidden", found, allowed)
+        })
+    }
+
+    /// How errors reach each layer.
+    fn deliveries(&self, seed: u64, numbers: &[u16]) -> Vec<Delivery> {
+        let (outputs, last) = (self.outputs(), self.layers.len() - 1);
+        let layers = self.layers.iter().zip(numbers).enumerate();
+        let delivery = layers.map(|(at, (spec, &number))| match self.route {
+            _ if at == last => Delivery::output(outputs),
+            None => Delivery::above(spec.units),
+            Some(route) => route.delivery(spec.units, outputs, seed, number),
+        });
+        delivery.collect()
+    }
+}
+
+/// Draws the initial levels of every array and loads them row by row.
+fn load_initial_levels(engine: &mut Engine, seed: u64) {
+    let (level_bits, window) = (engine.hardware().cell.level_bits, engine.hardware().cell.window);
+    for layer in 0..engine.layers().len() {
+        let this = &engine.layers()[layer];
+        let (layout, number, wiring) = (this.layout, this.index, this.spec.wiring);
+        let (gains, weight_max_log2, fan_in) =
+            (this.spec.gain_64ths, this.spec.weight_max_log2, this.spec.inputs);
+        for (array, pathway) in wiring.pathways().iter().enumerate() {
+            let inhibits = pathway.polarity == Polarity::Inhibits;
+            let gain = gains[usize::from(inhibits)];
+            let scale = initial_scale(gain, level_bits.get(), weight_max_log2, fan_in);
+            let place = Place {
+                seed,
+                site: Site::InitialLevels,
+                layer: number,
+                pathway: pathway.code,
+                sub: 0,
+                count: 0,
+            };
+            initial_levels(layout, window, scale, place, |row, levels| {
+                engine.execute(&Operation::LoadWeights { layer, array, row, levels });
+            });
+        }
+    }
+}

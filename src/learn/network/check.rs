@@ -1,0 +1,221 @@
+//! What fits with what: every rule between the parts of a network, its way to learn and its chip, said once.
+#![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
+
+use super::{NetworkError, NetworkSpec};
+use crate::chip::hardware::{Adc, Hardware, WriteScheme};
+use crate::chip::layer::{self, DrivenBy, LayerSpec};
+use crate::chip::population::Wiring;
+use crate::learn::error::Centre;
+use crate::learn::route::Route;
+use crate::learn::rule::{Rule, UpdateMode};
+use crate::num::fixed::OutOfRange;
+use crate::num::tables::SHIFT_MAX;
+
+/// `log2` of the least and the greatest `weight_max`.
+pub const WEIGHT_MAX_LOG2: std::ops::RangeInclusive<i32> = -8..=8;
+/// Initial gains, in 64ths: up to 16.
+pub const GAIN_64THS: std::ops::RangeInclusive<u32> = 1..=1024;
+/// Words a unit adds, at most.
+const TAPS_MAX: usize = 4;
+/// Shift of a sum of words, at most: nothing is left of it beyond.
+const TAP_SHIFT_MAX: u32 = 16;
+
+type Checked = Result<(), NetworkError>;
+
+fn misfit(key: &'static str, found: impl ToString, allowed: impl ToString) -> Checked {
+    Err(NetworkError::Misfit { key, found: found.to_string(), allowed: allowed.to_string() })
+}
+
+pub(super) fn check(network: &NetworkSpec, hardware: &Hardware) -> Checked {
+    sizes(network)?;
+    layer::check(&network.layers, hardware)?;
+    numbers(network)?;
+    rule(network, hardware)?;
+    wiring(network)?;
+    batches(network, hardware)?;
+    routes(network)?;
+    rates(network, hardware)
+}
+
+/// Layers that have units and follow one another.
+fn sizes(network: &NetworkSpec) -> Checked {
+    if network.layers.iter().any(|layer| layer.units == 0) {
+        return misfit("network.hidden", "has a layer of 0 units", "give at least 1 unit");
+    }
+    if network.layers.iter().any(|layer| layer.inputs == 0) {
+        return misfit("network.hidden", "has a layer of 0 inputs", "give it at least 1 value");
+    }
+    for (at, pair) in network.layers.windows(2).enumerate() {
+        let (units, inputs) = (pair[0].units, pair[1].inputs);
+        if units != inputs {
+            let found =
+                format!("gives layer {at} {units} units, and layer {} {inputs} inputs", at + 1);
+            return misfit(
+                "network.hidden",
+                found,
+                "the units of a layer are the inputs of the next",
+            );
+        }
+    }
+    Ok(())
+}
+
+/// Weights and gains that levels can stand for.
+fn numbers(network: &NetworkSpec) -> Checked {
+    let last = network.layers.len() - 1;
+    for (at, LayerSpec { weight_max_log2, gain_64ths, .. }) in network.layers.iter().enumerate() {
+        if !WEIGHT_MAX_LOG2.contains(weight_max_log2) {
+            let found = format!("of layer {at} is 2^{weight_max_log2}");
+            let allowed = "it must be a power of two from 1/256 to 256";
+            return misfit("network.weight_max", found, allowed);
+        }
+        if let Some(gain) = gain_64ths.iter().find(|gain| !GAIN_64THS.contains(gain)) {
+            let key = if at == last { "network.init_gain_output" } else { "network.init_gain" };
+            let found = format!("of layer {at} holds {gain}/64");
+            return misfit(key, found, "gains are multiples of 1/64, up to 16");
+        }
+    }
+    Ok(())
+}
+
+/// What a rule asks of outputs and chip.
+fn rule(network: &NetworkSpec, hardware: &Hardware) -> Checked {
+    match network.rule {
+        Rule::Ed | Rule::Dfa => Ok(()),
+        Rule::Kaneko if network.outputs() == 1 => Ok(()),
+        Rule::Kaneko => {
+            let allowed = format!(
+                "Kaneko's rule has one output and two classes, but the network has {} outputs; use a binary set such as \
+                 xor or parity4, or rule = \"ed\"",
+                network.outputs()
+            );
+            misfit("learning.rule", "is \"kaneko\"", allowed)
+        }
+        Rule::Bp if hardware.adc == Adc::Ideal && hardware.tile.transposed_read => Ok(()),
+        Rule::Bp => {
+            let allowed = "back-propagation reads arrays from their columns: hw.tile.transposed_read = true and \
+                           hw.adc = \"ideal\" (finite converters on rows are not simulated)";
+            misfit("learning.rule", "is \"bp\"", allowed)
+        }
+    }
+}
+
+/// Two populations under Dale's law, one stream of differential pairs for the baselines that break it.
+fn wiring(network: &NetworkSpec) -> Checked {
+    let last = network.layers.len() - 1;
+    for (at, layer) in network.layers.iter().enumerate() {
+        let wanted = match (network.rule.is_dalean(), at == last) {
+            (true, false) => Wiring::Dual,
+            (true, true) => Wiring::DualReadout,
+            (false, _) => Wiring::Single,
+        };
+        if layer.wiring != wanted {
+            let found =
+                format!("does not fit the arrays of layer {at}, which are {:?}", layer.wiring);
+            let allowed = format!(
+                "error diffusion has two populations and reads one out, baselines have differential pairs: wire it {wanted:?}"
+            );
+            return misfit("learning.rule", found, allowed);
+        }
+        let drives = if at == 0 { DrivenBy::Shared } else { DrivenBy::Streams };
+        if layer.driven_by != drives {
+            let found = format!("has a layer {at} driven by {:?}", layer.driven_by);
+            let allowed = format!(
+                "data drive both streams of the first layer alike, and streams those of the others: {drives:?}"
+            );
+            return misfit("network.hidden", found, allowed);
+        }
+    }
+    Ok(())
+}
+
+/// What is centred over, and when it is written.
+fn batches(network: &NetworkSpec, hardware: &Hardware) -> Checked {
+    if network.centre == Centre::Batch {
+        if network.mode == UpdateMode::Online {
+            let allowed = "one sample has no mean; use learning.centre = \"running\" or \"none\" with mode = \"online\"";
+            return misfit("learning.centre", "is \"batch\"", allowed);
+        }
+        if network.batch.get() == 1 {
+            let allowed = "a batch of one has no error beside its mean and learns nothing; use learning.centre = \
+                           \"running\" or \"none\", or a larger learning.batch";
+            return misfit("learning.centre", "is \"batch\"", allowed);
+        }
+    }
+    if network.mode == UpdateMode::Accumulate && hardware.write.scheme != WriteScheme::Rounded {
+        let allowed = "trains write one sample at a time; with hw.write.scheme = \"rank1\" use mode = \"replay\" or \
+                       \"online\"";
+        return misfit("learning.mode", "is \"accumulate\"", allowed);
+    }
+    Ok(())
+}
+
+/// A route that the rule has, with taps that the words of the output can give.
+fn routes(network: &NetworkSpec) -> Checked {
+    let Some(route) = network.route else {
+        return match network.rule {
+            Rule::Bp => Ok(()),
+            Rule::Ed | Rule::Kaneko | Rule::Dfa => {
+                let allowed = "every other rule than \"bp\" has one, such as \"modulo\"";
+                misfit("learning.route", "is missing", allowed)
+            }
+        };
+    };
+    match network.rule {
+        Rule::Bp => {
+            let allowed = "back-propagation has no route: errors come down through the layers above; leave the key out";
+            return misfit("learning.route", "is given beside rule = \"bp\"", allowed);
+        }
+        Rule::Dfa if !matches!(route, Route::RandomDense { .. }) => {
+            let allowed = "direct feedback alignment has random dense feedback; leave the key out";
+            return misfit("learning.route", "is not \"random_dense\"", allowed);
+        }
+        Rule::Ed | Rule::Kaneko | Rule::Dfa => {}
+    }
+    let most = TAPS_MAX.min(network.outputs());
+    let shift = match route {
+        Route::Modulo { taps, .. } if !(1..=most).contains(&taps) => {
+            let outputs = network.outputs();
+            let allowed = format!("with {outputs} outputs it must lie in 1..={most}");
+            return misfit("learning.taps", format!("is {taps}"), allowed);
+        }
+        Route::Modulo { taps: 1, shift: Some(shift) } => {
+            let allowed = "with one tap there is no sum to shift: leave the key out, or use more learning.taps";
+            return misfit("learning.tap_shift", format!("is {shift}"), allowed);
+        }
+        Route::Modulo { shift, .. } | Route::RandomDense { shift } => shift,
+        Route::RandomSparse | Route::ScalarBroadcast => None,
+    };
+    match shift {
+        Some(shift) if shift > TAP_SHIFT_MAX => {
+            let allowed = format!("a sum of words needs at most {TAP_SHIFT_MAX}");
+            misfit("learning.tap_shift", format!("is {shift}"), allowed)
+        }
+        _ => Ok(()),
+    }
+}
+
+/// A rate a layer, each of which a shift stands for.
+fn rates(network: &NetworkSpec, hardware: &Hardware) -> Checked {
+    let (found, layers) = (network.rates.len(), network.layers.len());
+    if found != layers {
+        let allowed = format!("there are {layers} layers (hidden and output); give {layers}");
+        return misfit("learning.rate_multipliers", format!("makes {found} rates"), allowed);
+    }
+    for (at, rate) in network.rates(hardware).enumerate() {
+        rate.shift().map_err(|error| no_shift(at, &error))?;
+    }
+    Ok(())
+}
+
+/// A rate for which there is no shift.
+pub(super) fn no_shift(layer: usize, error: &OutOfRange) -> NetworkError {
+    let k = error.found;
+    let (rate, others, by) =
+        if k > 0 { ("raise", "lower", k - i64::from(SHIFT_MAX)) } else { ("lower", "raise", -k) };
+    let allowed = format!(
+        "k is the number of bits that its sums of products are shifted by, 0..={SHIFT_MAX}: {rate} learning.rate or its \
+         multiplier (2^{by} times is enough), or {others} learning.batch, learning.rate_mantissa or network.weight_max"
+    );
+    NetworkError::misfit("learning.rate", format!("gives layer {layer} a k of {k}"), allowed)
+}

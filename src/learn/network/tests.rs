@@ -1,0 +1,202 @@
+use super::*;
+use crate::chip::engine::Phase;
+use crate::chip::hardware::{Adc, AdcRange, HardwareSpec, Subtract, WriteScheme};
+use crate::chip::layer::DrivenBy;
+use crate::chip::ledger::Event;
+use crate::chip::population::Wiring;
+use crate::num::fixed::AdcBits;
+use crate::num::tables::Activation;
+
+/// 5 to 4 to 3 units by error diffusion: as plain as can be.
+fn plain() -> NetworkSpec {
+    let layer = |inputs, units, wiring| LayerSpec {
+        inputs,
+        units,
+        wiring,
+        driven_by: if inputs == 5 { DrivenBy::Shared } else { DrivenBy::Streams },
+        activation: Activation::Sigmoid(Positive::new(4.0).unwrap()),
+        weight_max_log2: 2,
+        gain_64ths: [96, 32],
+        constant_row: false,
+    };
+    NetworkSpec {
+        layers: vec![layer(5, 4, Wiring::Dual), layer(4, 3, Wiring::DualReadout)],
+        rule: Rule::Ed,
+        mode: UpdateMode::Accumulate,
+        centre: Centre::Batch,
+        route: Some(Route::Modulo { taps: 1, shift: None }),
+        batch: Batch::new(8).unwrap(),
+        mantissa: RateMantissa::new(1).unwrap(),
+        rates: vec![Positive::new(20.0).unwrap(); 2],
+        decay: Decay::Constant,
+    }
+}
+
+fn baseline(rule: Rule) -> NetworkSpec {
+    let mut network = plain();
+    network.layers.iter_mut().for_each(|layer| layer.wiring = Wiring::Single);
+    network.route = (rule == Rule::Dfa).then_some(Route::RandomDense { shift: None });
+    network.rule = rule;
+    network
+}
+
+fn modulo(taps: usize, shift: Option<u32>) -> Option<Route> {
+    Some(Route::Modulo { taps, shift })
+}
+
+const PLACE: NetworkPlace = NetworkPlace { seed: 7, first_layer: 0, updates: 10 };
+
+fn build(network: &NetworkSpec, place: NetworkPlace) -> Result<Driver, NetworkError> {
+    network.build(&Hardware::reference(), Backend::Scalar, place)
+}
+
+/// What is wrong with a network after a change: nothing builds that the check refuses.
+fn refused(network: &NetworkSpec) -> NetworkError {
+    let error = network.check(&Hardware::reference()).unwrap_err();
+    assert_eq!(build(network, PLACE).err().as_ref(), Some(&error));
+    assert!(network.rates_effective(&Hardware::reference()).is_err());
+    error
+}
+
+#[test]
+fn everything_that_does_not_fit_together_is_refused_with_its_key() {
+    type Change = fn(&mut NetworkSpec);
+    let cases: [(&str, &str, Change); 29] = [
+        ("network.hidden", "0 layers", |n| n.layers.clear()),
+        ("network.hidden", "a layer of 0 units", |n| n.layers[1].units = 0),
+        ("network.hidden", "a layer of 0 inputs", |n| n.layers[0].inputs = 0),
+        ("network.hidden", "4 units, and layer 1 9 inputs", |n| n.layers[1].inputs = 9),
+        ("network.hidden", "at most 65535", |n| n.layers[0].inputs = usize::MAX),
+        ("network.hidden", "at most 65535", |n| {
+            n.layers[0].inputs = usize::MAX;
+            n.layers[0].constant_row = true;
+        }),
+        ("network.hidden", "65 layers", |n| {
+            let mut layer = n.layers[0].clone();
+            layer.inputs = layer.units;
+            n.layers.splice(1..1, std::iter::repeat_n(layer, 63));
+            n.rates = vec![Positive::ONE; 65];
+        }),
+        ("network.weight_max", "of layer 0 is 2^9", |n| n.layers[0].weight_max_log2 = 9),
+        ("network.weight_max", "of layer 1 is 2^-9", |n| n.layers[1].weight_max_log2 = -9),
+        ("network.init_gain", "1025/64", |n| n.layers[0].gain_64ths = [1024, 1025]),
+        ("network.init_gain_output", "0/64", |n| n.layers[1].gain_64ths = [0, 1]),
+        ("learning.rule", "two classes", |n| n.rule = Rule::Kaneko),
+        ("learning.rule", "wire it Single", |n| {
+            (n.rule, n.route) = (Rule::Dfa, Some(Route::RandomDense { shift: None }));
+        }),
+        ("learning.rule", "wire it DualReadout", |n| n.layers[1].wiring = Wiring::Dual),
+        ("learning.rule", "wire it Dual", |n| n.layers[0].wiring = Wiring::Single),
+        ("network.hidden", "Shared", |n| n.layers[0].driven_by = DrivenBy::Streams),
+        ("network.hidden", "Streams", |n| n.layers[1].driven_by = DrivenBy::Shared),
+        ("learning.centre", "one sample has no mean", |n| n.mode = UpdateMode::Online),
+        ("learning.centre", "larger learning.batch", |n| n.batch = Batch::new(1).unwrap()),
+        ("learning.route", "is missing", |n| n.route = None),
+        ("learning.route", "leave the key out", |n| {
+            *n = NetworkSpec { route: modulo(1, None), ..baseline(Rule::Bp) };
+        }),
+        ("learning.route", "random dense feedback", |n| {
+            *n = NetworkSpec { route: modulo(1, None), ..baseline(Rule::Dfa) };
+        }),
+        ("learning.taps", "in 1..=3", |n| n.route = modulo(0, None)),
+        ("learning.taps", "in 1..=3", |n| n.route = modulo(4, None)),
+        ("learning.tap_shift", "no sum", |n| n.route = modulo(1, Some(0))),
+        ("learning.tap_shift", "at most 16", |n| n.route = modulo(2, Some(17))),
+        ("learning.rate_multipliers", "makes 1 rates", |n| n.rates.truncate(1)),
+        ("learning.rate", "layer 1 a k of 33", |n| {
+            n.rates[1] = Positive::new(5e-6).unwrap();
+        }),
+        ("learning.rate", "layer 0 a k of -2", |n| n.rates[0] = Positive::new(1e5).unwrap()),
+    ];
+    for (key, words, change) in cases {
+        let mut network = plain();
+        change(&mut network);
+        let error = refused(&network);
+        assert_eq!(error.key(), key, "{error}");
+        assert!(error.to_string().contains(words), "no `{words}` in {error}");
+    }
+}
+
+#[test]
+fn what_lies_at_the_edge_is_built() {
+    let cases = [
+        NetworkSpec { route: modulo(3, Some(16)), ..plain() },
+        NetworkSpec { route: Some(Route::RandomSparse), ..plain() },
+        NetworkSpec { route: Some(Route::ScalarBroadcast), ..plain() },
+        NetworkSpec { mode: UpdateMode::Online, centre: Centre::Running, ..plain() },
+        NetworkSpec { batch: Batch::new(1).unwrap(), centre: Centre::None, ..plain() },
+        baseline(Rule::Dfa),
+        baseline(Rule::Bp),
+    ];
+    for network in cases {
+        let driver = build(&network, PLACE).unwrap();
+        let layers = driver.engine().layers();
+        let cells: usize =
+            layers.iter().flat_map(|l| &l.arrays).map(|array| array.layout().cells()).sum();
+        let loaded = driver.engine().ledger(Phase::Training).total(Event::CellLoads);
+        assert_eq!(loaded, cells as u64, "every cell is loaded, once");
+    }
+}
+
+#[test]
+fn a_chip_that_a_network_does_not_fit_is_refused() {
+    type Change = fn(&mut HardwareSpec);
+    let cases: [(NetworkSpec, &str, Change); 4] = [
+        (baseline(Rule::Bp), "learning.rule", |h| h.tile.transposed_read = false),
+        (baseline(Rule::Bp), "learning.rule", |h| {
+            let (bits, subtract) = (AdcBits::new(8).unwrap(), Subtract::Digital);
+            h.adc = Adc::Finite { bits, subtract, range: AdcRange::Full };
+        }),
+        (plain(), "learning.mode", |h| h.write.scheme = WriteScheme::Trains { slots_log2: 2 }),
+        (plain(), "hw.tile.count", |h| h.tile.count_max = Some(2)),
+    ];
+    for (network, key, change) in cases {
+        let hardware = Hardware::reference().with(change).unwrap();
+        assert_eq!(network.check(&hardware).unwrap_err().key(), key);
+    }
+}
+
+#[test]
+fn networks_whose_layers_are_numbered_through_share_no_draw() {
+    let network = NetworkSpec { route: Some(Route::RandomSparse), ..plain() };
+    let levels = |driver: &Driver, layer: usize| -> Vec<u16> {
+        driver.engine().layers()[layer].arrays.iter().flat_map(|array| array.levels()).collect()
+    };
+    let actor = build(&network, PLACE).unwrap();
+    let critic = build(&network, NetworkPlace { first_layer: 2, ..PLACE }).unwrap();
+    let numbers =
+        |driver: &Driver| driver.engine().layers().iter().map(|l| l.index).collect::<Vec<_>>();
+    assert_eq!((numbers(&actor), numbers(&critic)), (vec![0, 1], vec![2, 3]));
+    assert_ne!(levels(&actor, 0), levels(&critic, 0));
+    // a number is a place, whoever stands there
+    let mut longer = network.clone();
+    let mut second = network.layers[0].clone();
+    second.inputs = 4;
+    longer.layers.insert(1, second.clone());
+    longer.layers.insert(1, second);
+    longer.rates = vec![network.rates[0]; 4];
+    let longer = build(&longer, PLACE).unwrap();
+    assert_eq!(levels(&longer, 3), levels(&critic, 1));
+    assert_ne!(levels(&longer, 3), levels(&actor, 1));
+    // and there are so many
+    let last = NetworkPlace { first_layer: u16::MAX - 1, ..PLACE };
+    assert!(build(&network, last).is_ok());
+    let error = build(&network, NetworkPlace { first_layer: u16::MAX, ..PLACE }).unwrap_err();
+    assert!(error.to_string().contains("behind 65535 others"), "{error}");
+}
+
+#[test]
+fn effective_rates_are_those_of_whole_shifts() {
+    let network = plain();
+    let hardware = Hardware::reference();
+    let effective = network.rates_effective(&hardware).unwrap();
+    let driver = build(&network, PLACE).unwrap();
+    for (layer, rate) in effective.iter().enumerate() {
+        // the rate that a shift really gives is given back by asking for it
+        let mut again = network.clone();
+        again.rates[layer] = *rate;
+        assert_eq!(again.rates_effective(&hardware).unwrap()[layer], *rate);
+        assert_eq!(build(&again, PLACE).unwrap().shift(layer), driver.shift(layer));
+        assert_ne!(*rate, network.rates[layer]);
+    }
+}
