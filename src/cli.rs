@@ -145,7 +145,7 @@ impl Shared {
         if !(1..=1024).contains(&threads) {
             return Err(usage(&format!("--threads is {threads}, but must lie in 1..=1024")));
         }
-        Ok(Machine { backend, threads })
+        Ok(Machine::new(backend, threads)?)
     }
 
     fn data_root(&self) -> DataRoot {

@@ -1,55 +1,106 @@
 //! Simulates neural networks that learn **on** an analog or photonic chip whose synapses can only be non-negative:
 //! deterministic, all-integer, the same bits on every machine.
 //!
-//! The program `dalean` is a thin face over this library. Six wings, each may use those before it:
+//! This page is the library's whole public face. A configuration is read and checked ([`Config`]), data is loaded
+//! ([`Data`]), and a run is carried out in memory ([`Session`]) or in a folder ([`train()`], [`resume`], [`evaluate`],
+//! [`verify`]). Below that stand the parts themselves: a chip ([`Hardware`]), a network ([`NetworkSpec`]), examples, and
+//! a [`Classifier`] that joins them. Whatever can be wrong is an error that says where, what was found and what is
+//! allowed; no argument makes a call panic.
 //!
-//! | wing | holds |
-//! |---|---|
-//! | [`num`] | rounding, random words by place, tables |
-//! | [`chip`] | unsigned crossbars, converters, the engine with its five operations, the event ledger |
-//! | [`learn`] | error words, routes, rules, statistics |
-//! | [`task`] | classification: examples, experiments, epochs |
-//! | [`lab`] | configuration, data sets, run folders, prices, reports, verifying |
-//! | [`cli`] | arguments and messages |
+//! | feature | brings | needs |
+//! |---|---|---|
+//! | none | chip, learning, tasks | a handful of crates |
+//! | `lab` | configuration, data sets, run folders, sweeps, prices, reports | files, SQLite, plotting |
+//! | `cli` (default) | the program `dalean` | a terminal |
 //!
 //! The equations are in docs/MODEL.md, the words in docs/GLOSSARY.md, the map in docs/ARCHITECTURE.md.
-//!
-//! # A few batches of the built-in digits
-//!
-//! ```
-//! use dalean::chip::crossbar::kernel::Backend;
-//! use dalean::lab::{config, data, store::hash};
-//! use dalean::task::classify::Trainer;
-//!
-//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
-//! // an experiment on 5-bit cells; what it does not say has harmless defaults
-//! let text = "network.hidden = [32]\nlearning = { batch = 16, epochs = 1 }\nhw.cell.level_bits = 5";
-//! let sources = config::Sources { experiment: Some(("example", text)), ..Default::default() };
-//! let config = config::load(&sources)?;
-//! let digits = data::load(&config.source()?, &data::DataRoot::new("data"))?;
-//! let (few, _) = digits.split.train.split_at(160);
-//!
-//! // ten updates, with the scalar law and with the fastest kernel of this machine
-//! let mut hashes = Vec::new();
-//! for backend in [Backend::Scalar, Backend::best()] {
-//!     let experiment = config.experiment(few.features(), few.classes(), None)?;
-//!     let seeded = experiment.build(backend, few.len())?;
-//!     let mut trainer = Trainer::new(experiment, seeded);
-//!     trainer.learn(&few, &mut |_progress| true).expect("nobody asks it to stop");
-//!     assert_eq!(trainer.driver().updates(), 10);
-//!     for pathway in trainer.statistics() {
-//!         println!("layer {} {}: {} deaths", pathway.layer, pathway.name, pathway.deaths);
-//!     }
-//!     hashes.push(hash::state(&mut trainer));
-//! }
-//! assert_eq!(hashes[0], hashes[1]); // levels, counters, everything
-//! # Ok(())
-//! # }
-//! ```
+#![cfg_attr(feature = "lab", doc = "")]
+#![cfg_attr(feature = "lab", doc = "# One epoch of the built-in digits")]
+#![cfg_attr(feature = "lab", doc = "")]
+#![cfg_attr(feature = "lab", doc = include_str!("../docs/example.md"))]
+#![cfg_attr(
+    not(feature = "internals"),
+    expect(
+        unreachable_pub,
+        reason = "wings are public to the tests of this repository alone: feature `internals`"
+    )
+)]
 
+// Six wings, each may use those before it. Tests, benches and fuzz targets of this repository see them whole.
+#[cfg(feature = "internals")]
 pub mod chip;
+#[cfg(not(feature = "internals"))]
+mod chip;
+#[cfg(feature = "cli")]
+#[doc(hidden)]
 pub mod cli;
+#[cfg(all(feature = "lab", feature = "internals"))]
 pub mod lab;
+#[cfg(all(feature = "lab", not(feature = "internals")))]
+mod lab;
+#[cfg(feature = "internals")]
 pub mod learn;
+#[cfg(not(feature = "internals"))]
+mod learn;
+#[cfg(feature = "internals")]
 pub mod num;
+#[cfg(not(feature = "internals"))]
+mod num;
+#[cfg(feature = "internals")]
 pub mod task;
+#[cfg(not(feature = "internals"))]
+mod task;
+
+pub use crate::chip::crossbar::kernel::{Backend, UnknownBackend};
+pub use crate::chip::hardware::{Hardware, HardwareError, HardwareSpec};
+pub use crate::learn::network::{NetworkError, NetworkSpec};
+pub use crate::task::classify::{
+    Classifier, Evaluation, Examples, ExamplesError, Experiment, Split, Stop,
+};
+
+/// The parts of a chip: what a [`HardwareSpec`] is made of.
+///
+/// ```
+/// use dalean::hardware::{Adc, AdcBits, AdcRange, Subtract};
+/// use dalean::Hardware;
+///
+/// let bits = AdcBits::new(6).expect("2..=16");
+/// let adc = Adc::Finite { bits, subtract: Subtract::Digital, range: AdcRange::Full };
+/// let chip = Hardware::reference().with(|parts| parts.adc = adc).expect("a chip");
+/// assert_eq!(chip.adc, adc);
+/// ```
+pub mod hardware {
+    pub use crate::chip::hardware::{
+        Adc, AdcRange, CellSpec, DigitalSpec, DitherBits, DitherPattern, DriveSpec, FloorKind,
+        PulseCode, Subtract, TileSpec, Timing, Window, WriteScheme, WriteSpec,
+    };
+    pub use crate::num::fixed::{
+        AdcBits, DriveBits, ErrorBits, IncrementMax, LevelBits, LutBits, OutOfRange, ResidualBits,
+    };
+}
+
+/// The parts of a network: what a [`NetworkSpec`] is made of. [`Classifier`] shows one put together.
+pub mod network {
+    pub use crate::chip::layer::{DrivenBy, LayerSpec, PlanError};
+    pub use crate::chip::population::Wiring;
+    pub use crate::learn::error::Centre;
+    pub use crate::learn::route::Route;
+    pub use crate::learn::rule::{Rule, UpdateMode};
+    pub use crate::num::fixed::{Batch, RateMantissa};
+    pub use crate::num::tables::{Activation, Decay, Positive};
+    pub use crate::task::classify::Augment;
+}
+
+#[cfg(feature = "lab")]
+pub use crate::lab::{
+    config::{Config, ConfigError, Sources},
+    data::{DataError, DataRoot, Loaded as Data},
+    run::{
+        Event as RunEvent, Keeping, Machine, Outcome as Trained, Progress, RunError, Session,
+        Verdict, evaluate, resume, train, verify,
+    },
+    store::{
+        ARITHMETIC,
+        record::{EpochRecord, Receipt, Score, TestOutcome},
+    },
+};

@@ -114,8 +114,8 @@ pub(super) fn train(args: &TrainArgs) -> Done {
                     meter.line(&format!(
                         "run {}  kernel {}  threads {}",
                         path.display(),
-                        machine.backend.name(),
-                        machine.threads
+                        machine.backend().name(),
+                        machine.threads()
                     ));
                     if epoch > 0 {
                         meter.line(&format!("continuing after epoch {epoch}"));

@@ -75,7 +75,7 @@ pub(super) fn execute(args: &SweepArgs) -> Done {
     let every = Duration::from_secs(args.checkpoint_seconds);
     let keeping = Keeping { states: args.keep_states, every };
     let options =
-        Options { backend: machine.backend, jobs: machine.threads, keeping, shard: args.shard };
+        Options { backend: machine.backend(), jobs: machine.threads(), keeping, shard: args.shard };
     let meter = Mutex::new(SweepMeter::new(shared.quiet || shared.json));
     let on_event = |event: Event<'_>| {
         let mut meter = meter.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
@@ -191,9 +191,9 @@ fn dry_run(args: &SweepArgs, plan: &Plan, machine: Machine, path: &std::path::Pa
     };
     let all = tasks.len();
     let todo: Vec<&Task> = tasks.into_iter().filter(|task| !finished(task)).collect();
-    let one = Machine { threads: 1, ..machine };
+    let one = Machine::new(machine.backend(), 1)?;
     let estimate = sweep::estimate(plan, &todo, one)?;
-    let jobs = machine.threads.min(todo.len()).max(1);
+    let jobs = machine.threads().min(todo.len()).max(1);
     let seconds = estimate.core_seconds / jobs as f64;
     if shared.json {
         say(&json!({"event": "done", "dry_run": true, "sweep": plan.sweep.name,

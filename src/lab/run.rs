@@ -30,17 +30,60 @@ use crate::lab::store::folder::FolderError;
 use crate::learn::network::NetworkError;
 
 /// What a run is carried out with; none of it changes a result.
+///
+/// ```
+/// use dalean::{Backend, Machine};
+///
+/// assert!(Machine::new(Backend::best(), 2).is_ok());
+/// assert!(Machine::new(Backend::best(), 0).is_err());
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Machine {
+    backend: Backend,
+    threads: usize,
+}
+
+impl Machine {
+    /// Threads of a run, at most.
+    pub const THREADS_MAX: usize = 1024;
+
+    /// These loops on so many threads.
+    ///
+    /// # Errors
+    /// When `threads` is 0 or above [`Machine::THREADS_MAX`].
+    pub fn new(backend: Backend, threads: usize) -> Result<Self, RunError> {
+        if (1..=Self::THREADS_MAX).contains(&threads) {
+            Ok(Self { backend, threads })
+        } else {
+            Err(RunError::Threads { found: threads, max: Self::THREADS_MAX })
+        }
+    }
+
     /// Which loops run.
-    pub backend: Backend,
+    #[must_use]
+    pub const fn backend(self) -> Backend {
+        self.backend
+    }
+
     /// Threads.
-    pub threads: usize,
+    #[must_use]
+    pub const fn threads(self) -> usize {
+        self.threads
+    }
 }
 
 /// Why a run could not be carried out.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum RunError {
+    /// Threads that no run has.
+    #[error("a run on {found} threads; use 1 to {max}")]
+    Threads {
+        /// Asked for.
+        found: usize,
+        /// Most.
+        max: usize,
+    },
     /// The configuration.
     #[error(transparent)]
     Config(#[from] ConfigError),

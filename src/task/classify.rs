@@ -2,10 +2,12 @@
 //!
 //! [`Experiment`] is everything that decides a result; [`Trainer`] carries it out.
 
+mod classifier;
 mod examples;
 mod experiment;
 mod trainer;
 
+pub use classifier::Classifier;
 pub use examples::{Examples, ExamplesError, Split};
 pub use experiment::{Augment, Experiment, Seeded};
 pub use trainer::{Evaluation, Progress, Stop, Trainer};

@@ -18,7 +18,7 @@ use serde_json::Value;
 use super::golden_run::EVERYTHING;
 
 fn machine() -> Machine {
-    Machine { backend: Backend::best(), threads: 1 }
+    Machine::new(Backend::best(), 1).unwrap()
 }
 
 fn root() -> DataRoot {

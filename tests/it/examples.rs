@@ -42,8 +42,7 @@ fn generated(set: NamedSet, count: usize) -> Loaded {
         Examples::new(values, labels, features, 255, 10).unwrap()
     };
     let split = Split { train: part(count), validation: part(20), test: part(20) };
-    let hash = data::content_hash(&split);
-    Loaded { split, description: format!("generated in place of {set}"), hash, image: Some(image) }
+    Loaded::new(&format!("generated in place of {set}"), split, Some(image)).unwrap()
 }
 
 #[test]
@@ -64,7 +63,7 @@ fn every_experiment_learns_two_batches() {
             }
             source => data::load(&source, &DataRoot::new("no such folder")).unwrap(),
         };
-        let machine = Machine { backend: Backend::best(), threads: 1 };
+        let machine = Machine::new(Backend::best(), 1).unwrap();
         let mut session =
             Session::new(&config, loaded, machine).unwrap_or_else(|e| panic!("{name}: {e}"));
         let (_, updates) = session.epoch_size();

@@ -26,7 +26,7 @@ hw.timing = { clock_mhz = 1000.0 }
 ";
 
 fn machine() -> Machine {
-    Machine { backend: Backend::best(), threads: 1 }
+    Machine::new(Backend::best(), 1).unwrap()
 }
 
 fn golden() -> PathBuf {

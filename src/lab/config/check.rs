@@ -6,7 +6,7 @@ use std::fmt::Display;
 
 use super::file::{DataFile, ExperimentFile, HardwareFile, LearningFile, NetworkFile, PerLayer};
 use super::quantity::Constants;
-use super::{ConfigError, chip, data};
+use super::{ConfigError, Sources, chip, data};
 use crate::chip::hardware::Hardware;
 use crate::learn::error::Centre;
 use crate::learn::route::Route;
@@ -211,6 +211,22 @@ pub(super) fn config(mut file: ExperimentFile) -> Result<Config, ConfigError> {
 }
 
 impl Config {
+    /// Reads and checks a configuration.
+    ///
+    /// ```
+    /// use dalean::{Config, Sources};
+    ///
+    /// let settings = ["hw.cell.level_bits=13".to_owned()];
+    /// let error = Config::load(&Sources { settings: &settings, ..Sources::default() }).unwrap_err();
+    /// assert!(error.to_string().contains("must lie in 1..=12"));
+    /// ```
+    ///
+    /// # Errors
+    /// When a text cannot be read, has unknown keys, or the numbers are impossible.
+    pub fn load(sources: &Sources<'_>) -> Result<Self, ConfigError> {
+        super::load(sources)
+    }
+
     /// The configuration as one self-contained file, every default written out.
     ///
     /// # Panics

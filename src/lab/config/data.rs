@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use super::check::wrong;
 use super::file::DataFile;
 use super::{Config, ConfigError};
-use crate::lab::data::{FileSet, PartFile, Source};
+use crate::lab::data::{self, DataError, DataRoot, FileSet, Loaded, PartFile, Source};
 
 /// Checks that every key of `[data]` means something there, and writes defaults back.
 pub(super) fn resolve(data: &mut DataFile) -> Result<DataFile, ConfigError> {
@@ -52,6 +52,26 @@ pub(super) fn resolve(data: &mut DataFile) -> Result<DataFile, ConfigError> {
         }
     }
     Ok(data.clone())
+}
+
+impl Loaded {
+    /// Loads the data that a configuration names; known sets are looked for in `root` unless they are built in.
+    ///
+    /// ```
+    /// use dalean::{Config, Data, DataRoot, Sources};
+    ///
+    /// let config = Config::load(&Sources::default())?;
+    /// let digits = Data::load(&config, &DataRoot::new("data"))?;
+    /// assert_eq!(digits.split.train.len(), 3505);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
+    /// # Errors
+    /// When a key is missing, a set is missing or damaged, or a file does not make examples.
+    pub fn load(config: &Config, root: &DataRoot) -> Result<Self, DataError> {
+        let source = config.source().map_err(|error| DataError::Keys(error.to_string()))?;
+        data::load(&source, root)
+    }
 }
 
 impl Config {

@@ -14,6 +14,18 @@ use crate::task::classify::ExamplesError;
 /// Why data could not be had.
 #[derive(Debug, thiserror::Error)]
 pub enum DataError {
+    /// Parts that are not of one kind.
+    #[error(
+        "the {part} examples differ from the training examples in features, full scale or classes; all parts have the \
+         same"
+    )]
+    Parts {
+        /// Which part differs.
+        part: &'static str,
+    },
+    /// Keys that name no data.
+    #[error("{0}")]
+    Keys(String),
     /// A name that is no set.
     #[error(
         "there is no data set `{found}`; the sets are optdigits, mnist, fashion-mnist, cifar10, xor and \

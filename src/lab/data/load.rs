@@ -29,8 +29,9 @@ use crate::task::classify::{Examples, Split};
 /// Greatest size of a file: 2^32 bytes.
 const FILE_BYTES_MAX: u64 = 1 << 32;
 
-/// A data set, ready for a run.
+/// A data set, ready for a run. Copies share their examples.
 #[derive(Debug, Clone)]
+#[non_exhaustive]
 pub struct Loaded {
     /// The examples.
     pub split: Split,
@@ -40,6 +41,36 @@ pub struct Loaded {
     pub hash: String,
     /// How to show an example as a picture.
     pub image: Option<ImageShape>,
+}
+
+impl Loaded {
+    /// Examples of one's own, as a data set.
+    ///
+    /// ```
+    /// use dalean::{Data, Examples, Split};
+    ///
+    /// let part = |values: Vec<u8>| Examples::new(values, vec![0, 1], 2, 3, 2).expect("two examples");
+    /// let train = part(vec![0, 1, 2, 3]);
+    /// let (validation, test) = (part(vec![0, 0, 3, 3]), part(vec![1, 1, 2, 2]));
+    /// let data = Data::new("mine", Split { train, validation, test }, None)?;
+    /// assert_eq!(data.hash.len(), 64);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
+    /// # Errors
+    /// When the parts differ in features, full scale or classes, or an image has another number of values.
+    pub fn new(name: &str, split: Split, image: Option<ImageShape>) -> Result<Self, DataError> {
+        let shape = |part: &Examples| (part.features(), part.full_scale(), part.classes());
+        let parts = [("validation", &split.validation), ("test", &split.test)];
+        if let Some((part, _)) = parts.iter().find(|(_, e)| shape(e) != shape(&split.train)) {
+            return Err(DataError::Parts { part });
+        }
+        let features = split.train.features();
+        if let Some(image) = image.filter(|image| image.values() != Some(features)) {
+            return Err(DataError::Image { image, features });
+        }
+        Ok(finish(name, split, image, ""))
+    }
 }
 
 /// Loads `source`; known sets are looked for in `root` unless they are built in.

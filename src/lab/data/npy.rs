@@ -12,7 +12,7 @@
 //! ```
 //!
 //! Integers (signed or not, 1 to 8 bytes, either end first) pass when they lie in 0 ..= 255, booleans as
-//! 0 and 1. Anything else is an error; nothing is clipped. `npyz` takes a file at its word, so [`sane`] looks at a
+//! 0 and 1. Anything else is an error; nothing is clipped. `npyz` takes a file at its word, so `sane` looks at a
 //! header before it does.
 
 use npyz::{DType, Deserialize, NpyFile, NpyHeader, Order, TypeChar};

@@ -56,9 +56,9 @@ impl Classify {
             let hint = "choose the last epoch with learning.select = \"last\"";
             return Err(RunError::Empty { part: "validation", hint });
         }
-        let seeded = experiment.build(machine.backend, train.len())?;
+        let seeded = experiment.build(machine.backend(), train.len())?;
         let mut trainer = Trainer::new(experiment, seeded);
-        trainer.driver_mut().engine_mut().set_threads(machine.threads);
+        trainer.driver_mut().engine_mut().set_threads(machine.threads());
         let codes = trainer.calibrate(&train).map(|calibration| calibration.code_max);
         let low = codes.into_iter().flatten().enumerate().filter(|&(_, code_max)| code_max <= 3);
         let notes = low.map(|(layer, code_max)| Note::LowCodes { layer, code_max }).collect();

@@ -243,8 +243,8 @@ impl<'a> Run<'a> {
             records: vec![],
             timing: TimingRecord {
                 version: env!("CARGO_PKG_VERSION").into(),
-                kernel: machine.backend.name().into(),
-                threads: machine.threads,
+                kernel: machine.backend().name().into(),
+                threads: machine.threads(),
                 epoch_seconds: vec![],
             },
             keeping: Keeping::ALL,

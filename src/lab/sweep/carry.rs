@@ -251,7 +251,7 @@ impl<'a> Crew<'a> {
             (self.on_event)(Event::Work(task.work));
             return Ok(Came::Done { row, seconds, elsewhere: true });
         }
-        let machine = Machine { backend: self.options.backend, threads: 1 };
+        let machine = Machine::new(self.options.backend, 1).expect("one thread");
         let samples = f64::from(task.config.epochs) * data.split.train.len().max(1) as f64;
         let mut before = None;
         let outcome = run::carry_on(

@@ -15,6 +15,25 @@ use crate::num::fixed::DriveBits;
 /// Why values and labels do not make a set of examples.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum ExamplesError {
+    /// No such examples can be.
+    #[error(
+        "{features} features of 0 to {full_scale} and {classes} classes make no examples; features, full scale and \
+         classes are above 0, and there are at most 256 classes"
+    )]
+    Kind {
+        /// Features an example.
+        features: usize,
+        /// Greatest value.
+        full_scale: u8,
+        /// Number of classes.
+        classes: usize,
+    },
+    /// Too many to be numbered.
+    #[error("there are {found} examples; fewer than 2^32 are supported")]
+    Count {
+        /// Examples found.
+        found: usize,
+    },
     /// Values do not divide into rows.
     #[error("{values} values do not make {examples} examples of {features} features")]
     Shape {
@@ -76,8 +95,7 @@ impl Examples {
     /// # Errors
     /// When the shapes disagree, a value is above `full_scale` or a label not below `classes`.
     ///
-    /// # Panics
-    /// When `features`, `full_scale` or `classes` is 0, or `classes` is above 256.
+    /// When `features`, `full_scale` or `classes` is 0, `classes` is above 256, or there are 2^32 examples.
     pub fn new(
         values: Vec<u8>,
         labels: Vec<u8>,
@@ -85,8 +103,12 @@ impl Examples {
         full_scale: u8,
         classes: usize,
     ) -> Result<Self, ExamplesError> {
-        assert!(features > 0 && full_scale > 0, "an example has features with a range");
-        assert!((1..=256).contains(&classes), "labels are bytes");
+        if features == 0 || full_scale == 0 || !(1..=256).contains(&classes) {
+            return Err(ExamplesError::Kind { features, full_scale, classes });
+        }
+        if u32::try_from(labels.len()).is_err() {
+            return Err(ExamplesError::Count { found: labels.len() });
+        }
         if labels.len().checked_mul(features) != Some(values.len()) {
             let (values, examples) = (values.len(), labels.len());
             return Err(ExamplesError::Shape { values, examples, features });

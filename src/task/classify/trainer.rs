@@ -7,6 +7,7 @@ use crate::chip::engine::{Calibration, Currents, Engine, Phase};
 use crate::chip::state::{Piece, Section, State, StateError, Visitor};
 use crate::learn::driver::Driver;
 use crate::learn::error;
+use crate::learn::network::NetworkError;
 use crate::learn::statistics::{self, FloorMap, PathwayStatistics};
 use crate::num::draw::{self, Place, Site, below};
 
@@ -81,6 +82,29 @@ impl Trainer {
     #[must_use]
     pub const fn epoch(&self) -> u32 {
         self.epoch
+    }
+
+    /// Checks that examples have the values and classes that the network is for.
+    ///
+    /// # Errors
+    /// When they do not.
+    pub fn fits(&self, examples: &Examples) -> Result<(), NetworkError> {
+        let layers = &self.experiment.network.layers;
+        let inputs = layers.first().map_or(0, |layer| layer.inputs);
+        let outputs = layers.last().map_or(0, |layer| layer.units);
+        let (features, classes) = (examples.features(), examples.classes());
+        if features != inputs {
+            let found = format!("has {inputs} inputs");
+            let allowed = format!("the examples have {features} values each");
+            return Err(NetworkError::misfit("network.hidden", found, allowed));
+        }
+        if outputs != classes && !(outputs == 1 && classes == 2) {
+            let found = format!("is {outputs}");
+            let allowed =
+                format!("the data has {classes} classes: use {classes}, or 1 for two classes");
+            return Err(NetworkError::misfit("network.outputs", found, allowed));
+        }
+        Ok(())
     }
 
     /// Statistics of every pathway now.

@@ -17,7 +17,7 @@ fn session() -> Session {
     let config = load(&Sources { experiment: Some(("fuzz", CONFIG)), ..Sources::default() });
     let config = config.expect("a valid configuration");
     let data = data::load(&config.source().expect("a known set"), &DataRoot::new("none"));
-    let machine = Machine { backend: Backend::best(), threads: 1 };
+    let machine = Machine::new(Backend::best(), 1).expect("one thread");
     Session::new(&config, data.expect("built in"), machine).expect("it fits")
 }
 

@@ -18,10 +18,12 @@ pub(in crate::lab::report) fn ramp(
         format!("<stop offset=\"{part:.3}\" stop-color=\"{colour}\"/>")
     };
     let stops: String = colours.iter().enumerate().map(stop).collect();
+    // one for each scale of a page: a colour that is hidden elsewhere would be hidden here too
+    let id: String = title.chars().filter(char::is_ascii_alphanumeric).collect();
     let way = if upright { "x2=\"0\" y1=\"1\"" } else { "" };
     let mut out = format!(
-        "<linearGradient id=\"ramp\" {way}>{stops}</linearGradient><rect x=\"{}\" y=\"{}\" width=\"{}\" height=\"{}\" \
-         fill=\"url(#ramp)\"/>",
+        "<linearGradient id=\"ramp-{id}\" {way}>{stops}</linearGradient><rect x=\"{}\" y=\"{}\" width=\"{}\" height=\"{}\" \
+         fill=\"url(#ramp-{id})\"/>",
         place(x),
         place(y),
         place(across),

@@ -8,7 +8,7 @@ use crate::lab::price::{Cost, Group, prefixed};
 use crate::lab::report::RunView;
 use crate::lab::report::chart::{Chart, Series};
 use crate::lab::report::number::{escape, float, percent, place, share, size};
-use crate::lab::report::scale::{Axis, round};
+use crate::lab::report::scale::{Axis, Curve, Scale, round};
 
 /// Components drawn as lines, each with its own colour and dashes.
 const LINES: [(&str, bool); 4] =
@@ -111,8 +111,8 @@ impl Decades {
     }
 
     fn place(&self, joules: f64) -> f64 {
-        let power = joules.max(f64::MIN_POSITIVE).log10();
-        WIDTH * ((power - self.from) / (self.to - self.from)).clamp(0.0, 1.0)
+        let [from, to] = [self.from, self.to].map(|power| 10f64.powf(power));
+        WIDTH * Scale { curve: Curve::Log, from, to }.fraction(joules)
     }
 
     /// Grid lines at the decades.

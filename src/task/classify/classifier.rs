@@ -1,0 +1,116 @@
+//! A training whose parts were checked against one another: nothing that is asked of it can panic.
+#![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
+
+use super::examples::Examples;
+use super::experiment::Experiment;
+use super::trainer::{Evaluation, Progress, Stop, Trainer};
+use crate::chip::crossbar::kernel::Backend;
+use crate::chip::hardware::{Adc, AdcRange};
+use crate::chip::state::{State, StateError, Visitor};
+use crate::learn::network::NetworkError;
+
+/// A network on a chip, and the examples it learns from.
+///
+/// ```
+/// use dalean::network::{Activation, Centre, Decay, DrivenBy, LayerSpec, Route, Rule, UpdateMode, Wiring};
+/// use dalean::network::{Batch, Positive, RateMantissa};
+/// use dalean::{Backend, Classifier, Examples, Experiment, Hardware, NetworkSpec};
+///
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// // exclusive or: four examples of two values, two classes
+/// let xor = Examples::new(vec![0, 0, 0, 1, 1, 0, 1, 1], vec![0, 1, 1, 0], 2, 1, 2)?;
+/// let alpha = Positive::new(4.0).ok_or("a width")?;
+/// let layer = |inputs, units, wiring, driven_by| LayerSpec {
+///     inputs,
+///     units,
+///     wiring,
+///     driven_by,
+///     activation: Activation::Sigmoid(alpha),
+///     weight_max_log2: 2,
+///     gain_64ths: [96, 32],
+///     constant_row: true,
+/// };
+/// let network = NetworkSpec {
+///     layers: vec![
+///         layer(2, 8, Wiring::Dual, DrivenBy::Shared),
+///         layer(8, 2, Wiring::DualReadout, DrivenBy::Streams),
+///     ],
+///     rule: Rule::Ed,
+///     mode: UpdateMode::Accumulate,
+///     centre: Centre::Batch,
+///     route: Some(Route::Modulo { taps: 1, shift: None }),
+///     batch: Batch::new(4)?,
+///     mantissa: RateMantissa::new(1)?,
+///     rates: vec![Positive::new(20.0).ok_or("a rate")?; 2],
+///     decay: Decay::Constant,
+/// };
+/// let hardware = Hardware::reference();
+/// let experiment = Experiment { seed: 1, hardware, network, epochs: 3, augment: None };
+/// let mut classifier = Classifier::new(experiment, &xor, Backend::best())?;
+/// for _ in 0..3 {
+///     classifier.learn(&mut |_progress| true).expect("nobody asks it to stop");
+/// }
+/// assert_eq!(classifier.evaluate(&xor)?.predictions.len(), 4);
+/// # Ok(())
+/// # }
+/// ```
+#[derive(Debug)]
+pub struct Classifier {
+    trainer: Trainer,
+    train: Examples,
+}
+
+impl Classifier {
+    /// Builds the network with its initial levels, and finds the ranges of its converters where the chip asks for it.
+    ///
+    /// # Errors
+    /// When something does not fit together, not on the chip, or not with the examples.
+    pub fn new(
+        experiment: Experiment,
+        train: &Examples,
+        backend: Backend,
+    ) -> Result<Self, NetworkError> {
+        let seeded = experiment.build(backend, train.len())?;
+        let mut trainer = Trainer::new(experiment, seeded);
+        trainer.fits(train)?;
+        trainer.calibrate(train);
+        Ok(Self { trainer, train: train.clone() })
+    }
+
+    /// One pass over the training examples, in the epoch's order. Returns right answers given while learning.
+    ///
+    /// # Errors
+    /// [`Stop`] when `go_on` says so; the state then lies inside an epoch.
+    pub fn learn(&mut self, go_on: &mut dyn FnMut(Progress) -> bool) -> Result<u64, Stop> {
+        let again = matches!(
+            self.trainer.experiment().hardware.adc,
+            Adc::Finite { range: AdcRange::Calibrated { every_epoch: true, .. }, .. }
+        );
+        let Self { trainer, train } = self;
+        if again && trainer.epoch() > 0 {
+            trainer.calibrate(train);
+        }
+        trainer.learn(train, go_on)
+    }
+
+    /// Reads examples without learning.
+    ///
+    /// # Errors
+    /// When they do not fit the network.
+    pub fn evaluate(&mut self, examples: &Examples) -> Result<Evaluation, NetworkError> {
+        self.trainer.fits(examples)?;
+        Ok(self.trainer.evaluate(examples))
+    }
+
+    /// Epochs finished.
+    #[must_use]
+    pub const fn epoch(&self) -> u32 {
+        self.trainer.epoch()
+    }
+}
+
+impl State for Classifier {
+    fn visit(&mut self, visitor: &mut dyn Visitor) -> Result<(), StateError> {
+        self.trainer.visit(visitor)
+    }
+}
