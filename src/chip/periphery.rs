@@ -48,7 +48,7 @@ impl Converter {
     /// Code of a current, and whether the converter saturated.
     #[inline]
     #[must_use]
-    pub const fn convert(self, current: i64) -> (i64, bool) {
+    pub fn convert(self, current: i64) -> (i64, bool) {
         let steps = rsh(current, self.shift);
         if steps > self.max {
             (self.max, true)
@@ -80,7 +80,7 @@ impl Converter {
 /// Look-up of an accumulator in a table of `2 half` entries: the place, and whether the index saturated.
 #[inline]
 #[must_use]
-pub const fn index(accumulator: i64, shift: u32, half: i64) -> (usize, bool) {
+pub fn index(accumulator: i64, shift: u32, half: i64) -> (usize, bool) {
     let steps = rsh(accumulator, shift);
     let i = if steps < -half {
         -half

@@ -21,7 +21,7 @@ pub(super) struct TrainArgs {
     /// Hardware model: a built-in name or a file
     #[arg(long, value_name = "FILE")]
     hw: Option<String>,
-    /// Change a key, such as hw.cell.level_bits=4 (repeatable)
+    /// Change a key, such as hw.cell.level_bits=4; KEY=default takes back what a file said (repeatable)
     #[arg(long = "set", value_name = "KEY=VALUE")]
     settings: Vec<String>,
     /// Seed of all draws

@@ -5,23 +5,36 @@
 //! sat_n(v)  = clamp(v, -(2^(n-1)-1), 2^(n-1)-1)     symmetric: -2^(n-1) never occurs
 //! ```
 //!
-//! All numbers are `i64` here; callers narrow where their plan proves the width. See docs/MODEL.md, 0.
+//! [`rsh`] and [`sat`] are the same law at every signed width; callers [`narrow`] where their plan proves the width. See
+//! docs/MODEL.md, 0.
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
 use std::fmt;
+
+use num_traits::{PrimInt, Signed};
 
 /// Arithmetic shift right by `shift`, halves toward plus infinity. Exact for every `v`: nothing is
 /// added to `v` itself, so the rounding constant cannot wrap.
 #[inline]
 #[must_use]
-pub const fn rsh(v: i64, shift: u32) -> i64 {
+pub fn rsh<T: PrimInt + Signed>(v: T, shift: u32) -> T {
     if shift == 0 {
         v
-    } else if shift > 63 {
-        0
+    } else if shift >= T::zero().count_zeros() {
+        T::zero()
     } else {
-        (v >> shift) + ((v >> (shift - 1)) & 1)
+        v.signed_shr(shift) + (v.signed_shr(shift - 1) & T::one())
     }
+}
+
+/// The same number in another width.
+///
+/// # Panics
+/// When it does not fit: `why` says why it does.
+#[inline]
+#[must_use]
+pub fn narrow<T: PrimInt>(v: impl PrimInt, why: &str) -> T {
+    T::from(v).expect(why)
 }
 
 /// The largest magnitude that `bits` hold symmetrically: `2^(bits-1) - 1`.
@@ -31,18 +44,13 @@ pub const fn rail(bits: u32) -> i64 {
     (1 << (bits - 1)) - 1
 }
 
-/// Clamps to the symmetric range of `bits` and says whether that changed the value.
+/// Clamps to the symmetric range of `bits`, at most those of `T`, and says whether that changed the value.
 #[inline]
 #[must_use]
-pub const fn sat(v: i64, bits: u32) -> (i64, bool) {
-    let rail = rail(bits);
-    if v > rail {
-        (rail, true)
-    } else if v < -rail {
-        (-rail, true)
-    } else {
-        (v, false)
-    }
+pub fn sat<T: PrimInt + Signed>(v: T, bits: u32) -> (T, bool) {
+    let rail = T::max_value().unsigned_shr(T::zero().count_zeros() - bits);
+    let held = v.max(-rail).min(rail);
+    (held, held != v)
 }
 
 /// `ceil(log2(n))`, 0 for 0 and 1.
@@ -154,6 +162,8 @@ mod tests {
         assert_eq!([-6, -5, 5, 6].map(|v| rsh(v, 2)), [-1, -1, 1, 2]);
         assert_eq!(rsh(-7, 0), -7);
         assert_eq!((rsh(i64::MAX, 1), rsh(i64::MIN, 63)), (1 << 62, -1));
+        assert_eq!((rsh(i32::MAX, 1), rsh(i32::MIN, 31), rsh(i32::MIN, 32)), (1 << 30, -1, 0));
+        assert_eq!((rsh(i128::MAX, 1), rsh(i128::MIN, 127), rsh(3i8, 1)), (1 << 126, -1, 2));
         assert_eq!((rsh(i64::MAX, 63), rsh(i64::MIN, 64), rsh(i64::MAX, 64)), (1, 0, 0));
     }
 
@@ -167,6 +177,24 @@ mod tests {
             [-2, -1, 1, 2].map(|v| sat(v, 2)),
             [(-1, true), (-1, false), (1, false), (1, true)]
         );
+    }
+
+    #[test]
+    fn a_rail_is_the_same_at_every_width() {
+        for bits in 1..=8 {
+            let rail = rail(bits);
+            assert_eq!([sat(i64::MAX, bits).0, sat(i64::MIN, bits).0], [rail, -rail]);
+            assert_eq!(i64::from(sat(i8::MIN, bits).0), -rail);
+            assert_eq!(i128::from(rail), sat(i128::MAX, bits).0);
+        }
+        assert_eq!((sat(i64::MIN, 64), sat(i64::MAX, 64)), ((-i64::MAX, true), (i64::MAX, false)));
+    }
+
+    #[test]
+    #[should_panic(expected = "a byte holds it")]
+    fn what_does_not_fit_is_never_wrapped() {
+        assert_eq!(narrow::<u8>(255i64, "it fits"), 255);
+        let _: u8 = narrow(-1i64, "a byte holds it");
     }
 
     #[test]
@@ -187,7 +215,8 @@ mod tests {
     proptest! {
         #[test]
         fn rsh_is_the_equation(v in -(1i64 << 60)..(1i64 << 60), s in 1u32..60) {
-            prop_assert_eq!(i128::from(rsh(v, s)), (i128::from(v) + (1i128 << (s - 1))) >> s);
+            let equation = (i128::from(v) + (1i128 << (s - 1))) >> s;
+            prop_assert_eq!((i128::from(rsh(v, s)), rsh(i128::from(v), s)), (equation, equation));
         }
     }
 }

@@ -16,7 +16,7 @@
 #![deny(clippy::disallowed_types, clippy::disallowed_methods)]
 
 use super::fixed::{
-    Batch, DriveBits, ErrorBits, LevelBits, LutBits, OutOfRange, RateMantissa, log2_ceil,
+    Batch, DriveBits, ErrorBits, LevelBits, LutBits, OutOfRange, RateMantissa, log2_ceil, narrow,
 };
 
 /// A finite number above 0, given by the user: a width, a rate, a factor.
@@ -140,10 +140,10 @@ impl Lut {
             if p >= 0 { (255i64 << p, codes) } else { (255, codes << p.unsigned_abs()) };
         let activity = (-half..half).map(|i| {
             let rounded = (2 * factor * i + divisor).div_euclid(2 * divisor);
-            u8::try_from(rounded.clamp(0, 255)).expect("clamped to a byte")
+            narrow::<u8>(rounded.clamp(0, 255), "clamped to a byte")
         });
         let derivative = (-half..half).map(|i| if slope(i) { 255 } else { 0 });
-        let shift = u32::try_from(shift).expect("at most a few dozen");
+        let shift = narrow(shift, "at most a few dozen");
         Self { activity: activity.collect(), derivative: derivative.collect(), shift }
     }
 }

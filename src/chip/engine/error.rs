@@ -150,7 +150,7 @@ fn latch(
         let (errors, beyond) = errors.split_at_mut(live);
         beyond.fill(0);
         for (error, tapped) in errors.iter_mut().zip(taps_here.chunks_exact(taps.per_unit)) {
-            let sum = tapped.iter().map(|&word| i64::from(words[usize::from(word)])).sum();
+            let sum: i64 = tapped.iter().map(|&word| i64::from(words[usize::from(word)])).sum();
             let (bounded, changed) = sat(rsh(sum, taps.shift), bits.get());
             saturated += u64::from(changed);
             *error = bounded as i16;

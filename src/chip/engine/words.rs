@@ -71,7 +71,7 @@ impl Engine {
 fn sums(output: &[i16], outputs: usize, shift: u32, bits: ErrorBits) -> (Vec<i16>, u64) {
     let mut saturated = 0;
     let word = |words: &[i16]| {
-        let sum = words.iter().map(|&word| i64::from(word)).sum();
+        let sum: i64 = words.iter().map(|&word| i64::from(word)).sum();
         let (word, changed) = sat(rsh(sum, shift), bits.get());
         saturated += u64::from(changed);
         word as i16

@@ -12,7 +12,7 @@ pub struct Sources<'a> {
     pub overlays: &'a [Overlay<'a>],
     /// `--hw`: model name or path.
     pub hardware: Option<&'a str>,
-    /// `--set key=value`, in order.
+    /// `--set key=value`, in order; `key=default` takes back what a file said.
     pub settings: &'a [String],
     /// `--seed`.
     pub seed: Option<u64>,
@@ -42,7 +42,10 @@ pub fn load(sources: &Sources<'_>) -> Result<Config, ConfigError> {
         overlay(&mut table, (*over).clone());
     }
     for setting in sources.settings {
-        overlay(&mut table, setting_table(setting)?);
+        match taken_back(setting)? {
+            Some(keys) => remove(&mut table, &keys),
+            None => overlay(&mut table, setting_table(setting)?),
+        }
     }
     if let Some(model) = sources.hardware {
         let set = toml::Table::from_iter([("model".into(), toml::Value::String(model.into()))]);
@@ -122,6 +125,36 @@ pub fn setting_table(setting: &str) -> Result<toml::Table, ConfigError> {
     parse(&place, &text)
 }
 
+/// The keys that `key=default` takes back, as a table; `None` for any other setting.
+fn taken_back(setting: &str) -> Result<Option<toml::Table>, ConfigError> {
+    let Some((key, "default")) = setting.split_once('=').map(|(key, value)| (key, value.trim()))
+    else {
+        return Ok(None);
+    };
+    // a key that a value of some kind suits is a key; of one that none suits, the first message says why
+    let kinds = ["1", "0.5", "true", "\"\"", "[1]", "[0.5, 0.5]", "{}"];
+    let mut why = None;
+    for kind in kinds {
+        match setting_table(&format!("{key}={kind}")) {
+            Ok(table) => return Ok(Some(table)),
+            Err(error) => why = why.or(Some(error)),
+        }
+    }
+    why.map_or(Ok(None), Err)
+}
+
+/// Takes keys out, as if no text had said them.
+fn remove(table: &mut toml::Table, keys: &toml::Table) {
+    for (key, below) in keys {
+        match (table.get_mut(key), below) {
+            (Some(toml::Value::Table(table)), toml::Value::Table(keys)) if !keys.is_empty() => {
+                remove(table, keys);
+            }
+            _ => drop(table.remove(key)),
+        }
+    }
+}
+
 /// Lays `over` on top of `under`: tables merge, everything else is replaced.
 pub fn overlay(under: &mut toml::Table, over: toml::Table) {
     for (key, value) in over {
@@ -159,13 +192,83 @@ mod tests {
     }
 
     #[test]
+    fn a_key_is_taken_back_as_if_no_file_had_said_it() {
+        let text =
+            "[learning]\ntaps = 3\nrate = 5\n[network]\nhidden = [7]\n[hw.cell]\nlevel_bits = 4\n";
+        let load = |settings: &[&str]| {
+            let settings: Vec<String> = settings.iter().map(ToString::to_string).collect();
+            let experiment = Some(("x.toml", text));
+            load(&Sources { experiment, settings: &settings, ..Sources::default() })
+        };
+        let refused = load(&["learning.rule=bp"]).unwrap_err().to_string();
+        assert!(refused.contains("--set learning.taps=default"), "{refused}");
+        let config = load(&["learning.rule=bp", "learning.taps=default"]).unwrap();
+        assert_eq!((config.route, config.rates[0].get()), (None, 5.0));
+        let config = load(&["network.hidden=default", "hw.cell = default"]).unwrap();
+        assert_eq!((config.hidden, config.hardware.cell.level_bits.get()), (vec![256], 8));
+        // what nobody said can be taken back, what nobody knows cannot
+        assert!(load(&["hw.adc=default", "learning.rate_multipliers=default"]).is_ok());
+        let error = load(&["learning.tap=default"]).unwrap_err().to_string();
+        assert!(error.contains("unknown field `tap`"), "{error}");
+    }
+
+    #[test]
+    fn every_key_that_means_nothing_where_it_stands_is_refused() {
+        for (settings, key) in [
+            (&["learning.rule=bp", "learning.taps=1"][..], "learning.taps"),
+            (&["learning.rule=dfa", "learning.tap_shift=1"], "learning.tap_shift"),
+            (&["learning.route=scalar_broadcast", "learning.taps=1"], "learning.taps"),
+            (&["hw.write.dither_bits=0", "hw.write.dither=per_cell"], "hw.write.dither"),
+            (&["data.label_column=last"], "data.label_column"),
+            (&["data.format=csv", "data.train=a", "data.train_labels=b"], "data.train_labels"),
+            (&["data.format=idx", "data.test_labels=b"], "data.test_labels"),
+            (&["data.format=idx", "data.labels_array=b"], "data.labels_array"),
+        ] {
+            let error = with(settings).unwrap_err().to_string();
+            assert!(error.starts_with(&format!("`{key}` is")), "{settings:?}: {error}");
+        }
+        assert!(with(&["hw.write.dither_bits=0"]).is_ok());
+        assert!(with(&["data.format=idx", "data.train=a", "data.train_labels=b"]).is_ok());
+    }
+
+    #[test]
+    #[expect(clippy::disallowed_methods, reason = "a test reads the examples")]
+    fn every_example_is_a_network_that_fits_together() {
+        let root = concat!(env!("CARGO_MANIFEST_DIR"), "/examples");
+        let mut folders = vec![std::path::PathBuf::from(root)];
+        let mut seen = 0;
+        while let Some(folder) = folders.pop() {
+            for entry in std::fs::read_dir(&folder).unwrap() {
+                let path = entry.unwrap().path();
+                if path.is_dir() && !path.ends_with("sweeps") {
+                    folders.push(path);
+                } else if path.extension().is_some_and(|end| end == "toml") {
+                    let text = std::fs::read_to_string(&path).unwrap();
+                    let name = path.to_string_lossy();
+                    let experiment = Some((&*name, &*text));
+                    let config = load(&Sources { experiment, ..Sources::default() }).unwrap();
+                    let classes = if name.contains("kaneko") { 2 } else { 10 };
+                    let made = config.experiment(784, classes, Some([28, 28, 1]));
+                    assert!(made.is_ok(), "{name}: {made:?}");
+                    assert_eq!(load_again(&config).to_toml(), config.to_toml());
+                    seen += 1;
+                }
+            }
+        }
+        assert!(seen >= 20, "examples were found ({seen})");
+    }
+
+    fn load_again(config: &Config) -> Config {
+        let text = config.to_toml();
+        load(&Sources { experiment: Some(("resolved", &text)), ..Sources::default() }).unwrap()
+    }
+
+    #[test]
     fn a_resolved_configuration_resolves_to_itself() {
         let config =
             with(&["hw.model=prime", "hw.write.increment_max=3", "learning.taps=3"]).unwrap();
-        let text = config.to_toml();
-        let again =
-            load(&Sources { experiment: Some(("x", &text)), ..Sources::default() }).unwrap();
-        assert_eq!(again.to_toml(), text);
+        let again = load_again(&config);
+        assert_eq!(again.to_toml(), config.to_toml());
         assert_eq!(again.hardware, config.hardware);
     }
 

@@ -10,6 +10,7 @@ use crate::learn::error;
 use crate::learn::network::NetworkError;
 use crate::learn::statistics::{self, FloorMap, PathwayStatistics};
 use crate::num::draw::{self, Place, Site, below};
+use crate::num::fixed::narrow;
 
 /// Samples read together when nothing is learnt. Does not change a result.
 const READ_BATCH: usize = 256;
@@ -136,7 +137,7 @@ impl Trainer {
         go_on: &mut dyn FnMut(Progress) -> bool,
     ) -> Result<u64, Stop> {
         let total = train.len();
-        let samples = u32::try_from(total).expect("fewer than 2^32 examples");
+        let samples = narrow(total, "fewer than 2^32 examples");
         let seed = self.experiment.seed;
         let order = draw::shuffled(seed, u64::from(self.epoch), samples);
         let shifts = self.experiment.augment.map(|augment| shifts(augment, seed, self.epoch));
@@ -201,7 +202,7 @@ impl Trainer {
                 let own =
                     if outputs(engine) == 1 { 0 } else { engine.output_accumulator(sample, truth) };
                 correct += u64::from(guess == truth);
-                predictions.push(u8::try_from(guess).expect("at most 256 classes"));
+                predictions.push(narrow(guess, "at most 256 classes"));
                 margins.push(if guess == truth { 0 } else { (value - own).abs() });
             }
         }

@@ -39,7 +39,7 @@ fn no_taps(file: &LearningFile, why: &str) -> Result<(), ConfigError> {
         None => Ok(()),
         Some((key, value)) => {
             let allowed = format!(
-                "taps belong to route = \"modulo\", and {why}: take the key out, or choose that route"
+                "taps belong to route = \"modulo\", and {why}: take the key out (--set {key}=default), or choose that route"
             );
             Err(wrong(key, format!("is {value}"), allowed))
         }
