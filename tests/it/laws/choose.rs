@@ -82,7 +82,7 @@ fn adc() -> impl Strategy<Value = Adc> {
         1 => (0u32..=12).prop_map(AdcRange::Shift),
         1 => Just(AdcRange::Full),
         2 => Just(AdcRange::Tracking),
-        1 => (0u32..=3, any::<bool>())
+        2 => (0u32..=3, any::<bool>())
             .prop_map(|(headroom, every_epoch)| AdcRange::Calibrated { headroom, every_epoch }),
     ];
     let subtract = prop::sample::select(vec![Subtract::Digital, Subtract::Current]);
