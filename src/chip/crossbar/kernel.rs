@@ -1,9 +1,13 @@
 //! The loops that touch every cell. `scalar` is the law; every other back end gives its bits.
 //!
-//! A [`Backend`] says which loops run; [`Kernel::start`] makes them ready on this thread. All sums are `i32`: a
-//! read adds at most 33,025 products of two bytes (the plan cuts longer columns into chunks), an update at most
-//! 4,096 products of a drive (0..=255) and a gate (-127..=127), times a mantissa of at most 15. A back end is a
-//! token that exists only where the processor has the feature.
+//! A [`Backend`] says which loops run; [`Kernel::start`] makes them ready on this thread. A back end is a token that
+//! exists only where the processor has the feature; what it does is a table of functions, declared in `ops`, behind the
+//! checks of [`Kernel`]. Sums are `i32`: a read adds at most 33,025 products of two bytes (the plan cuts longer columns into
+//! chunks), an update at most 4,096 products of a drive (0..=255) and a gate (-127..=127), times a mantissa of at most 15.
+//! Where an update meets more positions, its sums are `i64`.
+//!
+//! A write has four steps, each with one law and one twin that compilers make vectors of: `sums`, `requests`, `pulses`,
+//! `levels`. Back ends have kernels of their own for products, and for writes as they usually are (`fused`, `single`).
 //!
 //! ```text
 //! drives      [block of 64 rows][sample][64]            u8

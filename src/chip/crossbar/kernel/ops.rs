@@ -21,6 +21,10 @@ use crate::num::fixed::ErrorBits;
 
 /// The operations of a back end.
 #[derive(Debug)]
+#[expect(
+    clippy::type_complexity,
+    reason = "this is where a signature is written, and the only place"
+)]
 pub(super) struct Ops {
     pub(super) read: unsafe fn(&[u8], Drives<'_>, Range<usize>, &mut [i32]),
     pub(super) read_conv:
@@ -59,7 +63,9 @@ pub(super) struct Ops {
     pub(super) peak: unsafe fn(usize) -> u64,
 }
 
-/// Compiles the twins of a write's steps for features of the processor.
+/// Compiles the twins of a write's steps for features of the processor. Where the whole program is compiled for them,
+/// tables have the twins themselves.
+#[cfg(target_arch = "x86_64")]
 macro_rules! twins {
     ($features:literal) => {
         #[target_feature(enable = $features)]
@@ -85,4 +91,5 @@ macro_rules! twins {
     };
 }
 
+#[cfg(target_arch = "x86_64")]
 pub(super) use twins;
