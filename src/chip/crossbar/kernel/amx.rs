@@ -188,7 +188,7 @@ pub(super) const OPS: Ops = Ops {
     read_converted,
     read_columns,
     accumulate,
-    accumulate_drawn,
+    accumulate_drawn: Some(accumulate_drawn),
     peak: peak::amx,
     ..avx512::OPS
 };

@@ -41,14 +41,17 @@ pub(super) struct Ops {
     pub(super) read_columns: unsafe fn(&[u8], Layout, Drives<'_>, &mut [i32]),
     /// Of as many samples as gates say, of rows that lie a stride apart.
     pub(super) accumulate: unsafe fn(&[u8], usize, &[i8], &mut Half<i32>),
-    pub(super) accumulate_drawn: unsafe fn(
-        (&[u8], usize),
-        &[i8],
-        &mut Half<i32>,
-        (&Draws, (usize, usize)),
-        &mut Half<u8>,
-        &Half<u8>,
-    ) -> bool,
+    /// Where it is faster than one after the other.
+    pub(super) accumulate_drawn: Option<
+        unsafe fn(
+            (&[u8], usize),
+            &[i8],
+            &mut Half<i32>,
+            (&Draws, (usize, usize)),
+            &mut Half<u8>,
+            &Half<u8>,
+        ) -> bool,
+    >,
     pub(super) dither: unsafe fn(&Draws, usize, usize, &mut Half<u8>),
     pub(super) dither_words: unsafe fn(&Draws, usize, usize, &mut Half<u16>),
     pub(super) loud: unsafe fn(Sums<'_>, &Write, u32) -> u16,
