@@ -1,9 +1,13 @@
 //! The loops that touch every cell. `scalar` is the law; every other back end gives its bits.
 //!
-//! A [`Backend`] says which loops run; [`Kernel::start`] makes them ready on this thread. All sums are `i32`: a
-//! read adds at most 33,025 products of two bytes (the plan cuts longer columns into chunks), an update at most
-//! 4,096 products of a drive (0..=255) and a gate (-127..=127), times a mantissa of at most 15. A back end is a
-//! token that exists only where the processor has the feature.
+//! A [`Backend`] says which loops run; [`Kernel::start`] makes them ready on this thread. A back end is a token that
+//! exists only where the processor has the feature; what it does is a table of functions, declared in `ops`, behind the
+//! checks of [`Kernel`]. Sums are `i32`: a read adds at most 33,025 products of two bytes (the plan cuts longer columns into
+//! chunks), an update at most 4,096 products of a drive (0..=255) and a gate (-127..=127), times a mantissa of at most 15.
+//! Where an update meets more positions, its sums are `i64`.
+//!
+//! A write has four steps, each with one law and one twin that compilers make vectors of: `sums`, `requests`, `pulses`,
+//! `levels`. Back ends have kernels of their own for products, and for writes as they usually are (`fused`, `single`).
 //!
 //! ```text
 //! drives      [block of 64 rows][sample][64]            u8
@@ -82,8 +86,11 @@ pub struct Kernel {
 
 /// Calls an operation of whichever back end is at work.
 macro_rules! call {
-    ($kernel:expr, $operation:ident($($argument:expr),*)) => {{
-        let operation = $kernel.ops.$operation;
+    ($kernel:expr, $operation:ident($($argument:expr),*)) => {
+        call!($kernel.ops.$operation, ($($argument),*))
+    };
+    ($operation:expr, ($($argument:expr),*)) => {{
+        let operation = $operation;
         // SAFETY: `Kernel::start` has the table from a token, which exists only where processor and system have all that
         // the functions of this table are compiled for. Tiles have their shape on this thread as long as the kernel
         // lives, which cannot leave it.
@@ -314,8 +321,10 @@ impl Kernel {
         assert!(stride > 0 && stride.is_multiple_of(4), "samples are padded to words of four");
         assert_eq!(turned.len(), BLOCK_ROWS * stride, "64 rows");
         assert_eq!(gates.len(), HALF_COLUMNS * stride, "16 columns");
-        let both = (turned, stride);
-        if !call!(self, accumulate_drawn(both, gates, sums, from, words, soon)) {
+        let both = self.ops.accumulate_drawn;
+        let done = both
+            .is_some_and(|both| call!(both, ((turned, stride), gates, sums, from, words, soon)));
+        if !done {
             let (draws, (column, block)) = from;
             call!(self, accumulate(turned, stride, gates, sums));
             call!(self, dither(draws, column, block, words));
@@ -357,11 +366,22 @@ impl Kernel {
         assert!(write.residual_bits <= 15, "a remainder fits 16 bits");
         assert!(cells.residual.is_some() == (write.residual_bits > 0), "a remainder has bits");
         let sums = sums.into();
-        if let Sums::Narrow(sums) = sums
-            && let Some(counts) = call!(self, fused(&mut cells, sums, write, dither))
-        {
-            return counts;
-        }
+        let fused = match sums {
+            Sums::Narrow(sums) => call!(self, fused(&mut cells, sums, write, dither)),
+            Sums::Wide(_) => None,
+        };
+        fused.unwrap_or_else(|| self.program_in_steps(cells, sums, write, dither))
+    }
+
+    /// Programs pulses that lie in memory between the steps. Apart, so that writes at once do not wait for their place.
+    #[inline(never)]
+    fn program_in_steps(
+        &self,
+        mut cells: Cells<'_>,
+        sums: Sums<'_>,
+        write: &Write,
+        dither: Dither<'_>,
+    ) -> WriteCounts {
         let mut pulses = Pulses([0; HALF_CELLS]);
         let counts = call!(self, pulses(sums, write, dither, &mut cells, &mut pulses.0));
         let effective = self.levels(cells, &pulses.0, write.ends(), write.groups);

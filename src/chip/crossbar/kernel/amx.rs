@@ -188,7 +188,7 @@ pub(super) const OPS: Ops = Ops {
     read_converted,
     read_columns,
     accumulate,
-    accumulate_drawn,
+    accumulate_drawn: Some(accumulate_drawn),
     peak: peak::amx,
     ..avx512::OPS
 };
@@ -197,7 +197,8 @@ pub(super) const OPS: Ops = Ops {
 /// Tiles of this thread have their shape.
 #[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi,popcnt")]
 unsafe fn read(cells: &[u8], drives: Drives<'_>, samples: Range<usize>, out: &mut [i32]) {
-    // SAFETY: the caller says so.
+    // SAFETY: the caller says that tiles have their shape. Only the last `Tiles` of the thread takes it from them, and none is
+    // dropped before this returns.
     let tiles = unsafe { Tiles::here() };
     if cells.is_empty() {
         return out.fill(0);
@@ -236,7 +237,8 @@ unsafe fn read_conv(
     (blocks, positions): (Range<usize>, Range<usize>),
     out: &mut [i32],
 ) -> bool {
-    // SAFETY: the caller says so.
+    // SAFETY: the caller says that tiles have their shape. Only the last `Tiles` of the thread takes it from them, and none is
+    // dropped before this returns.
     let tiles = unsafe { Tiles::here() };
     let offsets = image.plan().offsets().map(|offsets| &offsets[blocks]);
     offsets.is_some_and(|offsets| conv::read(tiles, cells, image, offsets, positions, out))
@@ -253,7 +255,8 @@ unsafe fn read_converted(
     scratch: &mut Scratch,
     codes: &mut [i16],
 ) -> Option<Rails> {
-    // SAFETY: the caller says so.
+    // SAFETY: the caller says that tiles have their shape. Only the last `Tiles` of the thread takes it from them, and none is
+    // dropped before this returns.
     let tiles = unsafe { Tiles::here() };
     let blocks = banks.drives[0].blocks();
     let mut rails = Rails::default();
@@ -313,7 +316,8 @@ unsafe fn read_converted(
 /// Tiles of this thread have their shape.
 #[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi,popcnt")]
 unsafe fn read_columns(plane: &[u8], layout: Layout, gates: Drives<'_>, out: &mut [i32]) {
-    // SAFETY: the caller says so.
+    // SAFETY: the caller says that tiles have their shape. Only the last `Tiles` of the thread takes it from them, and none is
+    // dropped before this returns.
     let tiles = unsafe { Tiles::here() };
     let samples = gates.samples();
     let together = samples / 32 * 32;
@@ -355,7 +359,8 @@ unsafe fn accumulate_drawn(
     words: &mut Half<u8>,
     soon: &Half<u8>,
 ) -> bool {
-    // SAFETY: the caller says so.
+    // SAFETY: the caller says that tiles have their shape. Only the last `Tiles` of the thread takes it from them, and none is
+    // dropped before this returns.
     let tiles = unsafe { Tiles::here() };
     if !stride.is_multiple_of(64) {
         return false;
@@ -370,7 +375,8 @@ unsafe fn accumulate_drawn(
 /// Tiles of this thread have their shape.
 #[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi,popcnt")]
 unsafe fn accumulate(turned: &[u8], stride: usize, gates: &[i8], sums: &mut Half<i32>) {
-    // SAFETY: the caller says so.
+    // SAFETY: the caller says that tiles have their shape. Only the last `Tiles` of the thread takes it from them, and none is
+    // dropped before this returns.
     let tiles = unsafe { Tiles::here() };
     if gates.len().is_multiple_of(HALF_CELLS) {
         half_block(tiles, stride, turned, avx512::as_bytes(gates), sums);

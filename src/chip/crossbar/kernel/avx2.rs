@@ -52,7 +52,7 @@ pub(super) const OPS: Ops = Ops {
     accumulate,
     dither: dither::dither,
     dither_words: dither::dither_words,
-    loud,
+    loud: fused::loud,
     pulses,
     levels,
     fused: fused::fused,

@@ -230,6 +230,7 @@ impl Cells<'_> {
     pub const GONE: u8 = u8::MAX;
 
     /// The window, where there is nothing but levels of 8 bits.
+    #[cfg(target_arch = "x86_64")]
     pub(super) fn plain_window(&self, write: &Write) -> Option<(u8, u8)> {
         if self.high.is_some() || self.residual.is_some() || self.pruned.is_some() {
             return None;

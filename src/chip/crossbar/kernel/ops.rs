@@ -21,6 +21,10 @@ use crate::num::fixed::ErrorBits;
 
 /// The operations of a back end.
 #[derive(Debug)]
+#[expect(
+    clippy::type_complexity,
+    reason = "this is where a signature is written, and the only place"
+)]
 pub(super) struct Ops {
     pub(super) read: unsafe fn(&[u8], Drives<'_>, Range<usize>, &mut [i32]),
     pub(super) read_conv:
@@ -37,14 +41,17 @@ pub(super) struct Ops {
     pub(super) read_columns: unsafe fn(&[u8], Layout, Drives<'_>, &mut [i32]),
     /// Of as many samples as gates say, of rows that lie a stride apart.
     pub(super) accumulate: unsafe fn(&[u8], usize, &[i8], &mut Half<i32>),
-    pub(super) accumulate_drawn: unsafe fn(
-        (&[u8], usize),
-        &[i8],
-        &mut Half<i32>,
-        (&Draws, (usize, usize)),
-        &mut Half<u8>,
-        &Half<u8>,
-    ) -> bool,
+    /// Where it is faster than one after the other.
+    pub(super) accumulate_drawn: Option<
+        unsafe fn(
+            (&[u8], usize),
+            &[i8],
+            &mut Half<i32>,
+            (&Draws, (usize, usize)),
+            &mut Half<u8>,
+            &Half<u8>,
+        ) -> bool,
+    >,
     pub(super) dither: unsafe fn(&Draws, usize, usize, &mut Half<u8>),
     pub(super) dither_words: unsafe fn(&Draws, usize, usize, &mut Half<u16>),
     pub(super) loud: unsafe fn(Sums<'_>, &Write, u32) -> u16,
@@ -59,7 +66,9 @@ pub(super) struct Ops {
     pub(super) peak: unsafe fn(usize) -> u64,
 }
 
-/// Compiles the twins of a write's steps for features of the processor.
+/// Compiles the twins of a write's steps for features of the processor. Where the whole program is compiled for them,
+/// tables have the twins themselves.
+#[cfg(target_arch = "x86_64")]
 macro_rules! twins {
     ($features:literal) => {
         #[target_feature(enable = $features)]
@@ -85,4 +94,5 @@ macro_rules! twins {
     };
 }
 
+#[cfg(target_arch = "x86_64")]
 pub(super) use twins;

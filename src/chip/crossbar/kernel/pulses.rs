@@ -350,5 +350,5 @@ fn lanes<L: Lane, const WORDS: bool, const RESIDUAL: u8>(
 /// The sum of what lanes counted.
 #[inline(always)]
 pub(super) fn total(lanes: &[u32; LANES]) -> u64 {
-    lanes.iter().fold(0, |sum, lane| sum + lane).into()
+    lanes.iter().sum::<u32>().into()
 }

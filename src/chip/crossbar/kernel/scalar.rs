@@ -36,7 +36,7 @@ pub(super) const OPS: Ops = Ops {
     turn,
     read_columns,
     accumulate: sums::accumulate,
-    accumulate_drawn: |_, _, _, _, _, _| false,
+    accumulate_drawn: None,
     dither,
     dither_words,
     loud: pulses::loud,

@@ -25,7 +25,7 @@ fn fresh(write: &Write, seed: u64) -> State {
 /// Programs wide sums by the law and by all others, and gives what the law made of it.
 fn check_wide(sums: &Half<i64>, write: &Write, modes: [bool; 2], seed: u64) -> Vec<State> {
     let fresh = fresh(write, seed);
-    let words = bytes(seed / 3 | 1, 2 * HALF_CELLS);
+    let words = bytes((seed / 3) | 1, 2 * HALF_CELLS);
     let byte_words = half(&words[..HALF_CELLS]);
     let words: Vec<_> = words.as_chunks().0.iter().map(|word| u16::from_le_bytes(*word)).collect();
     let words = half(&words);
