@@ -19,7 +19,10 @@ use source::{is_word, module_of, reaches, tokens};
 /// Wings in order, each with its rooms in order.
 const HOUSE: [(&str, &[&str]); 6] = [
     ("num", &["fixed", "draw", "tables"]),
-    ("chip", &["hardware", "ledger", "periphery", "crossbar", "population", "layer", "engine"]),
+    (
+        "chip",
+        &["state", "hardware", "ledger", "periphery", "crossbar", "population", "layer", "engine"],
+    ),
     ("learn", &["error", "route", "statistics", "rule", "driver", "network"]),
     ("task", &["classify"]),
     ("lab", &["data", "config", "store", "price", "table", "report", "run", "wave", "sweep"]),

@@ -40,6 +40,7 @@ mod schedule;
 mod state;
 mod tape;
 pub mod tick;
+mod track;
 mod trains;
 mod unit;
 mod update;
@@ -51,6 +52,7 @@ use schedule::Schedule;
 pub use calibrate::Calibration;
 pub use pulses::{Pulses, TilePeaks, active};
 pub use tape::Recorded;
+pub use track::Written;
 pub use unit::{Centre, ErrorUnit};
 
 /// Which side of a crossbar is driven.
@@ -246,6 +248,8 @@ pub struct Engine {
     samples: usize,
     /// Samples that `LOADX` has brought since the start, by phase: state.
     loaded: [u64; 3],
+    /// Samples written one by one since ranges of converters were last looked at: state where they track.
+    unlooked: u64,
     phase: Phase,
     ledgers: [Ledger; 3],
     /// Counts cycles, on hardware that has a timing.
@@ -291,6 +295,7 @@ impl Engine {
             layers,
             samples: 0,
             loaded: [0; 3],
+            unlooked: 0,
             phase: Phase::Training,
             ledgers: [ledger.clone(), ledger.clone(), ledger],
             schedule,

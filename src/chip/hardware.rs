@@ -89,6 +89,8 @@ pub enum AdcRange {
     Shift(u32),
     /// The worst case never saturates.
     Full,
+    /// As calibrated with a headroom of [`AdcRange::TRACKING_HEADROOM`]; then the shift grows with the currents.
+    Tracking,
     /// From the first 256 training samples, read with ideal converters.
     Calibrated {
         /// Shift added to the one found.
@@ -96,6 +98,15 @@ pub enum AdcRange {
         /// Whether it is found again before each epoch.
         every_epoch: bool,
     },
+}
+
+impl AdcRange {
+    /// Headroom with which tracking begins.
+    pub const TRACKING_HEADROOM: u32 = 1;
+    /// One conversion in so many may lie on the rail; where more do, a tracking converter takes a greater step.
+    pub const TRACKING_RARE: u64 = 64;
+    /// Samples written one by one, after which tracking converters are looked at.
+    pub const TRACKING_SAMPLES: u64 = 64;
 }
 
 /// Fractional random bits of a rounding.
@@ -290,7 +301,7 @@ impl Hardware {
                 AdcRange::Calibrated { headroom, every_epoch: _ } => {
                     between("adc.headroom", headroom.into(), [0, 16])?;
                 }
-                AdcRange::Full => {}
+                AdcRange::Full | AdcRange::Tracking => {}
             }
         }
         if let Some(timing) = timing {

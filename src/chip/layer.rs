@@ -149,6 +149,9 @@ pub struct Layer {
     pub writes: Vec<u64>,
     /// Converter shifts by target stream and slice; empty with ideal converters.
     pub adc_shifts: Vec<Vec<u32>>,
+    /// Of converters that track, by target stream and slice: codes on the rail, and all codes, of training since ranges
+    /// were last looked at. Empty where none track.
+    pub rails: Vec<Vec<[u64; 2]>>,
 }
 
 impl Layer {
@@ -171,15 +174,18 @@ impl Layer {
             Adc::Finite { bits, subtract, range } => {
                 let shift = match range {
                     AdcRange::Shift(shift) => shift,
-                    AdcRange::Full | AdcRange::Calibrated { .. } => {
+                    AdcRange::Full | AdcRange::Calibrated { .. } | AdcRange::Tracking => {
                         hardware.full_shift(bits, subtract, rows.min(hardware.tile.rows))
                     }
                 };
                 vec![vec![shift; hardware.slices() as usize]; spec.wiring.targets().len()]
             }
         };
+        let tracks = matches!(hardware.adc, Adc::Finite { range: AdcRange::Tracking, .. });
+        let no_rail = |shifts: &Vec<u32>| vec![[0; 2]; shifts.len()];
+        let rails = if tracks { adc_shifts.iter().map(no_rail).collect() } else { vec![] };
         let writes = vec![0; arrays.len()];
-        Self { index, spec, layout, lut, delivery, arrays, writes, adc_shifts }
+        Self { index, spec, layout, lut, delivery, arrays, writes, adc_shifts, rails }
     }
 
     /// The table as kernels take it: what a unit hands on is its activity or, with `drive_bits`, the drive code of

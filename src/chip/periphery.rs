@@ -59,6 +59,13 @@ impl Converter {
         }
     }
 
+    /// Whether a code lies at an end of the range: the greatest one or, of a difference, also the least.
+    #[inline]
+    #[must_use]
+    pub const fn is_rail(self, code: i64) -> bool {
+        code == self.max || (self.min < 0 && code == self.min)
+    }
+
     /// The least shift at which `current` does not reach the rail.
     #[must_use]
     pub fn least_shift(self, current: i64) -> u32 {
@@ -123,6 +130,16 @@ mod tests {
             [-5, -4, 3, 4].map(|v| adc.convert(v)),
             [(-4, true), (-4, false), (3, false), (3, true)]
         );
+    }
+
+    #[test]
+    fn a_code_at_an_end_is_on_the_rail_whether_or_not_it_was_changed() {
+        let on_rail = |adc: Converter, v| adc.is_rail(adc.convert(v).0);
+        let digital = adc(8, Subtract::Digital, 0);
+        assert_eq!([0, 254, 255, 256].map(|v| on_rail(digital, v)), [false, false, true, true]);
+        let current = adc(8, Subtract::Current, 0);
+        let seen = [-129, -128, -127, 0, 126, 127, 128].map(|v| on_rail(current, v));
+        assert_eq!(seen, [true, true, false, false, false, true, true]);
     }
 
     #[test]

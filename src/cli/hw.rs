@@ -201,6 +201,7 @@ fn numbers(hardware: &Hardware) -> Vec<(&'static str, String)> {
             let range = match range {
                 AdcRange::Shift(shift) => format!("step 2^{shift}"),
                 AdcRange::Full => "full range".into(),
+                AdcRange::Tracking => "tracking".into(),
                 AdcRange::Calibrated { headroom, .. } => format!("calibrated + {headroom}"),
             };
             let each = match subtract {

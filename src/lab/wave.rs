@@ -75,6 +75,7 @@ pub fn record(
     let mut network = Network::new(&config.hardware, config.seed, engine.layers(), samples);
     network.set_learning(engine.mantissa(), engine.potentiation_only());
     network.set_error_unit(engine.error_unit());
+    network.set_unlooked(engine.unlooked());
     let place = look.tile;
     let grid = (place.layer < engine.layers().len()).then(|| network.grid(place.layer));
     let inside = |[targets, downs, acrosses]: [usize; 3]| {

@@ -6,7 +6,7 @@
 
 use super::error::ErrorUnit;
 use super::rule::{Rule, Step, UpdateMode};
-use crate::chip::engine::{Engine, Operation, Side, Write};
+use crate::chip::engine::{Engine, Operation, Side, Write, Written};
 use crate::chip::state::{Section, State, StateError, Visitor, visit_counts};
 
 /// How a network learns.
@@ -86,6 +86,7 @@ impl Driver {
                 let mut list = Vec::new();
                 errors(&self.engine, 0, &mut list);
                 self.update(&list);
+                self.engine.written(Written::Batch);
             }
             UpdateMode::Online => {
                 for (sample, codes) in codes.chunks_exact(inputs).enumerate() {
@@ -93,6 +94,7 @@ impl Driver {
                     let mut list = Vec::new();
                     errors(&self.engine, sample, &mut list);
                     self.update(&list);
+                    self.engine.written(Written::Sample);
                 }
             }
         }

@@ -18,9 +18,7 @@ use std::time::Instant;
 use dalean::chip::crossbar::kernel::Backend;
 use dalean::chip::engine::tick::{Command, More, Network, TileAdc, TileConfig};
 use dalean::chip::engine::{Engine, Operation, Phase, Side, Write};
-use dalean::chip::hardware::{
-    Adc, DitherBits, DitherPattern, FloorKind, Hardware, PulseCode, Timing, Window, WriteScheme,
-};
+use dalean::chip::hardware::{Hardware, PulseCode, Timing};
 use dalean::chip::layer::{DrivenBy, Layer, LayerSpec, Taps};
 use dalean::chip::population::Wiring;
 use dalean::num::draw::{Place, Site};
@@ -112,7 +110,8 @@ fn operations<'a>(codes: &'a [u8], words: &'a [i16]) -> [Operation<'a>; 5] {
 
 fn engine() -> Engine {
     let hardware = hardware();
-    let mut engine = Engine::new(hardware, Backend::best(), SEED, vec![layer(&hardware)]);
+    let layers = vec![layer(&hardware)];
+    let mut engine = Engine::new(hardware, Backend::best(), SEED, layers);
     for (array, row) in (0..2).flat_map(|array| (0..SIDE).map(move |row| (array, row))) {
         let levels = levels(array, row);
         engine.execute(&Operation::LoadWeights { layer: 0, array, row, levels: &levels });
@@ -251,7 +250,7 @@ fn rate(mut one: impl FnMut(usize)) -> f64 {
 
 fn main() {
     let mut fast = engine();
-    let mut tick = Network::new(hardware(), SEED, fast.layers(), SAMPLES);
+    let mut tick = Network::new(&hardware(), SEED, fast.layers(), SAMPLES);
     let mut rtl = Driver::new(&fast);
     let elapsed = |engine: &Engine| {
         let cycles = engine.ledger(Phase::Training).cycles().unwrap();

@@ -2,7 +2,7 @@
 # the level part of the state hash of section 6) by someone who had not seen the Rust code. Both sides must give the same integers.
 # Run:  python3 oracle.py > golden.json        (Python 3.11, numpy; about a quarter of a minute; asserts check the oracle itself)
 
-import hashlib, json, math, struct, sys
+import copy, hashlib, json, math, struct, sys
 from decimal import Decimal, getcontext
 from fractions import Fraction as Fr
 import numpy as np
@@ -248,7 +248,10 @@ class Net:
         self.alt_residual, self.alt_tap = True, False
         self.first = None
         self.calib_other = None
+        self.tracks = s["adc_range"] == "tracking"
         self.set_converters()
+        self.forget_rails()
+        self.unlooked = 0
 
     def new_sat(self):
         return {kind: [0] * self.nl for kind in SAT_KINDS}
@@ -267,8 +270,23 @@ class Net:
                 rows = slice(r0, r0 + s["tile_rows"])
                 yield sl, r0, pick(xe)[:, rows] @ self.level[l, e][rows], pick(xi)[:, rows] @ self.level[l, i][rows]
 
+    def forget_rails(self):
+        """[codes on the rail, all codes] since the last look, by layer, stream and slice."""
+        self.rails = [{st: [[0, 0] for _ in range(self.ns)] for st in self.streams(l)} for l in range(self.nl)]
+
+    def look(self):
+        """Tracking converters: more than 1 in 64 codes on the rail, and the shift grows by one."""
+        for l in range(self.nl):
+            for st in self.streams(l):
+                for sl, (on, codes) in enumerate(self.rails[l][st]):
+                    if 64 * on > codes:
+                        self.ash[l][st][sl] += 1
+        self.forget_rails()
+        self.unlooked = 0
+
     def accumulate(self, l, stream, xp, xn, count, ideal):
         s, acc = self.s, 0
+        rails = self.rails[l][stream] if not ideal and count is self.sat_train else [[0, 0] for _ in range(self.ns)]
         for sl, _, ve, vi in self.currents(l, stream, xp, xn):
             ash = 0 if ideal else self.ash[l][stream][sl]
             if ideal:
@@ -278,11 +296,15 @@ class Net:
                 ce, n1 = clamp_counted(rsh(ve, ash), 0, top)
                 ci, n2 = clamp_counted(rsh(vi, ash), 0, top)
                 count["conversion"][l] += n1 + n2
+                rails[sl][0] += int(np.count_nonzero(ce == top)) + int(np.count_nonzero(ci == top))
+                rails[sl][1] += ce.size + ci.size
                 d = ce - ci
             else:
                 half = 1 << (s["adc_bits"] - 1)
                 d, n1 = clamp_counted(rsh(ve - vi, ash), -half, half - 1)
                 count["conversion"][l] += n1
+                rails[sl][0] += int(np.count_nonzero((d == half - 1) | (d == -half)))
+                rails[sl][1] += d.size
             acc = acc + (d << (ash + sl * s["dac_bits"]))
         if ideal:       # the sliced, tiled sum is the whole product
             e, i = (PP, NP) if stream == "p" else (NN, PN)
@@ -326,7 +348,7 @@ class Net:
                 for st in self.streams(l):
                     self.ash[l][st] = [ash] * self.ns
         else:
-            assert s["adc_range"] == "calibrated"
+            assert s["adc_range"] == "calibrated" or (self.tracks and s["headroom"] == 1)
             self.ash, self.calib_other = blank(0), blank(0)
             recs = self.forward(self.x[:256], self.new_sat(), ideal=True)
             for l in range(self.nl):
@@ -464,6 +486,9 @@ class Net:
             for l in range(self.nl):
                 for p in self.paths[l]:
                     self.write(l, p, self.sums(l, p, recs[l], u[l], part))
+        self.unlooked += len(rows)
+        if self.tracks and (self.s["mode"] != "online" or self.unlooked == 64):
+            self.look()
 
     def epoch(self, e):
         order = shuffle_order(self.s["seed"], e, N_EX)
@@ -496,7 +521,8 @@ class Net:
                     state += rb
                 assert d["effective"] <= d["attempted"] and d["bounded"] <= d["requested"] <= d["attempted"]
                 out[f"layer{l}.{PATH_NAMES[p]}"] = d
-        return {"pathways": out, "state_level_part_sha256": sha(state), "mu": self.mu.tolist() if s["centre"] == "running" else None,
+        shifts = {"ash": copy.deepcopy(self.ash)} if self.tracks else {}
+        return {**shifts, "pathways": out, "state_level_part_sha256": sha(state), "mu": self.mu.tolist() if s["centre"] == "running" else None,
                 "saturations_training": {k: sum(v) for k, v in self.sat_train.items()},
                 "saturations_training_by_layer": {k: list(v) for k, v in self.sat_train.items()}}
 
@@ -504,7 +530,7 @@ class Net:
 def run_case(name, note, **over):
     net = Net(**over)
     settings = dict(net.s, seed_decimal=str(net.s["seed"]), widths=net.widths, features=N_FEAT, examples=N_EX, full_scale=FULL_SCALE, readout="p",
-                    slices=net.ns, k=net.k, lsh=net.lsh, G=net.G, ash=net.ash or None)
+                    slices=net.ns, k=net.k, lsh=net.lsh, G=net.G, ash=copy.deepcopy(net.ash) or None)
     if net.calib_other is not None:
         settings["ash_if_on_the_rail_means_changed_by_the_clamp"] = net.calib_other
     res = {"name": name, "note": note, "settings": settings, "after_init": net.snapshot(), "after_epoch": []}
@@ -575,6 +601,9 @@ CASES = [
     ("adc6_calibrated_digital", "calibrated, digital", dict(adc="finite", adc_bits=6, adc_range="calibrated", dac_bits=2, tile_rows=32, hidden=[40, 17], rate=[20, 10, 5], seed=24)),
     ("adc6_calibrated_current", "calibrated, current, 4-bit drives", dict(adc="finite", adc_bits=6, adc_range="calibrated", dac_bits=2, drive_bits=4, tile_rows=32, subtract="current", hidden=[40, 17], rate=[20, 10, 5], seed=0x0123456789ABCDEF)),
     ("adc5_calibrated_rail", "calibrated, current, 5 bits: here it matters what 'on the rail' means", dict(adc="finite", adc_bits=5, adc_range="calibrated", dac_bits=2, tile_rows=32, subtract="current", hidden=[40, 17], rate=[20, 10, 5], seed=1)),
+    ("adc4_tracking_digital", "tracking, digital, accumulate", dict(adc="finite", adc_bits=4, adc_range="tracking", dac_bits=2, tile_rows=32, hidden=[40, 17], rate=[40, 20, 10], epochs=4, seed=30)),
+    ("adc6_tracking_current", "tracking, current, online: a look every 64 samples", dict(adc="finite", adc_bits=6, adc_range="tracking", subtract="current", dac_bits=3, tile_rows=32, mode="online", centre="none", rate=[40, 20], epochs=4, seed=31)),
+    ("adc5_tracking_replay", "tracking, digital, replay, running centre", dict(adc="finite", adc_bits=5, adc_range="tracking", dac_bits=4, mode="replay", centre="running", hidden=[40], rate=[20, 10], epochs=3, seed=32)),
 ]
 
 
@@ -657,7 +686,8 @@ NOTES = {
                       "is left of the request when its cell is held at floor or ceiling; alt_tap: stream n sums -S over its taps and rounds, "
                       "instead of negating the rounded sum; alt_rail: calibration counts conversions the clamp changed, not codes that lie on a rail.",
     "batches": "order = shuffle of 0..47 from the identity each epoch; cut in runs of `batch`, the last short; online: one sample a time, k from the configured batch.",
-    "tables": "adc ideal: ash null, dac_bits and tile_rows change nothing. ash[layer][stream][slice].",
+    "tables": "adc ideal: ash null, dac_bits and tile_rows change nothing. ash[layer][stream][slice]: before the first update, and of converters that "
+              "track also after each epoch.",
 }
 
 if __name__ == "__main__":

@@ -18,8 +18,11 @@ fn every_rule_mode_and_chip_learns_the_built_in_digits() {
         (&["hw.write.residual_bits=8", "hw.cell.level_bits=4"], 0.8),
         (&["hw.cell.floor_kind=absorbing"], 0.8),
         (&["hw.cell.level_bits=12"], 0.85),
-        (&["hw.adc.bits=8", "hw.tile.rows=32", "hw.adc.recalibrate=epoch"], 0.85),
-        (&["hw.adc.bits=8", "hw.adc.subtract=current", "hw.adc.recalibrate=epoch"], 0.85),
+        (&["hw.adc.bits=8", "hw.tile.rows=32"], 0.85),
+        (&["hw.adc.bits=4"], 0.85),
+        (&["hw.adc.bits=8", "hw.adc.subtract=current"], 0.85),
+        (&["hw.adc.bits=6", "hw.adc.range=calibrated"], 0.85),
+        (&["hw.adc.bits=8", "hw.adc.range=calibrated", "hw.adc.recalibrate=epoch"], 0.85),
         (&["network.bias=rows"], 0.85),
     ] {
         let mut command = train_plain(out.path());

@@ -1,9 +1,13 @@
 //! The loops that touch every cell. `scalar` is the law; every other back end gives its bits.
 //!
-//! A [`Backend`] says which loops run; [`Kernel::start`] makes them ready on this thread. All sums are `i32`: a
-//! read adds at most 33,025 products of two bytes (the plan cuts longer columns into chunks), an update at most
-//! 4,096 products of a drive (0..=255) and a gate (-127..=127), times a mantissa of at most 15. A back end is a
-//! token that exists only where the processor has the feature.
+//! A [`Backend`] says which loops run; [`Kernel::start`] makes them ready on this thread. A back end is a token that
+//! exists only where the processor has the feature; what it does is a table of functions, declared in `ops`, behind the
+//! checks of [`Kernel`]. Sums are `i32`: a read adds at most 33,025 products of two bytes (the plan cuts longer columns into
+//! chunks), an update at most 4,096 products of a drive (0..=255) and a gate (-127..=127), times a mantissa of at most 15.
+//! Where an update meets more positions, its sums are `i64`.
+//!
+//! A write has four steps, each with one law and one twin that compilers make vectors of: `sums`, `requests`, `pulses`,
+//! `levels`. Back ends have kernels of their own for products, and for writes as they usually are (`fused`, `single`).
 //!
 //! ```text
 //! drives      [block of 64 rows][sample][64]            u8
@@ -59,7 +63,7 @@ pub use self::{
     conv::{ConvPlan, ConvScratch, ConvShape, ConvTurned, Image, Pixels},
     data::{
         Banks, Cells, Conversion, Dither, Drives, Ends, Extremes, Greatest, Half, LookUp, Peaks,
-        Pulsed, Scratch, Single, TOGETHER, Write, WriteCounts, is_driven,
+        Pulsed, Rails, Scratch, Single, TOGETHER, Write, WriteCounts, is_driven,
     },
     sums::Sums,
     team::Team,
@@ -82,8 +86,11 @@ pub struct Kernel {
 
 /// Calls an operation of whichever back end is at work.
 macro_rules! call {
-    ($kernel:expr, $operation:ident($($argument:expr),*)) => {{
-        let operation = $kernel.ops.$operation;
+    ($kernel:expr, $operation:ident($($argument:expr),*)) => {
+        call!($kernel.ops.$operation, ($($argument),*))
+    };
+    ($operation:expr, ($($argument:expr),*)) => {{
+        let operation = $operation;
         // SAFETY: `Kernel::start` has the table from a token, which exists only where processor and system have all that
         // the functions of this table are compiled for. Tiles have their shape on this thread as long as the kernel
         // lives, which cannot leave it.
@@ -123,7 +130,7 @@ impl Kernel {
     }
 
     /// Reads one panel of two banks tile by tile, converts each and adds `code_E - code_I` to `codes` (32 a
-    /// sample). Returns the conversions that saturated, by bank. The plan proves that codes add up inside 16 bits.
+    /// sample). Returns the conversions that met their rail. The plan proves that codes add up inside 16 bits.
     ///
     /// # Panics
     /// When the sizes do not match.
@@ -133,7 +140,7 @@ impl Kernel {
         samples: Range<usize>,
         scratch: &mut Scratch,
         codes: &mut [i16],
-    ) -> [u64; 2] {
+    ) -> Rails {
         let blocks = banks.drives[0].blocks();
         for (cells, drives) in banks.cells.iter().zip(banks.drives) {
             assert_eq!(cells.len(), blocks * BLOCK_CELLS, "every block has cells");
@@ -145,16 +152,15 @@ impl Kernel {
         assert!(banks.conversion.shift <= Conversion::SHIFT_MAX, "half a step fits");
         assert_eq!(samples.len() * PANEL_COLUMNS, codes.len(), "32 codes a sample");
         if codes.is_empty() {
-            return [0; 2];
+            return Rails::default();
         }
         let whole = samples.len() / TOGETHER * TOGETHER;
         let (these, rest) = codes.split_at_mut(whole * PANEL_COLUMNS);
         let middle = samples.start + whole;
         match call!(self, read_converted(banks, samples.start..middle, scratch, these)) {
-            Some(mut saturated) => {
-                let counts = self.read_apart(banks, middle..samples.end, scratch, rest);
-                saturated.iter_mut().zip(counts).for_each(|(sum, count)| *sum += count);
-                saturated
+            Some(mut rails) => {
+                rails += self.read_apart(banks, middle..samples.end, scratch, rest);
+                rails
             }
             None => self.read_apart(banks, samples, scratch, codes),
         }
@@ -167,8 +173,8 @@ impl Kernel {
         samples: Range<usize>,
         scratch: &mut Scratch,
         codes: &mut [i16],
-    ) -> [u64; 2] {
-        let mut saturated = [0; 2];
+    ) -> Rails {
+        let mut rails = Rails::default();
         let blocks = banks.drives[0].blocks();
         let groups = samples.clone().step_by(TOGETHER);
         for (start, codes) in groups.zip(codes.chunks_mut(Scratch::SUMS)) {
@@ -182,11 +188,10 @@ impl Kernel {
                     self.read(cells, drives, group.clone(), &mut out[..codes.len()]);
                 }
                 let [e, i] = [0, 1].map(|bank| &scratch.currents[bank][..codes.len()]);
-                let counts = call!(self, convert([e, i], banks.conversion, banks.live, codes));
-                saturated.iter_mut().zip(counts).for_each(|(sum, count)| *sum += count);
+                rails += call!(self, convert([e, i], banks.conversion, banks.live, codes));
             }
         }
-        saturated
+        rails
     }
 
     /// Looks up accumulators (`[sample][32]`, the first `live` of them): `values` and `derivatives` lie
@@ -316,8 +321,10 @@ impl Kernel {
         assert!(stride > 0 && stride.is_multiple_of(4), "samples are padded to words of four");
         assert_eq!(turned.len(), BLOCK_ROWS * stride, "64 rows");
         assert_eq!(gates.len(), HALF_COLUMNS * stride, "16 columns");
-        let both = (turned, stride);
-        if !call!(self, accumulate_drawn(both, gates, sums, from, words, soon)) {
+        let both = self.ops.accumulate_drawn;
+        let done = both
+            .is_some_and(|both| call!(both, ((turned, stride), gates, sums, from, words, soon)));
+        if !done {
             let (draws, (column, block)) = from;
             call!(self, accumulate(turned, stride, gates, sums));
             call!(self, dither(draws, column, block, words));
@@ -359,11 +366,22 @@ impl Kernel {
         assert!(write.residual_bits <= 15, "a remainder fits 16 bits");
         assert!(cells.residual.is_some() == (write.residual_bits > 0), "a remainder has bits");
         let sums = sums.into();
-        if let Sums::Narrow(sums) = sums
-            && let Some(counts) = call!(self, fused(&mut cells, sums, write, dither))
-        {
-            return counts;
-        }
+        let fused = match sums {
+            Sums::Narrow(sums) => call!(self, fused(&mut cells, sums, write, dither)),
+            Sums::Wide(_) => None,
+        };
+        fused.unwrap_or_else(|| self.program_in_steps(cells, sums, write, dither))
+    }
+
+    /// Programs pulses that lie in memory between the steps. Apart, so that writes at once do not wait for their place.
+    #[inline(never)]
+    fn program_in_steps(
+        &self,
+        mut cells: Cells<'_>,
+        sums: Sums<'_>,
+        write: &Write,
+        dither: Dither<'_>,
+    ) -> WriteCounts {
         let mut pulses = Pulses([0; HALF_CELLS]);
         let counts = call!(self, pulses(sums, write, dither, &mut cells, &mut pulses.0));
         let effective = self.levels(cells, &pulses.0, write.ends(), write.groups);

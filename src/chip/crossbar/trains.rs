@@ -4,7 +4,8 @@
 //! pulses   sign(column) #{ slots in which row and column fire }
 //! ```
 //!
-//! Levels take these pulses as they take all others: see `kernel::levels`. A train is a word with a bit a slot, so that slots of both are a bitwise and. See docs/MODEL.md, 3.9.
+//! Levels take these pulses as they take all others: see `kernel::levels`. A train is a word with a bit a slot, so that
+//! slots of both are a bitwise and. See docs/MODEL.md, 3.9.
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
 use super::Crossbar;

@@ -122,3 +122,43 @@ fn lines(place: &Place, bits: DitherBits, first: usize, count: usize) -> Vec<u16
         bytes[first % in_block..].iter().take(count).map(|&byte| u16::from(byte)).collect()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::chip::crossbar::layout::in_half;
+    use crate::num::draw::Site;
+
+    #[test]
+    fn a_separable_word_is_that_of_its_row_with_that_of_its_column() {
+        let place = Place::global(5, Site::WriteDither, 9);
+        for bits in [DitherBits::Eight, DitherBits::Sixteen] {
+            let (rows, columns) = (130, 64..112);
+            let down = lines(&Place { sub: 1, ..place }, bits, 0, 192);
+            let across = lines(&Place { sub: 2, ..place }, bits, 0, columns.end);
+            // an array of one column has its words in order
+            let word = |sub, line: usize| match bits {
+                DitherBits::Sixteen => Place { sub, ..place }.half(usize::MAX, line, 0),
+                _ => {
+                    let mut bytes = [0; 64];
+                    Place { sub, ..place }.bytes(usize::MAX, 0, line / 64, &mut bytes);
+                    bytes[line % 64].into()
+                }
+            };
+            assert!((0..rows).all(|row| down[row] == word(1, row)));
+            assert!((0..columns.end).all(|column| across[column] == word(2, column)));
+            let of = lines(&Place { sub: 2, ..place }, bits, columns.start, columns.len());
+            assert_eq!(of, across[columns.clone()], "columns that begin later");
+            let lines = Separable { down: down.clone(), first: columns.start, across: of };
+            let lines = lines.map(|word| word);
+            for (column, block) in [(64, 0), (80, 1), (96, 2)] {
+                let mut words = [0; HALF_CELLS];
+                lines.cross(column, block, &mut words);
+                for (row, c) in (0..64).flat_map(|row| (0..16).map(move |c| (row, c))) {
+                    let want = down[block * 64 + row] ^ across[column + c];
+                    assert_eq!(words[in_half(row, c)], want, "{row} {c}");
+                }
+            }
+        }
+    }
+}

@@ -4,6 +4,8 @@
 //! ash = headroom + least shift with at most 1 in 1,024 conversions on the rail          by layer, stream, slice
 //! ```
 //!
+//! Converters that track begin with a headroom of 1; what comes after is in `track`.
+//!
 //! The first 256 training samples are read with ideal converters in the whole network, and every current that a
 //! finite converter would have seen is noted. A conversion is on the rail when its code is the greatest one
 //! (or, of a difference, the least). See docs/MODEL.md, 2.
@@ -44,7 +46,12 @@ impl Engine {
             for (target, histogram) in histograms.iter().enumerate() {
                 for (slice, (counts, current_max)) in histogram.iter().enumerate() {
                     let shift = &mut self.layers[layer].adc_shifts[target][slice];
-                    if let AdcRange::Calibrated { headroom, .. } = range {
+                    let headroom = match range {
+                        AdcRange::Calibrated { headroom, .. } => Some(headroom),
+                        AdcRange::Tracking => Some(AdcRange::TRACKING_HEADROOM),
+                        AdcRange::Shift(_) | AdcRange::Full => None,
+                    };
+                    if let Some(headroom) = headroom {
                         *shift = least_shift(counts) + headroom;
                     }
                     code_max = code_max.max(rsh(*current_max, *shift));

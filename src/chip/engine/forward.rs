@@ -126,6 +126,7 @@ impl Engine {
             }
             let code = Self::code_of(wiring, target);
             self.charge_read(layer, code, Event::SaturatedLookUps, seen.look_ups);
+            self.count_rails(layer, target, &seen.reached);
             histograms.push(seen.histogram);
         }
         histograms

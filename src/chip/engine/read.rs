@@ -54,6 +54,8 @@ struct TileRead<'a> {
 pub(super) struct Seen {
     /// By bank.
     pub(super) saturated: [u64; BANKS_MAX],
+    /// Codes on the rail, of all banks, by slice; empty with ideal converters.
+    pub(super) reached: Vec<u64>,
     pub(super) look_ups: u64,
     pub(super) histogram: Histogram,
 }
@@ -61,12 +63,16 @@ pub(super) struct Seen {
 impl Seen {
     pub(super) fn new(reader: &Reader<'_>) -> Self {
         let slices = if reader.probe.is_some() { reader.slices } else { 0 };
-        Self { histogram: vec![([0; 64], 0); slices], ..Self::default() }
+        let converted = if reader.converters.is_some() { reader.slices } else { 0 };
+        let (histogram, reached) = (vec![([0; 64], 0); slices], vec![0; converted]);
+        Self { histogram, reached, ..Self::default() }
     }
 
     pub(super) fn merge(&mut self, other: Self) {
         self.saturated.iter_mut().zip(other.saturated).for_each(|(sum, more)| *sum += more);
         self.look_ups += other.look_ups;
+        self.reached.resize(other.reached.len(), 0);
+        self.reached.iter_mut().zip(other.reached).for_each(|(sum, more)| *sum += more);
         if self.histogram.is_empty() {
             self.histogram = other.histogram;
         } else {
@@ -191,9 +197,8 @@ impl<'a> Reader<'a> {
     ) {
         if let Some((converters, _)) = &self.converters {
             sums.fill(0);
-            for (pair, saturated) in self.pairs.iter().zip(seen.saturated.chunks_exact_mut(2)) {
-                let counts = self.add_codes(kernel, pair, converters, part, scratch, sums);
-                saturated.iter_mut().zip(counts).for_each(|(sum, count)| *sum += count);
+            for at in 0..self.pairs.len() {
+                self.add_codes(kernel, at, converters, part, (scratch, sums, seen));
             }
             return;
         }
@@ -207,19 +212,19 @@ impl<'a> Reader<'a> {
         }
     }
 
-    /// Adds the converted codes of a pair, each slice with its weight. Conversions that saturated, by bank.
+    /// Adds the converted codes of pair number `at`, each slice with its weight.
     fn add_codes(
         &self,
         kernel: &Kernel,
-        pair: &Pair<'_>,
+        at: usize,
         converters: &[Converter],
         part: &Part,
-        scratch: &mut Scratch,
-        sums: &mut [i32],
-    ) -> [u64; 2] {
+        (scratch, sums, seen): (&mut Scratch, &mut [i32], &mut Seen),
+    ) {
         let Part { panel, live, samples } = part.clone();
+        let pair = &self.pairs[at];
         let [excites, inhibits] = &pair.reads;
-        let mut saturated = [0; 2];
+        let saturated = &mut seen.saturated[2 * at..2 * at + 2];
         let mut codes = [0; Scratch::SUMS];
         let codes = &mut codes[..sums.len()];
         for (at, (e, i)) in excites.iter().zip(inhibits).enumerate() {
@@ -237,8 +242,9 @@ impl<'a> Reader<'a> {
                 },
                 live,
             };
-            let counts = kernel.read_converted(&banks, samples.clone(), scratch, codes);
-            saturated.iter_mut().zip(counts).for_each(|(sum, count)| *sum += count);
+            let rails = kernel.read_converted(&banks, samples.clone(), scratch, codes);
+            saturated.iter_mut().zip(rails.saturated).for_each(|(sum, count)| *sum += count);
+            seen.reached[e.slice] += rails.reached;
             if excites.get(at + 1).is_none_or(|next| next.slice != e.slice) {
                 let shift = adc.shift + e.slice as u32 * self.dac_bits;
                 for (sum, &code) in sums.iter_mut().zip(codes.iter()) {
@@ -246,7 +252,6 @@ impl<'a> Reader<'a> {
                 }
             }
         }
-        saturated
     }
 
     /// Exact difference of the currents of a pair.
@@ -354,6 +359,8 @@ impl<'a> Reader<'a> {
                     let d = match subtract {
                         Subtract::Digital => {
                             let [e, i] = [e, i].map(|v| adc.convert(v));
+                            let rails = [e, i].map(|(code, _)| u64::from(adc.is_rail(code)));
+                            seen.reached[slice] += rails[0] + rails[1];
                             seen.saturated[2 * pair] += u64::from(e.1);
                             seen.saturated[2 * pair + 1] += u64::from(i.1);
                             e.0 - i.0
@@ -361,6 +368,7 @@ impl<'a> Reader<'a> {
                         Subtract::Current => {
                             let (d, saturated) = adc.convert(e - i);
                             seen.saturated[2 * pair] += u64::from(saturated);
+                            seen.reached[slice] += u64::from(adc.is_rail(d));
                             d
                         }
                     };

@@ -2,7 +2,7 @@
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
 use super::{Engine, Phase};
-use crate::chip::state::{State, StateError, Visitor};
+use crate::chip::state::{Section, State, StateError, Visitor, visit_counts};
 
 impl State for Engine {
     fn visit(&mut self, visitor: &mut dyn Visitor) -> Result<(), StateError> {
@@ -11,6 +11,10 @@ impl State for Engine {
             layer.visit(residual_bits, visitor)?;
         }
         self.unit.visit(visitor)?;
+        if self.tracks() {
+            let samples = std::iter::once(&mut self.unlooked);
+            visit_counts(visitor, "unlooked", Section::SampleCounters, samples)?;
+        }
         for (code, phase) in (0..).zip(Phase::ALL) {
             self.ledger_mut(phase).visit(code, phase.name(), visitor)?;
         }

@@ -3,9 +3,9 @@
 
 use std::ops::Range;
 
-use super::{Operation, Side, Write};
+use super::{Operation, Side, Write, Written};
 
-/// An operation with numbers of its own, or the work of the error unit between operations.
+/// An operation with numbers of its own, or what happens between operations.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Recorded {
     /// `LOADW`.
@@ -36,6 +36,8 @@ pub enum Recorded {
         /// Errors of the loaded samples, `[sample][output]`.
         errors: Vec<i32>,
     },
+    /// Writes are done, on a chip whose converters track.
+    Written(Written),
     /// `ERR`.
     Error {
         /// Which layer.
@@ -77,7 +79,7 @@ impl Recorded {
         }
     }
 
-    /// The operation, unless it is the error unit's work.
+    /// The operation, unless it is none of the tiles'.
     #[must_use]
     pub fn operation(&self) -> Option<Operation<'_>> {
         Some(match self {
@@ -86,7 +88,7 @@ impl Recorded {
             }
             Self::LoadDrives { codes } => Operation::LoadDrives { codes },
             Self::Forward { layer, side } => Operation::Forward { layer: *layer, side: *side },
-            Self::Words { .. } => return None,
+            Self::Words { .. } | Self::Written(_) => return None,
             Self::Error { layer, samples, words, shared } => {
                 Operation::Error { layer: *layer, samples: samples.clone(), words, shared: *shared }
             }

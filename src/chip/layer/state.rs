@@ -1,4 +1,4 @@
-//! What a layer keeps: its arrays, the shifts of its converters, and how often each array was written.
+//! What a layer keeps: its arrays, the shifts of its converters and what these are adjusted by, and how often each array was written.
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
 use super::Layer;
@@ -37,6 +37,10 @@ impl Layer {
                     *place = u32::try_from(shift).expect("a visitor keeps to the range");
                 });
             }
+        }
+        if !self.rails.is_empty() {
+            let counts = self.rails.iter_mut().flatten().flatten();
+            visit_counts(visitor, &format!("{name}.rails"), Section::SampleCounters, counts)?;
         }
         let writes = format!("{name}.writes");
         visit_counts(visitor, &writes, Section::WriteCounts, self.writes.iter_mut())

@@ -155,17 +155,26 @@ fn converters(table: &mut AdcTable, key: &dyn Fn(&str) -> String) -> Result<Adc,
     let bits = range(&key("adc.bits"), AdcBits::new(bits))?;
     let subtracts = [("digital", Subtract::Digital), ("current", Subtract::Current)];
     let subtract = word(&key("adc.subtract"), &mut table.subtract, "digital", &subtracts)?;
-    let headroom = between(&key("adc.headroom"), *table.headroom.get_or_insert(1), 0, 16)?;
-    let again = [("never", false), ("epoch", true)];
-    let every_epoch = word(&key("adc.recalibrate"), &mut table.recalibrate, "never", &again)?;
-    let default = || RangeFile::Named("calibrated".into());
+    let default = || RangeFile::Named("tracking".into());
     let range = match table.range.get_or_insert_with(default) {
         RangeFile::Named(name) if name == "calibrated" => {
-            AdcRange::Calibrated { headroom: u32::try_from(headroom).expect("0..=16"), every_epoch }
+            let usual = if bits.get() <= 6 { 3 } else { 4 };
+            let headroom = *table.headroom.get_or_insert(usual);
+            let headroom = between(&key("adc.headroom"), headroom, 0, 16)?;
+            let again = [("never", false), ("epoch", true)];
+            let recalibrate = &mut table.recalibrate;
+            let every_epoch = word(&key("adc.recalibrate"), recalibrate, "never", &again)?;
+            let headroom = u32::try_from(headroom).expect("0..=16");
+            return Ok(Adc::Finite {
+                bits,
+                subtract,
+                range: AdcRange::Calibrated { headroom, every_epoch },
+            });
         }
+        RangeFile::Named(name) if name == "tracking" => AdcRange::Tracking,
         RangeFile::Named(name) if name == "full" => AdcRange::Full,
         RangeFile::Named(name) => {
-            let allowed = "it is \"calibrated\", \"full\" or a shift in 0..=40";
+            let allowed = "it is \"tracking\", \"calibrated\", \"full\" or a shift in 0..=40";
             return Err(wrong(&key("adc.range"), format!("is \"{name}\""), allowed));
         }
         RangeFile::Shift(shift) => {
@@ -173,6 +182,13 @@ fn converters(table: &mut AdcTable, key: &dyn Fn(&str) -> String) -> Result<Adc,
             AdcRange::Shift(u32::try_from(shift).expect("0..=40"))
         }
     };
+    let calibrated = "only adc.range = \"calibrated\" has it: set that, or remove the key";
+    if let Some(headroom) = table.headroom {
+        return Err(wrong(&key("adc.headroom"), format!("is {headroom}"), calibrated));
+    }
+    if let Some(recalibrate) = &table.recalibrate {
+        return Err(wrong(&key("adc.recalibrate"), format!("is \"{recalibrate}\""), calibrated));
+    }
     Ok(Adc::Finite { bits, subtract, range })
 }
 
@@ -321,6 +337,24 @@ mod tests {
     }
 
     #[test]
+    fn finite_converters_track_unless_they_are_told_otherwise() {
+        let range = |text: &str| {
+            let (hardware, file) = chip(text).unwrap();
+            assert_eq!(chip(&toml::to_string(&file).unwrap()).unwrap().0, hardware, "{text}");
+            let Adc::Finite { range, .. } = hardware.adc else { panic!("finite") };
+            range
+        };
+        assert_eq!(range("adc.bits = 4"), AdcRange::Tracking);
+        for (bits, headroom) in [(4, 3), (6, 3), (7, 4), (12, 4)] {
+            let found = range(&format!("adc = {{ bits = {bits}, range = \"calibrated\" }}"));
+            assert_eq!(found, AdcRange::Calibrated { headroom, every_epoch: false });
+        }
+        let given =
+            "adc = { bits = 8, range = \"calibrated\", headroom = 1, recalibrate = \"epoch\" }";
+        assert_eq!(range(given), AdcRange::Calibrated { headroom: 1, every_epoch: true });
+    }
+
+    #[test]
     fn mistakes_name_the_key_and_what_is_allowed() {
         let wide = "drive.mode = \"pulse_width\"\n";
         for (text, wanted) in [
@@ -339,6 +373,10 @@ mod tests {
             (&format!("{wide}drive.slot_cycles = 1000000"), "slot_cycles"),
             ("drive = { mode = \"amplitude\", dac_bits = 4 }", "light carries"),
             ("drive.mode = \"amplitude\"\nadc = { bits = 8 }", "balanced photodiodes"),
+            ("adc = { bits = 8, headroom = 3 }", "`hw.adc.headroom` is 3; only adc.range"),
+            ("adc = { bits = 8, range = 4, headroom = 0 }", "`hw.adc.headroom` is 0"),
+            ("adc = { bits = 8, recalibrate = \"epoch\" }", "`hw.adc.recalibrate` is \"epoch\""),
+            ("adc = { bits = 8, range = \"tracked\" }", "it is \"tracking\", \"calibrated\""),
         ] {
             let error = chip(text).unwrap_err();
             assert!(error.contains(wanted), "{text}: {error}");

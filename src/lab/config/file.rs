@@ -301,11 +301,11 @@ keys! {
     AdcTable {
         /// Resolution, 2..=16.
         bits: i64,
-        /// `calibrated`, `full`, or a shift.
+        /// `tracking`, `calibrated`, `full`, or a shift.
         range: RangeFile,
-        /// Shift added to the calibrated one.
+        /// Shift added to the calibrated one: 3 up to 6 bits, 4 above. Of `calibrated` alone.
         headroom: i64,
-        /// `never` or `epoch`.
+        /// `never` or `epoch`. Of `calibrated` alone.
         recalibrate: String,
         /// `digital` or `current`.
         subtract: String,
@@ -349,9 +349,9 @@ impl<'de> Deserialize<'de> for AdcFile {
     }
 }
 
-/// `range = "calibrated"`, `"full"` or a shift.
+/// `range = "tracking"`, `"calibrated"`, `"full"` or a shift.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(untagged, expecting = "\"calibrated\", \"full\" or a shift (a whole number)")]
+#[serde(untagged, expecting = "\"tracking\", \"calibrated\", \"full\" or a shift (a whole number)")]
 pub enum RangeFile {
     /// By name.
     Named(String),

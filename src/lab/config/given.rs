@@ -256,6 +256,7 @@ impl List {
                 let range = match range {
                     AdcRange::Shift(shift) => shift.to_string(),
                     AdcRange::Full => "full".into(),
+                    AdcRange::Tracking => "tracking".into(),
                     AdcRange::Calibrated { headroom, every_epoch: false } => {
                         format!("calibrated + {headroom}")
                     }

@@ -306,8 +306,9 @@ impl fmt::Display for Note {
             ),
             Self::Saturated { epoch, saturated, conversions } => write!(
                 f,
-                "{} % of the conversions up to epoch {epoch} saturated; converter ranges come from a net that has not \
-                 learnt yet. Raise hw.adc.headroom (4 or 5 trained MNIST)",
+                "{} % of the conversions up to epoch {epoch} saturated: the range of the converters is too small for \
+                 the currents of a net that learns. hw.adc.range = \"tracking\" widens it meanwhile; of a \
+                 \"calibrated\" one, raise hw.adc.headroom",
                 u128::from(*saturated) * 100 / u128::from(*conversions).max(1)
             ),
         }

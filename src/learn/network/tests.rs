@@ -172,6 +172,7 @@ fn networks_whose_layers_are_numbered_through_share_no_draw() {
     let mut longer = network.clone();
     let mut second = network.layers[0].clone();
     second.inputs = 4;
+    second.driven_by = DrivenBy::Streams;
     longer.layers.insert(1, second.clone());
     longer.layers.insert(1, second);
     longer.rates = vec![network.rates[0]; 4];

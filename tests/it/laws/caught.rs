@@ -10,7 +10,7 @@ use super::fault::Fault;
 use super::play::{law, script};
 
 /// Cases within which a fault must show.
-const CASES: usize = 64;
+const CASES: usize = 96;
 
 /// The same cases in every run.
 fn cases() -> Vec<(Net, Vec<Choice>)> {

@@ -37,6 +37,8 @@ pub(crate) struct Net {
     pub(crate) specs: Vec<LayerSpec>,
     pub(crate) deliveries: Vec<Delivery>,
     pub(crate) centre: Centre,
+    /// Shift with which converters that track begin: often so small that many codes lie on the rail.
+    pub(crate) tracks_from: u32,
     pub(crate) mantissa: u32,
     pub(crate) potentiation_only: bool,
 }
@@ -77,9 +79,10 @@ fn window(bits: LevelBits, ends: Option<[u16; 2]>) -> Window {
 
 fn adc() -> impl Strategy<Value = Adc> {
     let range = prop_oneof![
-        (0u32..=12).prop_map(AdcRange::Shift),
-        Just(AdcRange::Full),
-        (0u32..=3, any::<bool>())
+        1 => (0u32..=12).prop_map(AdcRange::Shift),
+        1 => Just(AdcRange::Full),
+        2 => Just(AdcRange::Tracking),
+        2 => (0u32..=3, any::<bool>())
             .prop_map(|(headroom, every_epoch)| AdcRange::Calibrated { headroom, every_epoch }),
     ];
     let subtract = prop::sample::select(vec![Subtract::Digital, Subtract::Current]);
@@ -205,6 +208,7 @@ pub(crate) fn net(sides: impl Strategy<Value = Vec<usize>>) -> impl Strategy<Val
             let shared: Vec<_> = (0..count).map(|_| numbers.within(0, 9) == 0).collect();
             let centres = [Centre::None, Centre::Batch, Centre::Running];
             let centre = centres[numbers.within(0, 2) as usize];
+            let tracks_from = numbers.within(0, 6) as u32;
             let reads_backwards = hardware.tile.transposed_read && hardware.adc == Adc::Ideal;
             let (mut specs, mut deliveries) = (vec![], vec![]);
             for (at, (activation, weight_max_log2, constant_row)) in layers.into_iter().enumerate()
@@ -226,7 +230,16 @@ pub(crate) fn net(sides: impl Strategy<Value = Vec<usize>>) -> impl Strategy<Val
                 let above = reads_backwards && last == Wiring::Single && at + 1 < count;
                 deliveries.push(delivery(&mut numbers, sides[at + 1], above));
             }
-            Net { seed, hardware, specs, deliveries, centre, mantissa, potentiation_only }
+            Net {
+                seed,
+                hardware,
+                specs,
+                deliveries,
+                centre,
+                tracks_from,
+                mantissa,
+                potentiation_only,
+            }
         },
     )
 }

@@ -85,11 +85,19 @@ pub(crate) enum Fault {
     WordsAboveOffByOne,
     /// A transposed read takes its gates from no memory.
     GateMemoryFree,
+    /// Converters that track never take a greater step.
+    ShiftStays,
+    /// What was on the rail before the last look counts again.
+    RailsAreKept,
+    /// Reads without learning are tracked too.
+    EvaluationIsTracked,
+    /// The least code of a difference is not on the rail.
+    LeastCodeIsNoRail,
 }
 
 impl Fault {
     /// All of them.
-    pub(crate) const ALL: [Self; 41] = [
+    pub(crate) const ALL: [Self; 45] = [
         Self::WrapAtCeiling,
         Self::FloorOffByOne,
         Self::CeilingOffByOne,
@@ -131,5 +139,9 @@ impl Fault {
         Self::SignsIgnored,
         Self::WordsAboveOffByOne,
         Self::GateMemoryFree,
+        Self::ShiftStays,
+        Self::RailsAreKept,
+        Self::EvaluationIsTracked,
+        Self::LeastCodeIsNoRail,
     ];
 }

@@ -3,8 +3,8 @@
 use std::ops::Range;
 
 use dalean::chip::crossbar::kernel::Backend;
-use dalean::chip::engine::{Calibration, Engine, Operation, Phase, Side, Write};
-use dalean::chip::hardware::{Adc, WriteScheme};
+use dalean::chip::engine::{Calibration, Engine, Operation, Phase, Side, Write, Written};
+use dalean::chip::hardware::{Adc, AdcRange, WriteScheme};
 use dalean::chip::layer::{Layer, WordSource};
 use dalean::chip::ledger::Ledger;
 use dalean::learn::error::ErrorUnit;
@@ -39,6 +39,8 @@ pub(crate) enum Op {
     },
     /// Errors of the loaded samples.
     Words(Vec<i32>),
+    /// Writes are done, of a batch or of so many single samples.
+    Written(Option<u32>),
     Calibrate(Vec<u8>),
     Charge(Phase),
 }
@@ -226,6 +228,11 @@ impl Script<'_> {
         self.ops.push(Op::Words(errors));
     }
 
+    fn written(&mut self) {
+        let samples = if self.pick(2) == 0 { None } else { Some(1 + self.pick(70) as u32) };
+        self.ops.push(Op::Written(samples));
+    }
+
     /// A shift that often moves cells, and sometimes any.
     fn shift(&mut self) -> u32 {
         let shift =
@@ -319,6 +326,7 @@ impl Script<'_> {
                         self.program(layer);
                     }
                 }
+                self.written();
             }
         }
     }
@@ -332,6 +340,10 @@ pub(crate) fn engine(net: &Net, backend: Backend) -> Engine {
     let mut engine = Engine::new(net.hardware.clone(), backend, net.seed, layers.collect());
     engine.set_mantissa(net.mantissa);
     engine.set_potentiation_only(net.potentiation_only);
+    if matches!(net.hardware.adc, Adc::Finite { range: AdcRange::Tracking, .. }) {
+        let layers = engine.layers_mut().iter_mut();
+        layers.for_each(|l| l.adc_shifts.iter_mut().for_each(|s| s.fill(net.tracks_from)));
+    }
     let outputs = net.specs.last().unwrap().units;
     let bits = net.hardware.digital.error_bits;
     engine.set_error_unit(ErrorUnit::new(net.centre, bits, outputs));
@@ -356,7 +368,7 @@ pub(crate) fn operation(op: &Op) -> Option<Operation<'_>> {
             samples: samples.clone(),
             shift: *shift,
         },
-        Op::Words(_) | Op::Calibrate(_) | Op::Charge(_) => return None,
+        Op::Words(_) | Op::Written(_) | Op::Calibrate(_) | Op::Charge(_) => return None,
     })
 }
 
@@ -365,6 +377,10 @@ pub(crate) fn execute(engine: &mut Engine, op: &Op) -> Found {
         Op::Words(errors) => return Found::Words(engine.output_words(errors)),
         Op::Calibrate(codes) => return Found::Ranges(engine.calibrate(codes)),
         Op::Charge(phase) => engine.set_phase(*phase),
+        Op::Written(None) => engine.written(Written::Batch),
+        Op::Written(Some(samples)) => {
+            (0..*samples).for_each(|_| engine.written(Written::Sample));
+        }
         _ => engine.execute(&operation(op).expect("an operation of the chip")),
     }
     Found::Nothing
@@ -397,6 +413,7 @@ fn shadow_execute(shadow: &mut Shadow, pending: &mut [usize], op: &Op) -> Found 
         Op::Words(errors) => return Found::Words(shadow.output_words(errors)),
         Op::Calibrate(codes) => return Found::Ranges(shadow.calibrate(codes)),
         Op::Charge(phase) => shadow.charge_to(*phase),
+        Op::Written(samples) => shadow.written(*samples),
     }
     Found::Nothing
 }
@@ -447,6 +464,7 @@ fn compare_step(engine: &Engine, shadow: &Shadow, op: &Op) -> Result<(), String>
         Op::Backward(layer) if engine.backward(*layer) != shadow.layers[*layer].backward => {
             Err("row sums differ".into())
         }
+        Op::Written(_) => (0..=last).try_for_each(|layer| compare_cells(engine, shadow, layer)),
         Op::Update { layer, .. } | Op::Levels { layer, .. } => {
             compare_cells(engine, shadow, *layer)
         }
@@ -518,8 +536,8 @@ fn compare_cells(engine: &Engine, shadow: &Shadow, layer: usize) -> Result<(), S
             return Err(format!("layer {layer} array {at}: write counts differ"));
         }
     }
-    if got.adc_shifts != want.adc_shifts {
-        return Err(format!("layer {layer}: converter shifts differ"));
+    if got.adc_shifts != want.adc_shifts || got.rails != want.rails {
+        return Err(format!("layer {layer}: converter shifts, or what they follow, differ"));
     }
     Ok(())
 }

@@ -57,6 +57,8 @@ pub(crate) struct Side {
     rows: usize,
     pub(crate) arrays: Vec<Array>,
     pub(crate) adc_shifts: Vec<Vec<u32>>,
+    /// Codes on the rail and all codes since ranges were looked at.
+    pub(crate) rails: Vec<Vec<[u64; 2]>>,
     drives: [Table; 2],
     pub(crate) accumulators: [Table; 2],
     pub(crate) activity: [Table; 2],
@@ -76,6 +78,8 @@ pub(crate) struct Shadow {
     pub(crate) loaded: [u64; 3],
     /// Running means of the error unit.
     pub(crate) means: Vec<i64>,
+    /// Samples written one by one since ranges were looked at.
+    unlooked: u32,
     phase: Phase,
     pub(crate) ledgers: [Ledger; 3],
 }
@@ -107,13 +111,17 @@ impl Shadow {
                     let rail = (1i64 << (bits.get() - sign)) - 1;
                     let shift = match range {
                         AdcRange::Shift(shift) => shift,
+                        AdcRange::Tracking => net.tracks_from,
                         _ => (0..60).find(|&s| rsh(worst, s) <= rail).unwrap(),
                     };
                     let slices = hw.drive.bits.get().div_ceil(hw.drive.dac_bits) as usize;
                     vec![vec![shift; slices]; spec.wiring.targets().len()]
                 }
             };
+            let tracks = matches!(hw.adc, Adc::Finite { range: AdcRange::Tracking, .. });
+            let rails = shifts.iter().filter(|_| tracks).map(|s: &Vec<u32>| vec![[0; 2]; s.len()]);
             Side {
+                rails: rails.collect(),
                 spec: spec.clone(),
                 delivery: delivery.clone(),
                 lut: Lut::new(spec.activation, hw.digital.lut_bits, layer::unit(spec, hw)),
@@ -136,6 +144,7 @@ impl Shadow {
             layers: layers.collect(),
             samples: 0,
             loaded: [0; 3],
+            unlooked: 0,
             means: if net.centre == Centre::Running { vec![0; outputs] } else { vec![] },
             phase: Phase::Training,
             ledgers: [ledger.clone(), ledger.clone(), ledger],
@@ -239,6 +248,7 @@ impl Shadow {
             if hw.adc == Adc::Ideal { 1 } else { hw.drive.bits.get().div_ceil(hw.drive.dac_bits) };
         let mut seen = vec![vec![]; slices as usize];
         let (mut accumulators, mut saturated, mut look_ups) = (vec![], [0; 2], 0);
+        let mut rails = vec![[0; 2]; slices as usize];
         for sample in 0..self.samples {
             let mut row = vec![];
             for column in 0..units {
@@ -252,15 +262,25 @@ impl Shadow {
                         Adc::Finite { bits, subtract, .. } if !probe => {
                             let ash = self.layers[layer].adc_shifts[t][s as usize];
                             let bits = bits.get();
+                            let [on_rail, codes] = &mut rails[s as usize];
                             let d = match subtract {
                                 Subtract::Digital => {
                                     let max = (1 << bits) - 1;
-                                    self.convert(e, ash, 0, max, &mut saturated[0])
-                                        - self.convert(i, ash, 0, max, &mut saturated[1])
+                                    let e = self.convert(e, ash, 0, max, &mut saturated[0]);
+                                    let i = self.convert(i, ash, 0, max, &mut saturated[1]);
+                                    *on_rail += u64::from(e == max) + u64::from(i == max);
+                                    *codes += 2;
+                                    e - i
                                 }
                                 Subtract::Current => {
                                     let half = 1 << (bits - 1);
-                                    self.convert(e - i, ash, -half, half - 1, &mut saturated[0])
+                                    let min = -half;
+                                    let d =
+                                        self.convert(e - i, ash, min, half - 1, &mut saturated[0]);
+                                    let least = d == min && !self.is(Fault::LeastCodeIsNoRail);
+                                    *on_rail += u64::from(d == half - 1 || least);
+                                    *codes += 1;
+                                    d
                                 }
                             };
                             d << ash
@@ -279,6 +299,11 @@ impl Shadow {
                 row.push(acc);
             }
             accumulators.push(row);
+        }
+        let counts = self.phase == Phase::Training || self.is(Fault::EvaluationIsTracked);
+        if let Some(sums) = self.layers[layer].rails.get_mut(t).filter(|_| counts) {
+            let both = sums.iter_mut().flatten().zip(rails.into_iter().flatten());
+            both.for_each(|(sum, more)| *sum += more);
         }
         let lut = &self.layers[layer].lut;
         let half = 1i64 << (hw.digital.lut_bits.get() - 1);
@@ -385,7 +410,12 @@ impl Shadow {
                         };
                         seen.iter().filter(rails).count()
                     };
-                    if let AdcRange::Calibrated { headroom, .. } = range {
+                    let headroom = match range {
+                        AdcRange::Calibrated { headroom, .. } => Some(headroom),
+                        AdcRange::Tracking => Some(1),
+                        _ => None,
+                    };
+                    if let Some(headroom) = headroom {
                         let least = (0..64).find(|&s| on_rail(s) * 1024 <= seen.len()).unwrap();
                         let least =
                             least - u32::from(self.is(Fault::CalibrationOneLower) && least > 0);

@@ -5,7 +5,7 @@
 
 use dalean::chip::crossbar::kernel::Backend;
 use dalean::chip::engine::tick::Network;
-use dalean::chip::engine::{Engine, Operation, Phase};
+use dalean::chip::engine::{Engine, Operation, Phase, Written};
 
 use super::choose::{Choice, Net, Numbers};
 use super::play::{self, Op};
@@ -26,7 +26,7 @@ pub(crate) fn law(net: &Net, choices: &[Choice], seed: u64) -> Result<(), String
     while !rest.is_empty() {
         let longest = if numbers.within(0, 1) == 0 { 1 } else { 24 };
         let most = numbers.within(1, longest) as usize;
-        let alone = |op: &Op| matches!(op, Op::Charge(_) | Op::Words(_));
+        let alone = |op: &Op| matches!(op, Op::Charge(_) | Op::Words(_) | Op::Written(_));
         let until = rest.iter().position(alone).unwrap_or(rest.len());
         let (stretch, after) = rest.split_at(most.min(until).min(rest.len()));
         if let Some(Op::Charge(phase)) = rest.first() {
@@ -39,6 +39,15 @@ pub(crate) fn law(net: &Net, choices: &[Choice], seed: u64) -> Result<(), String
             let (got, want) = (engine.output_words(errors), tick.output_words(errors));
             if got != want || engine.error_unit().means() != tick.means() {
                 return Err(format!("{errors:?} became {got:?}, not {want:?}"));
+            }
+            rest = &rest[1..];
+            continue;
+        }
+        if let Some(op @ Op::Written(samples)) = rest.first() {
+            play::execute(&mut engine, op);
+            match samples {
+                None => tick.written(Written::Batch),
+                Some(samples) => (0..*samples).for_each(|_| tick.written(Written::Sample)),
             }
             rest = &rest[1..];
             continue;
@@ -76,6 +85,9 @@ fn compare(engine: &Engine, tick: &Network, outputs: bool) -> Result<(), String>
             if left.is_some_and(|left| left != tick.residuals(at, array)) {
                 return Err(format!("{place}: remainders differ"));
             }
+        }
+        if layer.adc_shifts != tick.adc_shifts(at) {
+            return Err(format!("layer {at}: converter shifts differ"));
         }
         if !engine.backward(at).is_empty() && engine.backward(at) != tick.backward(at) {
             return Err(format!("layer {at}: row sums differ"));

@@ -22,7 +22,7 @@ use self::fused::TileBank;
 use self::product::{Walk, half_block, levels_by_drives, levels_by_gates, pair};
 use super::avx512::{self, Avx512};
 use super::ops::Ops;
-use super::{Banks, Draws, Drives, Half, Image, Packed, Scratch, TOGETHER, peak};
+use super::{Banks, Draws, Drives, Half, Image, Packed, Rails, Scratch, TOGETHER, peak};
 use crate::chip::crossbar::layout::{BLOCK_CELLS, BLOCK_ROWS, HALF_CELLS, Layout};
 
 /// Sums of the first four tile registers start at 0.
@@ -188,7 +188,7 @@ pub(super) const OPS: Ops = Ops {
     read_converted,
     read_columns,
     accumulate,
-    accumulate_drawn,
+    accumulate_drawn: Some(accumulate_drawn),
     peak: peak::amx,
     ..avx512::OPS
 };
@@ -197,7 +197,8 @@ pub(super) const OPS: Ops = Ops {
 /// Tiles of this thread have their shape.
 #[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi,popcnt")]
 unsafe fn read(cells: &[u8], drives: Drives<'_>, samples: Range<usize>, out: &mut [i32]) {
-    // SAFETY: the caller says so.
+    // SAFETY: the caller says that tiles have their shape. Only the last `Tiles` of the thread takes it from them, and none is
+    // dropped before this returns.
     let tiles = unsafe { Tiles::here() };
     if cells.is_empty() {
         return out.fill(0);
@@ -236,7 +237,8 @@ unsafe fn read_conv(
     (blocks, positions): (Range<usize>, Range<usize>),
     out: &mut [i32],
 ) -> bool {
-    // SAFETY: the caller says so.
+    // SAFETY: the caller says that tiles have their shape. Only the last `Tiles` of the thread takes it from them, and none is
+    // dropped before this returns.
     let tiles = unsafe { Tiles::here() };
     let offsets = image.plan().offsets().map(|offsets| &offsets[blocks]);
     offsets.is_some_and(|offsets| conv::read(tiles, cells, image, offsets, positions, out))
@@ -252,15 +254,17 @@ unsafe fn read_converted(
     samples: Range<usize>,
     scratch: &mut Scratch,
     codes: &mut [i16],
-) -> Option<[u64; 2]> {
-    // SAFETY: the caller says so.
+) -> Option<Rails> {
+    // SAFETY: the caller says that tiles have their shape. Only the last `Tiles` of the thread takes it from them, and none is
+    // dropped before this returns.
     let tiles = unsafe { Tiles::here() };
     let blocks = banks.drives[0].blocks();
-    let mut saturated = [0; 2];
+    let mut rails = Rails::default();
     let sums = &mut scratch.currents;
     for (group, codes) in codes.as_chunks_mut::<{ Scratch::SUMS }>().0.iter_mut().enumerate() {
         let first = (samples.start + group * TOGETHER) * BLOCK_ROWS;
-        let mut packed = Packed { codes: [0; Scratch::SUMS], saturated: [[0; 32]; 2] };
+        let (saturated, reached) = ([[0; 32]; 2], [[0; 32]; 2]);
+        let mut packed = Packed { codes: [0; Scratch::SUMS], saturated, reached };
         let tile = |tile: &Range<usize>, bank: usize| {
             let drives = banks.drives[bank];
             let size = drives.samples() * BLOCK_ROWS;
@@ -283,7 +287,7 @@ unsafe fn read_converted(
             let blocks = from..(from + banks.tile_blocks).min(blocks);
             let [e, i] = &mut *sums;
             if at == 0 {
-                // nothing to convert yet: zeros are code 0, and no conversion of them saturates
+                // nothing to convert yet: zeros are code 0, which is no rail
                 i.fill(0);
             }
             fused::converting_inhibition(
@@ -303,17 +307,17 @@ unsafe fn read_converted(
                 &mut packed,
             );
         }
-        let counts = avx512::settle(&sums[1], banks.conversion, banks.live, &mut packed, codes);
-        saturated.iter_mut().zip(counts).for_each(|(sum, count)| *sum += count);
+        rails += avx512::settle(&sums[1], banks.conversion, banks.live, &mut packed, codes);
     }
-    Some(saturated)
+    Some(rails)
 }
 
 /// # Safety
 /// Tiles of this thread have their shape.
 #[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi,popcnt")]
 unsafe fn read_columns(plane: &[u8], layout: Layout, gates: Drives<'_>, out: &mut [i32]) {
-    // SAFETY: the caller says so.
+    // SAFETY: the caller says that tiles have their shape. Only the last `Tiles` of the thread takes it from them, and none is
+    // dropped before this returns.
     let tiles = unsafe { Tiles::here() };
     let samples = gates.samples();
     let together = samples / 32 * 32;
@@ -355,7 +359,8 @@ unsafe fn accumulate_drawn(
     words: &mut Half<u8>,
     soon: &Half<u8>,
 ) -> bool {
-    // SAFETY: the caller says so.
+    // SAFETY: the caller says that tiles have their shape. Only the last `Tiles` of the thread takes it from them, and none is
+    // dropped before this returns.
     let tiles = unsafe { Tiles::here() };
     if !stride.is_multiple_of(64) {
         return false;
@@ -370,7 +375,8 @@ unsafe fn accumulate_drawn(
 /// Tiles of this thread have their shape.
 #[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi,popcnt")]
 unsafe fn accumulate(turned: &[u8], stride: usize, gates: &[i8], sums: &mut Half<i32>) {
-    // SAFETY: the caller says so.
+    // SAFETY: the caller says that tiles have their shape. Only the last `Tiles` of the thread takes it from them, and none is
+    // dropped before this returns.
     let tiles = unsafe { Tiles::here() };
     if gates.len().is_multiple_of(HALF_CELLS) {
         half_block(tiles, stride, turned, avx512::as_bytes(gates), sums);

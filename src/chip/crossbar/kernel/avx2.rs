@@ -15,7 +15,8 @@ use std::ops::Range;
 
 use super::ops::{Ops, twins};
 use super::{
-    Cells, Conversion, Dither, Drives, Ends, Half, Sums, Write, WriteCounts, lanes, peak, scalar,
+    Cells, Conversion, Dither, Drives, Ends, Half, Rails, Sums, Write, WriteCounts, lanes, peak,
+    scalar,
 };
 use crate::chip::crossbar::layout::{BLOCK_CELLS, BLOCK_ROWS, HALF_CELLS, HALF_COLUMNS, Layout};
 use crate::num::fixed::ErrorBits;
@@ -51,7 +52,7 @@ pub(super) const OPS: Ops = Ops {
     accumulate,
     dither: dither::dither,
     dither_words: dither::dither_words,
-    loud,
+    loud: fused::loud,
     pulses,
     levels,
     fused: fused::fused,
@@ -64,12 +65,7 @@ pub(super) const OPS: Ops = Ops {
 twins!("avx2,popcnt");
 
 #[target_feature(enable = "avx2,popcnt")]
-fn convert(
-    currents: [&[i32]; 2],
-    conversion: Conversion,
-    live: usize,
-    codes: &mut [i16],
-) -> [u64; 2] {
+fn convert(currents: [&[i32]; 2], conversion: Conversion, live: usize, codes: &mut [i16]) -> Rails {
     lanes::convert(currents, conversion, live, codes)
 }
 

@@ -99,6 +99,22 @@ impl Conversion {
     pub const SHIFT_MAX: u32 = 30;
 }
 
+/// Conversions of two banks that met an end of their range.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Rails {
+    /// Codes that the end changed, by bank.
+    pub saturated: [u64; 2],
+    /// Codes that lie on the end, changed or not, of both banks.
+    pub reached: u64,
+}
+
+impl std::ops::AddAssign for Rails {
+    fn add_assign(&mut self, more: Self) {
+        self.saturated.iter_mut().zip(more.saturated).for_each(|(sum, count)| *sum += count);
+        self.reached += more.reached;
+    }
+}
+
 /// Two banks read by converters, panel by panel.
 #[derive(Debug, Clone, Copy)]
 pub struct Banks<'a> {
@@ -149,6 +165,8 @@ impl Default for Scratch {
 pub(super) struct Packed {
     pub(super) codes: [i16; Scratch::SUMS],
     pub(super) saturated: [[i16; PANEL_COLUMNS]; 2],
+    /// Codes on the rail.
+    pub(super) reached: [[i16; PANEL_COLUMNS]; 2],
 }
 
 /// A unit's table: `index = clamp( rsh(acc, shift), -half, half - 1 ) + half`.
@@ -212,6 +230,7 @@ impl Cells<'_> {
     pub const GONE: u8 = u8::MAX;
 
     /// The window, where there is nothing but levels of 8 bits.
+    #[cfg(target_arch = "x86_64")]
     pub(super) fn plain_window(&self, write: &Write) -> Option<(u8, u8)> {
         if self.high.is_some() || self.residual.is_some() || self.pruned.is_some() {
             return None;

@@ -2,7 +2,7 @@
 //! functions compiled for their processor; what they do better they write themselves.
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
-use super::Conversion;
+use super::{Conversion, Rails};
 use crate::chip::crossbar::layout::{BLOCK_ROWS, HALF_COLUMNS, PANEL_COLUMNS};
 use crate::num::fixed::ErrorBits;
 
@@ -13,11 +13,12 @@ pub(super) fn convert(
     conversion: Conversion,
     live: usize,
     codes: &mut [i16],
-) -> [u64; 2] {
+) -> Rails {
     let half = 1u32 << conversion.shift >> 1;
     let (shift, max) = (conversion.shift, u32::from(conversion.max));
     let alive: [u32; PANEL_COLUMNS] = std::array::from_fn(|c| u32::from(c < live));
     let mut saturated = [[0u32; PANEL_COLUMNS]; 2];
+    let mut reached = [0u32; PANEL_COLUMNS];
     let codes = codes.as_chunks_mut::<PANEL_COLUMNS>().0;
     let rows = e.as_chunks::<PANEL_COLUMNS>().0.iter().zip(i.as_chunks::<PANEL_COLUMNS>().0);
     for (codes, (e, i)) in codes.iter_mut().zip(rows) {
@@ -28,9 +29,11 @@ pub(super) fn convert(
             codes[c] += d as i16 * alive[c] as i16;
             saturated[0][c] += u32::from(e > max) & alive[c];
             saturated[1][c] += u32::from(i > max) & alive[c];
+            reached[c] += (u32::from(e >= max) + u32::from(i >= max)) * alive[c];
         }
     }
-    saturated.map(|counts| counts.iter().map(|&count| u64::from(count)).sum())
+    let sum = |counts: [u32; PANEL_COLUMNS]| counts.iter().map(|&count| u64::from(count)).sum();
+    Rails { saturated: saturated.map(sum), reached: sum(reached) }
 }
 
 /// [`super::scalar::gate`]. An error of at most `2^(bits-1) - 1` times a derivative of at most 255 rounds to at most

@@ -12,7 +12,6 @@
 //! compile it for their processor. Levels are at most 4,095 and pulses at most 127 in size. See docs/MODEL.md, 3.3.
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
-use super::pulses::{LANES, total};
 use super::{Cells, Ends, Half};
 use crate::chip::crossbar::layout::HALF_CELLS;
 
@@ -92,8 +91,7 @@ fn planes<const WIDE: bool, const ABSORBS: bool, const RESIDUAL: bool>(
     // what a write does not have is neither read nor kept
     let (mut none, mut nothing) = ([0; 64], [0; 64]);
     let mut kept = [0; 64];
-    // a cell moves by at most 4,095 in each of 16 groups
-    let mut moved = [0u16; 64];
+    let mut effective = 0;
     for group in (0..HALF_CELLS / 64).filter(|group| groups >> group & 1 == 1) {
         let low = &mut cells.low.as_chunks_mut().0[group];
         let high = match &mut cells.high {
@@ -109,16 +107,12 @@ fn planes<const WIDE: bool, const ABSORBS: bool, const RESIDUAL: bool>(
             _ => &mut nothing,
         };
         let pulses = &pulses.as_chunks().0[group];
-        lanes::<WIDE, ABSORBS, RESIDUAL>((low, high), pruned, left, pulses, ends, &mut moved);
+        effective += lanes::<WIDE, ABSORBS, RESIDUAL>((low, high), pruned, left, pulses, ends);
     }
-    let mut lanes = [0; LANES];
-    for (lane, sum) in lanes.iter_mut().enumerate() {
-        *sum = (0..64 / LANES).map(|quarter| u32::from(moved[quarter * LANES + lane])).sum();
-    }
-    total(&lanes)
+    effective.into()
 }
 
-/// 64 cells.
+/// 64 cells. Returns by how many levels they moved.
 #[inline(always)]
 fn lanes<const WIDE: bool, const ABSORBS: bool, const RESIDUAL: bool>(
     (low, high): (&mut [u8; 64], &mut [u8; 64]),
@@ -126,11 +120,11 @@ fn lanes<const WIDE: bool, const ABSORBS: bool, const RESIDUAL: bool>(
     left: &mut [u16; 64],
     pulses: &[i8; 64],
     ends: Ends,
-    moved: &mut [u16; 64],
-) {
+) -> u32 {
     let (floor, ceiling) = (ends.floor.cast_signed(), ends.ceiling.cast_signed());
     // copies, which compilers know to lie nowhere else
     let (mut lower, mut upper, mut kept, mut rest) = (*low, *high, *pruned, *left);
+    let mut steps = [0; 64];
     for i in 0..64 {
         let mut before = i16::from(lower[i]);
         if WIDE {
@@ -151,8 +145,14 @@ fn lanes<const WIDE: bool, const ABSORBS: bool, const RESIDUAL: bool>(
         lower[i] = level as u8;
         if WIDE {
             upper[i] = (level >> 8) as u8;
+            steps[i] = (level - before).unsigned_abs();
         }
-        moved[i] += (level - before).unsigned_abs();
     }
+    let moved = if WIDE {
+        steps.iter().map(|&step| u32::from(step)).sum()
+    } else {
+        (0..64).map(|i| u32::from(lower[i].abs_diff(low[i]))).sum()
+    };
     (*low, *high, *pruned, *left) = (lower, upper, kept, rest);
+    moved
 }

@@ -305,7 +305,7 @@ unsafe fn read<M: Multiply>(
     samples: Range<usize>,
     out: &mut [i32],
 ) {
-    // SAFETY: the caller says so.
+    // SAFETY: the caller says that the processor has what `M` multiplies by.
     let products = unsafe { M::here() };
     out.fill(0);
     let walk = Walk {
@@ -341,7 +341,7 @@ unsafe fn accumulate<M: Multiply>(
     gates: &[i8],
     sums: &mut Half<i32>,
 ) {
-    // SAFETY: the caller says so.
+    // SAFETY: the caller says that the processor has what `M` multiplies by.
     let products = unsafe { M::here() };
     let mut starts = [0; HALF_COLUMNS];
     for gates in gates.as_chunks::<64>().0 {
@@ -369,7 +369,7 @@ unsafe fn read_columns<M: Multiply>(
     gates: Drives<'_>,
     out: &mut [i32],
 ) {
-    // SAFETY: the caller says so.
+    // SAFETY: the caller says that the processor has what `M` multiplies by.
     let products = unsafe { M::here() };
     for (sample, out) in out.chunks_exact_mut(layout.rows_padded()).enumerate() {
         let gates = (0..gates.blocks()).flat_map(|block| gates.row(block, sample));

@@ -14,21 +14,25 @@ use std::ops::Range;
 
 use super::{
     Banks, Cells, Conversion, Dither, Draws, Drives, Ends, Extremes, Half, Image, LookUp, Peaks,
-    Scratch, Single, Sums, Write, WriteCounts,
+    Rails, Scratch, Single, Sums, Write, WriteCounts,
 };
 use crate::chip::crossbar::layout::Layout;
 use crate::num::fixed::ErrorBits;
 
 /// The operations of a back end.
 #[derive(Debug)]
+#[expect(
+    clippy::type_complexity,
+    reason = "this is where a signature is written, and the only place"
+)]
 pub(super) struct Ops {
     pub(super) read: unsafe fn(&[u8], Drives<'_>, Range<usize>, &mut [i32]),
     pub(super) read_conv:
         unsafe fn(&[u8], Image<'_>, (Range<usize>, Range<usize>), &mut [i32]) -> bool,
     /// Of whole groups of [`TOGETHER`](super::TOGETHER) samples.
     pub(super) read_converted:
-        unsafe fn(&Banks<'_>, Range<usize>, &mut Scratch, &mut [i16]) -> Option<[u64; 2]>,
-    pub(super) convert: unsafe fn([&[i32]; 2], Conversion, usize, &mut [i16]) -> [u64; 2],
+        unsafe fn(&Banks<'_>, Range<usize>, &mut Scratch, &mut [i16]) -> Option<Rails>,
+    pub(super) convert: unsafe fn([&[i32]; 2], Conversion, usize, &mut [i16]) -> Rails,
     pub(super) look_up: unsafe fn(&[i32], &LookUp, usize, &mut [u8], &mut [u8]) -> u64,
     pub(super) difference: unsafe fn([&[i32]; 2], &mut [i32]),
     pub(super) latch: unsafe fn(&[i16], usize, &[u16], &mut [i16]),
@@ -37,14 +41,17 @@ pub(super) struct Ops {
     pub(super) read_columns: unsafe fn(&[u8], Layout, Drives<'_>, &mut [i32]),
     /// Of as many samples as gates say, of rows that lie a stride apart.
     pub(super) accumulate: unsafe fn(&[u8], usize, &[i8], &mut Half<i32>),
-    pub(super) accumulate_drawn: unsafe fn(
-        (&[u8], usize),
-        &[i8],
-        &mut Half<i32>,
-        (&Draws, (usize, usize)),
-        &mut Half<u8>,
-        &Half<u8>,
-    ) -> bool,
+    /// Where it is faster than one after the other.
+    pub(super) accumulate_drawn: Option<
+        unsafe fn(
+            (&[u8], usize),
+            &[i8],
+            &mut Half<i32>,
+            (&Draws, (usize, usize)),
+            &mut Half<u8>,
+            &Half<u8>,
+        ) -> bool,
+    >,
     pub(super) dither: unsafe fn(&Draws, usize, usize, &mut Half<u8>),
     pub(super) dither_words: unsafe fn(&Draws, usize, usize, &mut Half<u16>),
     pub(super) loud: unsafe fn(Sums<'_>, &Write, u32) -> u16,
@@ -59,7 +66,9 @@ pub(super) struct Ops {
     pub(super) peak: unsafe fn(usize) -> u64,
 }
 
-/// Compiles the twins of a write's steps for features of the processor.
+/// Compiles the twins of a write's steps for features of the processor. Where the whole program is compiled for them,
+/// tables have the twins themselves.
+#[cfg(target_arch = "x86_64")]
 macro_rules! twins {
     ($features:literal) => {
         #[target_feature(enable = $features)]
@@ -85,4 +94,5 @@ macro_rules! twins {
     };
 }
 
+#[cfg(target_arch = "x86_64")]
 pub(super) use twins;

@@ -24,6 +24,8 @@
 //! sum is rounded to at most itself, and a residual of 16 bits fits above it. See docs/MODEL.md, 3.3.
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
+use std::ops::BitOr;
+
 use super::requests::{self, Plain, Request};
 use super::{Cells, Dither, Half, Sums, Write, WriteCounts};
 use crate::chip::crossbar::layout::{BLOCK_ROWS, HALF_CELLS, HALF_COLUMNS, in_half};
@@ -31,6 +33,7 @@ use crate::num::fixed::rsh;
 
 /// Half a pulse, as words of 8 bits have it: what half-up rounds with.
 pub(super) static HALVES: Half<u8> = [128; HALF_CELLS];
+static NO_WORDS: Half<u16> = [0; HALF_CELLS];
 
 /// The request in units of `2^-bits` steps, before a word is added. Shifted out of 64 bits it is far outside every bound,
 /// and so is the end of 64 bits.
@@ -51,7 +54,8 @@ struct Given {
 /// The law: a cell with a remainder asks for something, and is given it with a word of some bits.
 fn given(residual: i64, request: Request, (word, bits): (i64, u32), write: &Write) -> Given {
     let (bound, fraction) = (i64::from(write.increment_max), write.residual_bits);
-    let total = residual + (quotient(request, bits).saturating_add(word) >> bits);
+    let rounded = quotient(request, bits).saturating_add(word) >> bits;
+    let total = rounded.saturating_add(residual);
     let wanted = total >> fraction;
     let pulses = wanted.clamp(-bound, bound);
     let left = (total - (pulses << fraction)).clamp(0, (1 << fraction) - 1);
@@ -102,6 +106,9 @@ pub(super) fn loud(sums: Sums<'_>, write: &Write, bits: u32) -> u16 {
     (0..BLOCK_ROWS).fold(0, |mask, row| mask | u16::from(loud(row)) << (row / 4))
 }
 
+/// Cells that are looked at together.
+pub(super) const LANES: usize = 16;
+
 /// Shifts and ends of a write, the same for every cell.
 #[derive(Clone, Copy)]
 pub(super) struct Scale {
@@ -148,7 +155,7 @@ const COARSE: u8 = 1;
 const FINE: u8 = 2;
 
 /// Lanes that sums come in.
-trait Lane: Copy + Default {
+trait Lane: Copy + Default + PartialEq + BitOr<Output = Self> {
     /// The request, cut or rounded to what words are added to.
     fn quotient(self, scale: &Scale) -> Self;
 
@@ -157,12 +164,6 @@ trait Lane: Copy + Default {
 
     /// Not 0 where a request that is rounded to units of `2^by` is loud.
     fn loudness(self, plain: Plain, by: u32) -> Self;
-
-    /// Bits of both.
-    fn either(self, other: Self) -> Self;
-
-    /// Whether it is 0.
-    fn is_zero(self) -> bool;
 }
 
 impl Lane for i32 {
@@ -188,16 +189,6 @@ impl Lane for i32 {
         let v = plain.narrow(self).wrapping_add((1u32 << by >> 1).cast_signed());
         (v.cast_unsigned() >> by).cast_signed()
     }
-
-    #[inline(always)]
-    fn either(self, other: Self) -> Self {
-        self | other
-    }
-
-    #[inline(always)]
-    fn is_zero(self) -> bool {
-        self == 0
-    }
 }
 
 impl Lane for i64 {
@@ -216,16 +207,6 @@ impl Lane for i64 {
     #[inline(always)]
     fn loudness(self, plain: Plain, by: u32) -> Self {
         (plain.wide(self) + (1i64 << by >> 1)) >> by
-    }
-
-    #[inline(always)]
-    fn either(self, other: Self) -> Self {
-        self | other
-    }
-
-    #[inline(always)]
-    fn is_zero(self) -> bool {
-        self == 0
     }
 }
 
@@ -259,8 +240,8 @@ fn loud_lanes<L: Lane>(sums: &Half<L>, write: &Write, bits: u32) -> u16 {
     let plain = Plain::new(write);
     let mut loud = 0;
     for (group, sums) in sums.as_chunks::<64>().0.iter().enumerate() {
-        let any = sums.iter().fold(L::default(), |any, sum| any.either(sum.loudness(plain, by)));
-        loud |= u16::from(!any.is_zero()) << group;
+        let any = sums.iter().fold(L::default(), |any, sum| any | sum.loudness(plain, by));
+        loud |= u16::from(any != L::default()) << group;
     }
     loud
 }
@@ -273,41 +254,40 @@ fn of_lanes<L: Lane>(
     cells: &mut Cells<'_>,
     out: &mut Half<i8>,
 ) -> WriteCounts {
-    // words that a write does not have are nowhere: they are not read
-    let (bytes, words, nearest) = match dither {
-        Dither::Nearest => (&HALVES, None, true),
-        Dither::Byte(bytes) => (bytes, None, false),
-        Dither::Word(words) => (&HALVES, Some(words), false),
+    // words that a write does not have are not read
+    let (words, wide) = match dither {
+        Dither::Nearest => ((&HALVES, &NO_WORDS), false),
+        Dither::Byte(bytes) => ((bytes, &NO_WORDS), false),
+        Dither::Word(words) => ((&HALVES, words), true),
     };
     let kind = match write.residual_bits {
         0 => NONE,
         bits if bits <= write.shift => COARSE,
         _ => FINE,
     };
-    let none = [0; _];
-    let words = (bytes, words.unwrap_or(&none), nearest);
-    match (matches!(dither, Dither::Word(_)), kind) {
-        (false, NONE) => of_cells::<L, false, NONE>(sums, write, words, cells, out),
-        (false, COARSE) => of_cells::<L, false, COARSE>(sums, write, words, cells, out),
-        (false, _) => of_cells::<L, false, FINE>(sums, write, words, cells, out),
-        (true, NONE) => of_cells::<L, true, NONE>(sums, write, words, cells, out),
-        (true, COARSE) => of_cells::<L, true, COARSE>(sums, write, words, cells, out),
-        (true, _) => of_cells::<L, true, FINE>(sums, write, words, cells, out),
+    let scale = Scale::new(write, if wide { 16 } else { 8 }, matches!(dither, Dither::Nearest));
+    let by = (scale, write.groups);
+    match (wide, kind) {
+        (false, NONE) => of_cells::<L, false, NONE>(sums, by, words, cells, out),
+        (false, COARSE) => of_cells::<L, false, COARSE>(sums, by, words, cells, out),
+        (false, _) => of_cells::<L, false, FINE>(sums, by, words, cells, out),
+        (true, NONE) => of_cells::<L, true, NONE>(sums, by, words, cells, out),
+        (true, COARSE) => of_cells::<L, true, COARSE>(sums, by, words, cells, out),
+        (true, _) => of_cells::<L, true, FINE>(sums, by, words, cells, out),
     }
 }
 
 #[inline(always)]
 fn of_cells<L: Lane, const WORDS: bool, const RESIDUAL: u8>(
     sums: &Half<L>,
-    write: &Write,
-    (bytes, words, nearest): (&Half<u8>, &Half<u16>, bool),
+    (scale, groups): (Scale, u16),
+    (bytes, words): (&Half<u8>, &Half<u16>),
     cells: &mut Cells<'_>,
     out: &mut Half<i8>,
 ) -> WriteCounts {
-    let scale = Scale::new(write, if WORDS { 16 } else { 8 }, nearest);
     let mut tally = [[0; LANES]; 3];
     let mut none = [0; 64];
-    for group in (0..HALF_CELLS / 64).filter(|group| write.groups >> group & 1 == 1) {
+    for group in (0..HALF_CELLS / 64).filter(|group| groups >> group & 1 == 1) {
         let sums = &sums.as_chunks::<64>().0[group];
         let (bytes, words) = (&bytes.as_chunks().0[group], &words.as_chunks().0[group]);
         let left = match &mut cells.residual {
@@ -318,7 +298,7 @@ fn of_cells<L: Lane, const WORDS: bool, const RESIDUAL: u8>(
         lanes::<L, WORDS, RESIDUAL>(sums, (bytes, words), left, out, scale, &mut tally);
     }
     if let Some(told) = &mut cells.pulses {
-        for group in (0..HALF_CELLS / 64).filter(|group| write.groups >> group & 1 == 1) {
+        for group in (0..HALF_CELLS / 64).filter(|group| groups >> group & 1 == 1) {
             told.take(group * 64, &out.as_chunks::<64>().0[group]);
         }
     }
@@ -367,11 +347,8 @@ fn lanes<L: Lane, const WORDS: bool, const RESIDUAL: u8>(
     (*left, *out) = (rest, given);
 }
 
-/// Cells that are looked at together.
-pub(super) const LANES: usize = 16;
-
 /// The sum of what lanes counted.
 #[inline(always)]
 pub(super) fn total(lanes: &[u32; LANES]) -> u64 {
-    lanes.iter().fold(0, |sum, lane| sum + lane).into()
+    lanes.iter().sum::<u32>().into()
 }

@@ -15,7 +15,9 @@
 use std::ops::Range;
 
 use super::ops::Ops;
-use super::{Conversion, Draws, Drives, Extremes, Half, LookUp, Peaks, conv, levels, pulses, sums};
+use super::{
+    Conversion, Draws, Drives, Extremes, Half, LookUp, Peaks, Rails, conv, levels, pulses, sums,
+};
 use crate::chip::crossbar::layout::{
     BLOCK_CELLS, BLOCK_ROWS, HALF_CELLS, HALF_COLUMNS, Layout, PANEL_COLUMNS, in_half,
 };
@@ -34,7 +36,7 @@ pub(super) const OPS: Ops = Ops {
     turn,
     read_columns,
     accumulate: sums::accumulate,
-    accumulate_drawn: |_, _, _, _, _, _| false,
+    accumulate_drawn: None,
     dither,
     dither_words,
     loud: pulses::loud,
@@ -68,8 +70,8 @@ pub(super) fn convert(
     conversion: Conversion,
     live: usize,
     codes: &mut [i16],
-) -> [u64; 2] {
-    let mut saturated = [0; 2];
+) -> Rails {
+    let mut rails = Rails::default();
     for (at, code) in codes.iter_mut().enumerate() {
         if at % PANEL_COLUMNS >= live {
             continue;
@@ -78,9 +80,12 @@ pub(super) fn convert(
         let max = i64::from(conversion.max);
         let steps = [bank(0), bank(1)];
         *code += (steps[0].min(max) - steps[1].min(max)) as i16;
-        saturated.iter_mut().zip(steps).for_each(|(count, steps)| *count += u64::from(steps > max));
+        for (count, steps) in rails.saturated.iter_mut().zip(steps) {
+            *count += u64::from(steps > max);
+            rails.reached += u64::from(steps >= max);
+        }
     }
-    saturated
+    rails
 }
 
 pub(super) fn look_up(

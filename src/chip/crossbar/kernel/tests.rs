@@ -9,6 +9,7 @@ use crate::chip::crossbar::layout::{HALF_CELLS, HALF_COLUMNS, in_half};
 use crate::num::draw::{BLOCK_BYTES, Place, Site};
 
 mod reads;
+mod steps;
 
 /// Bytes from a seed, or only the greatest when the seed says so.
 fn bytes(seed: u64, len: usize) -> Vec<u8> {
@@ -198,10 +199,10 @@ struct State {
 }
 
 /// The state after a write. `wide` levels have a high byte; with `absorbs` the floor keeps cells.
-fn programmed(
+fn programmed<'a>(
     kernel: &Kernel,
     mut state: State,
-    sums: &Half<i32>,
+    sums: impl Into<Sums<'a>>,
     write: &Write,
     dither: Dither<'_>,
     [wide, absorbs]: [bool; 2],

@@ -8,9 +8,9 @@
 
 use std::ops::Range;
 
-use super::super::{Operation, Phase, Recorded, Side, Write};
+use super::super::{Operation, Phase, Recorded, Side, Write, Written};
 use super::tile::{BankEvents, Command, Tile, TileEvents};
-use crate::chip::hardware::{Hardware, Timing};
+use crate::chip::hardware::{Adc, AdcRange, Hardware, Timing};
 use crate::chip::layer::Layer;
 use crate::chip::ledger::{Cycles, During, Event, Interval, Ledger, Part};
 use crate::chip::population::Stream;
@@ -32,6 +32,8 @@ pub struct Network {
     timing: Timing,
     layers: Vec<TickLayer>,
     unit: Unit,
+    /// Samples written one by one since ranges were looked at; `None` where converters do not track.
+    unlooked: Option<u64>,
     samples: usize,
     phase: Phase,
     ledgers: [Ledger; 3],
@@ -58,6 +60,7 @@ impl Network {
     #[must_use]
     pub fn new(hardware: &Hardware, seed: u64, layers: &[Layer], slots: usize) -> Self {
         let timing = hardware.timing.expect("time is counted on hardware that has it");
+        let tracks = matches!(hardware.adc, Adc::Finite { range: AdcRange::Tracking, .. });
         let ledger = Ledger::with_cycles(layers.len());
         let layers =
             layers.iter().map(|layer| TickLayer::new(hardware, timing, seed, layer, slots));
@@ -65,6 +68,7 @@ impl Network {
             timing,
             layers: layers.collect(),
             unit: Unit::new(hardware),
+            unlooked: tracks.then_some(0),
             samples: 0,
             phase: Phase::Training,
             ledgers: [ledger.clone(), ledger.clone(), ledger],
@@ -81,7 +85,29 @@ impl Network {
 
     /// Takes over converter shifts.
     pub fn set_adc_shifts(&mut self, layers: &[Layer]) {
-        self.layers.iter_mut().zip(layers).for_each(|(tick, layer)| tick.set_adc_shifts(layer));
+        let layers = self.layers.iter_mut().zip(layers);
+        layers.for_each(|(tick, layer)| tick.set_adc_shifts(&layer.adc_shifts));
+    }
+
+    /// Converter shifts of a layer, by target stream and slice.
+    #[must_use]
+    pub fn adc_shifts(&self, layer: usize) -> &[Vec<u32>] {
+        &self.layers[layer].adc_shifts
+    }
+
+    /// Takes over how many samples were written one by one since ranges were looked at.
+    pub fn set_unlooked(&mut self, unlooked: u64) {
+        self.unlooked = self.unlooked.map(|_| unlooked);
+    }
+
+    /// Writes are done: where converters track, ranges are looked at after those of a batch, or of 64 samples.
+    pub fn written(&mut self, written: Written) {
+        let Some(unlooked) = &mut self.unlooked else { return };
+        *unlooked += u64::from(written == Written::Sample);
+        if written == Written::Batch || *unlooked == 64 {
+            *unlooked = 0;
+            self.layers.iter_mut().for_each(TickLayer::look);
+        }
     }
 
     /// Charges what follows to `phase`.
@@ -164,12 +190,14 @@ impl Network {
 
     /// Plays what an engine has recorded.
     pub fn play_tape(&mut self, tape: &[Recorded]) {
-        let error_unit = |recorded: &Recorded| matches!(recorded, Recorded::Words { .. });
-        for stretch in tape.split_inclusive(error_unit) {
+        let between = |recorded: &Recorded| recorded.operation().is_none();
+        for stretch in tape.split_inclusive(between) {
             let operations: Vec<_> = stretch.iter().filter_map(Recorded::operation).collect();
             self.run(&operations);
-            if let Some(Recorded::Words { errors }) = stretch.last() {
-                self.output_words(errors);
+            match stretch.last() {
+                Some(Recorded::Words { errors }) => _ = self.output_words(errors),
+                Some(&Recorded::Written(written)) => self.written(written),
+                _ => {}
             }
         }
     }
@@ -260,7 +288,11 @@ impl Network {
                 }
             }
         }
-        layers.for_each(|layer| self.take_events(layer, During::ForwardRows, false));
+        let training = self.phase == Phase::Training;
+        for layer in layers {
+            self.take_events(layer, During::ForwardRows, false);
+            self.layers[layer].take_rails(training);
+        }
     }
 
     /// A sample's activities become drives of the next layer, or outputs.

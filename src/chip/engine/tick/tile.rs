@@ -164,6 +164,8 @@ pub struct Tile {
     upd: Upd,
     bank_events: [BankEvents; 2],
     events: TileEvents,
+    /// Codes of reads through the rows, by slice: on the rail, all.
+    rails: Vec<[u64; 2]>,
     launched: Option<(Launch, Way)>,
     /// By bank: which rows and columns fire in the slot that ends in this cycle.
     firing: [(Vec<bool>, Vec<bool>); 2],
@@ -216,6 +218,7 @@ impl Tile {
             upd: Upd::default(),
             bank_events: Default::default(),
             events: TileEvents::default(),
+            rails: vec![[0; 2]; config.slices as usize],
             launched: None,
             firing: Default::default(),
             trained: [vec![false; cells], vec![false; cells]],

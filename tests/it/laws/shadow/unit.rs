@@ -43,6 +43,33 @@ impl Shadow {
         words
     }
 
+    /// Writes of a batch, or of so many single samples, are done: converters that track are looked at.
+    pub(crate) fn written(&mut self, samples: Option<u32>) {
+        let Some(samples) = samples else { return self.look() };
+        for _ in 0..samples {
+            self.unlooked += 1;
+            if self.unlooked == 64 {
+                self.look();
+            }
+        }
+    }
+
+    fn look(&mut self) {
+        self.unlooked = 0;
+        let stays = self.is(Fault::ShiftStays);
+        let kept = self.is(Fault::RailsAreKept);
+        for layer in &mut self.layers {
+            for (t, rails) in layer.rails.iter_mut().enumerate() {
+                for (s, counts) in rails.iter_mut().enumerate() {
+                    let [on_rail, codes] = *counts;
+                    let grows = on_rail as f64 > codes as f64 / 64.0;
+                    layer.adc_shifts[t][s] += u32::from(grows && !stays);
+                    *counts = if kept { *counts } else { [0; 2] };
+                }
+            }
+        }
+    }
+
     /// What some samples put on a layer's bus.
     pub(super) fn layer_words(
         &mut self,

@@ -47,6 +47,8 @@ macro_rules! convert {
             "vpackusdw zmm0, zmm0, zmm1\n",
             "vpcmpuw k1, zmm0, zmm18, 6\n",
             "vpsubw zmm20 {{k1}}, zmm20, zmm19\n",
+            "vpcmpuw k2, zmm0, zmm18, 5\n",
+            "vpsubw zmm21 {{k2}}, zmm21, zmm19\n",
             "vpminuw zmm0, zmm0, zmm18\n",
             "vmovdqa64 zmm1, [{packed} + {i}]\n",
             $combine,
@@ -74,7 +76,7 @@ macro_rules! convert_some {
 /// Multiplies 32 samples by 32 columns into `now`; converts `before` between the products. `$combine` adds to or takes
 /// from codes.
 macro_rules! converting {
-    ($name:ident, $combine:literal, $counts:literal) => {
+    ($name:ident, $combine:literal, $saturated:literal, $reached:literal) => {
         pub(super) fn $name(
             _: &Tiles,
             tile: TileBank<'_>,
@@ -106,7 +108,8 @@ macro_rules! converting {
                     "vpbroadcastd zmm17, dword ptr [{count} + 4]",
                     "vpbroadcastw zmm18, word ptr [{count} + 8]",
                     "vpternlogd zmm19, zmm19, zmm19, 255",
-                    concat!("vmovdqa64 zmm20, [{packed} + ", $counts, "]"),
+                    concat!("vmovdqa64 zmm20, [{packed} + ", $saturated, "]"),
+                    concat!("vmovdqa64 zmm21, [{packed} + ", $reached, "]"),
                     "2:",
                     "tileloadd tmm4, [{a} + {row}]",
                     "tileloadd tmm6, [{b} + {row}]",
@@ -146,7 +149,8 @@ macro_rules! converting {
                     "cmp {i}, {codes}",
                     "jb 6b",
                     "7:",
-                    concat!("vmovdqa64 [{packed} + ", $counts, "], zmm20"),
+                    concat!("vmovdqa64 [{packed} + ", $saturated, "], zmm20"),
+                    concat!("vmovdqa64 [{packed} + ", $reached, "], zmm21"),
                     "tilestored [{c} + {row} * 2], tmm0",
                     "tilestored [{c} + {row} * 2 + 64], tmm1",
                     "tilestored [{c} + {row} * 2 + 2048], tmm2",
@@ -167,7 +171,8 @@ macro_rules! converting {
                     before = in(reg) before.as_ptr(),
                     packed = in(reg) std::ptr::from_mut(packed),
                     out("zmm0") _, out("zmm1") _, out("zmm16") _, out("zmm17") _,
-                    out("zmm18") _, out("zmm19") _, out("zmm20") _, out("k1") _,
+                    out("zmm18") _, out("zmm19") _, out("zmm20") _, out("zmm21") _,
+                    out("k1") _, out("k2") _,
                     out("tmm0") _, out("tmm1") _, out("tmm2") _, out("tmm3") _,
                     out("tmm4") _, out("tmm5") _, out("tmm6") _, out("tmm7") _,
                     options(nostack),
@@ -177,5 +182,5 @@ macro_rules! converting {
     };
 }
 
-converting!(converting_excitation, "vpaddw", "2048");
-converting!(converting_inhibition, "vpsubw", "2112");
+converting!(converting_excitation, "vpaddw", "2048", "2176");
+converting!(converting_inhibition, "vpsubw", "2112", "2240");

@@ -15,7 +15,7 @@ use std::arch::x86_64::*;
 
 use super::{load, load_sums, store, total};
 use crate::chip::crossbar::kernel::pulses::HALVES;
-use crate::chip::crossbar::kernel::{Cells, Dither, Half, Write, WriteCounts};
+use crate::chip::crossbar::kernel::{Cells, Dither, Half, Sums, Write, WriteCounts};
 
 /// The shifts and the factor of a write, in 32-bit lanes.
 #[derive(Clone, Copy)]
@@ -98,6 +98,28 @@ fn rounded(sums: &[i32; 8], word: __m256i, scale: Scale) -> __m256i {
 #[target_feature(enable = "avx2,popcnt")]
 fn zeros(v: __m256i) -> u32 {
     _mm256_movemask_epi8(_mm256_cmpeq_epi8(v, _mm256_setzero_si256())).count_ones()
+}
+
+/// Loud groups of sums. Compilers make a loop of the twin that is slower, and it is asked of most half blocks.
+#[target_feature(enable = "avx2,popcnt")]
+pub(super) fn loud(sums: Sums<'_>, write: &Write, bits: u32) -> u16 {
+    let Sums::Narrow(sums) = sums else { return super::loud(sums, write, bits) };
+    let by = write.shift.saturating_sub(write.residual_bits).saturating_sub(bits);
+    // half of 2^31 beside the greatest sum wraps, and has the top bit as one that is too small
+    let half = _mm256_set1_epi32((1u32 << by >> 1).cast_signed());
+    // all bits of a loud sum that a quiet one does not have
+    let beyond = _mm256_set1_epi32((u32::MAX << by).cast_signed());
+    let mantissa = _mm256_set1_epi32(if write.negate { -write.mantissa } else { write.mantissa });
+    let mut loud = 0;
+    for (group, sums) in sums.as_chunks::<64>().0.iter().enumerate() {
+        let mut any = _mm256_setzero_si256();
+        for sums in sums.as_chunks::<8>().0 {
+            let v = _mm256_mullo_epi32(load_sums(sums), mantissa);
+            any = _mm256_or_si256(any, _mm256_add_epi32(v, half));
+        }
+        loud |= u16::from(_mm256_testz_si256(any, beyond) == 0) << group;
+    }
+    loud
 }
 
 #[target_feature(enable = "avx2,popcnt")]

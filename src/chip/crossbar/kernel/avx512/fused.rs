@@ -107,6 +107,7 @@ pub(super) fn fused(
 const MERGED: [u8; 16] = [0, 8, 1, 9, 2, 10, 3, 11, 4, 12, 5, 13, 6, 14, 7, 15];
 
 /// The upper bytes of two 16-bit sums are taken at once.
+#[inline]
 #[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi,popcnt")]
 fn programmed<const SCALE: u8, const KIND: u8>(
     cells: &mut Cells<'_>,

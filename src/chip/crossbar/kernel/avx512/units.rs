@@ -14,7 +14,7 @@ use std::arch::x86_64::*;
 
 use super::load_sums;
 use super::turn::interleave;
-use crate::chip::crossbar::kernel::{Conversion, LookUp, Packed, Scratch, scalar};
+use crate::chip::crossbar::kernel::{Conversion, LookUp, Packed, Rails, Scratch, scalar};
 use crate::chip::crossbar::layout::{BLOCK_ROWS, PANEL_COLUMNS};
 use crate::num::fixed::ErrorBits;
 
@@ -33,7 +33,7 @@ pub(super) fn convert(
     conversion: Conversion,
     live: usize,
     codes: &mut [i16],
-) -> [u64; 2] {
+) -> Rails {
     if live == PANEL_COLUMNS {
         converted::<true>(currents, conversion, u32::MAX, codes)
     } else {
@@ -48,34 +48,40 @@ fn converted<const ALL: bool>(
     conversion: Conversion,
     alive: u32,
     codes: &mut [i16],
-) -> [u64; 2] {
+) -> Rails {
     let half = _mm512_set1_epi32(1 << conversion.shift >> 1);
     let shift = _mm512_set1_epi32(conversion.shift.cast_signed());
     let max = _mm512_set1_epi16(conversion.max.cast_signed());
     // packing leaves quarters of 8 bytes in the order 0 4 1 5 2 6 3 7
     let order = _mm512_setr_epi64(0, 2, 4, 6, 1, 3, 5, 7);
-    // saturated conversions by lane, counted downward: at most 32 rows
+    // conversions by lane, counted downward: at most 32 rows of two banks
     let mut saturated = [_mm512_setzero_si512(); 2];
+    let mut reached = _mm512_setzero_si512();
     let rows = e.as_chunks::<PANEL_COLUMNS>().0.iter().zip(i.as_chunks::<PANEL_COLUMNS>().0);
     for (codes, (e, i)) in codes.as_chunks_mut::<PANEL_COLUMNS>().0.iter_mut().zip(rows) {
         let banks = [steps(e, half, shift), steps(i, half, shift)];
         for (saturated, steps) in saturated.iter_mut().zip(banks) {
-            let above = if ALL {
-                _mm512_cmpgt_epu16_mask(steps, max)
+            let (above, at) = if ALL {
+                (_mm512_cmpgt_epu16_mask(steps, max), _mm512_cmpge_epu16_mask(steps, max))
             } else {
-                _mm512_mask_cmpgt_epu16_mask(alive, steps, max)
+                (
+                    _mm512_mask_cmpgt_epu16_mask(alive, steps, max),
+                    _mm512_mask_cmpge_epu16_mask(alive, steps, max),
+                )
             };
             *saturated = _mm512_mask_sub_epi16(*saturated, above, *saturated, _mm512_set1_epi16(1));
+            reached = _mm512_mask_sub_epi16(reached, at, reached, _mm512_set1_epi16(1));
         }
         let [e, i] = banks.map(|steps| _mm512_min_epu16(steps, max));
         let d = if ALL { _mm512_sub_epi16(e, i) } else { _mm512_maskz_sub_epi16(alive, e, i) };
         add_codes(codes, _mm512_permutexvar_epi64(order, d));
     }
-    saturated.map(|lanes| {
+    let sum = |lanes| {
         // pairs of 16-bit counts add up to 32 bits
         let pairs = _mm512_madd_epi16(lanes, _mm512_set1_epi16(-1));
         u64::from(_mm512_reduce_add_epi32(pairs).cast_unsigned())
-    })
+    };
+    Rails { saturated: saturated.map(sum), reached: sum(reached) }
 }
 
 /// Converts the last inhibitory sums and adds packed codes to `codes`, in order. Returns saturated conversions.
@@ -86,29 +92,34 @@ pub(in crate::chip::crossbar::kernel) fn settle(
     live: usize,
     packed: &mut Packed,
     codes: &mut [i16; Scratch::SUMS],
-) -> [u64; 2] {
+) -> Rails {
     let half = _mm512_set1_epi32(1 << conversion.shift >> 1);
     let shift = _mm512_set1_epi32(conversion.shift.cast_signed());
     let max = _mm512_set1_epi16(conversion.max.cast_signed());
     let order = _mm512_setr_epi64(0, 2, 4, 6, 1, 3, 5, 7);
     let alive = packed_mask(u32::try_from((1u64 << live) - 1).expect("at most 32 columns"));
     let mut saturated = load_words(&packed.saturated[1]);
+    let mut reached = load_words(&packed.reached[1]);
     let rows = codes.as_chunks_mut::<PANEL_COLUMNS>().0.iter_mut();
     let rows = rows.zip(packed.codes.as_chunks::<PANEL_COLUMNS>().0);
     for ((codes, packed), last) in rows.zip(last.as_chunks::<PANEL_COLUMNS>().0) {
         let i = steps(last, half, shift);
         let above = _mm512_cmpgt_epu16_mask(i, max);
         saturated = _mm512_mask_add_epi16(saturated, above, saturated, _mm512_set1_epi16(1));
+        let at = _mm512_cmpge_epu16_mask(i, max);
+        reached = _mm512_mask_add_epi16(reached, at, reached, _mm512_set1_epi16(1));
         let d = _mm512_sub_epi16(load_words(packed), _mm512_min_epu16(i, max));
         let d = _mm512_maskz_mov_epi16(alive, d);
         add_codes(codes, _mm512_permutexvar_epi64(order, d));
     }
-    [load_words(&packed.saturated[0]), saturated].map(|lanes| {
+    let sum = |lanes| {
         let lanes = _mm512_maskz_mov_epi16(alive, lanes);
         // pairs of 16-bit counts add up to 32 bits
         let pairs = _mm512_madd_epi16(lanes, _mm512_set1_epi16(1));
         u64::from(_mm512_reduce_add_epi32(pairs).cast_unsigned())
-    })
+    };
+    let saturated = [load_words(&packed.saturated[0]), saturated].map(sum);
+    Rails { saturated, reached: sum(load_words(&packed.reached[0])) + sum(reached) }
 }
 
 #[inline]

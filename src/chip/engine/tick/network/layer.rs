@@ -41,6 +41,9 @@ pub(super) struct TickLayer {
     /// Accumulator and activity by target stream and sample, of what was read last.
     pub(super) outputs: [Vec<(i64, u8)>; 2],
     pub(super) backward: Vec<i64>,
+    /// Converter shifts, and codes on the rail and all codes since they were looked at, by target stream and slice.
+    pub(super) adc_shifts: Vec<Vec<u32>>,
+    pub(super) rails: Vec<Vec<[u64; 2]>>,
     index: u16,
     wiring: Wiring,
     planes: Vec<(Stream, [usize; 2])>,
@@ -87,6 +90,8 @@ impl TickLayer {
             },
             outputs: [vec![(0, 0); slots * columns], vec![(0, 0); slots * columns]],
             backward: vec![],
+            adc_shifts: layer.adc_shifts.clone(),
+            rails: layer.rails.clone(),
             index: layer.index,
             wiring,
             planes: wiring.planes().collect(),
@@ -225,14 +230,41 @@ impl TickLayer {
         self.codes(self.heads(target))[0]
     }
 
-    pub(super) fn set_adc_shifts(&mut self, layer: &Layer) {
+    pub(super) fn set_adc_shifts(&mut self, adc_shifts: &[Vec<u32>]) {
+        self.adc_shifts = adc_shifts.to_vec();
         let each = self.grid[0] * self.grid[1];
         for (tile, tick) in self.tiles.iter_mut().enumerate() {
             let (target, _) = self.planes[tile / each];
-            if let Some(shifts) = layer.adc_shifts.get(target.index()) {
+            if let Some(shifts) = adc_shifts.get(target.index()) {
                 tick.set_adc_shifts(shifts);
             }
         }
+    }
+
+    /// Takes the codes that tiles have seen; they count where `counted` says so and converters track.
+    pub(super) fn take_rails(&mut self, counted: bool) {
+        for tile in 0..self.tiles.len() {
+            let (target, _) = self.planes[self.plane(tile)];
+            let seen = self.tiles[tile].take_rails();
+            if let Some(rails) = self.rails.get_mut(target.index()).filter(|_| counted) {
+                let both = rails.iter_mut().flatten().zip(seen.into_iter().flatten());
+                both.for_each(|(sum, more)| *sum += more);
+            }
+        }
+    }
+
+    /// Ranges are looked at: a slice of which more than one code in 64 lay on the rail takes a greater step.
+    pub(super) fn look(&mut self) {
+        let mut adc_shifts = self.adc_shifts.clone();
+        for (shifts, rails) in adc_shifts.iter_mut().zip(&mut self.rails) {
+            for (shift, [on_rail, codes]) in shifts.iter_mut().zip(rails) {
+                if 64 * *on_rail > *codes {
+                    *shift += 1;
+                }
+                (*on_rail, *codes) = (0, 0);
+            }
+        }
+        self.set_adc_shifts(&adc_shifts);
     }
 
     /// Loads a row of an array; the code of its pathway.

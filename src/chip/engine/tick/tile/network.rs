@@ -117,6 +117,12 @@ impl Tile {
         ]
     }
 
+    /// Codes on the rail and all codes since the last call, by slice, of reads through the rows.
+    pub(in super::super) fn take_rails(&mut self) -> Vec<[u64; 2]> {
+        let none = vec![[0; 2]; self.rails.len()];
+        std::mem::replace(&mut self.rails, none)
+    }
+
     /// Counts since the last call.
     pub(in super::super) fn take_events(&mut self) -> ([BankEvents; 2], TileEvents) {
         (std::mem::take(&mut self.bank_events), std::mem::take(&mut self.events))

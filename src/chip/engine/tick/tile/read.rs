@@ -167,20 +167,30 @@ impl Tile {
             let bits = AdcBits::new(i64::from(bits)).expect("2..=16 bits");
             Converter::new(bits, subtract, shift)
         };
+        let mut rails = [0; 2];
+        let mut note = |converter: Converter, code| {
+            rails[0] += u64::from(converter.is_rail(code));
+            rails[1] += 1;
+        };
         let (d, shift, saturated, each) = match adc {
             TileAdc::Ideal => (e - i, weight, [false; 2], true),
             TileAdc::Digital { bits, shift } => {
                 let ash = shift_of(shift);
                 let converter = converter(bits, Subtract::Digital, ash);
                 let (e, i) = (converter.convert(e), converter.convert(i));
+                [e, i].into_iter().for_each(|(code, _)| note(converter, code));
                 (e.0 - i.0, ash + weight, [e.1, i.1], true)
             }
             TileAdc::Current { bits, shift } => {
                 let ash = shift_of(shift);
-                let (d, saturated) = converter(bits, Subtract::Current, ash).convert(e - i);
+                let converter = converter(bits, Subtract::Current, ash);
+                let (d, saturated) = converter.convert(e - i);
+                note(converter, d);
                 (d, ash + weight, [saturated, false], false)
             }
         };
+        let counted = self.rails[slice as usize].iter_mut().zip(rails);
+        counted.for_each(|(count, more)| *count += more);
         let before = if self.conv.slice == 0 { 0 } else { lines.acc[line] };
         let negative = way == Way::Columns && self.conv.slice >= self.config.slices;
         let d = if negative { -d } else { d };
