@@ -165,17 +165,36 @@ pub(super) fn difference<T: Serialize>(kept: &Value, found: &T) -> Option<Differ
     differs("", kept, &serde_json::to_value(found).expect("records have a JSON form"))
 }
 
+/// Tables of counts by name. A name that such a table does not have was counted 0 times: there a missing one is wrong
+/// unless nothing was counted.
+const COUNTS: [&str; 6] = ["events", "cycles", "training", "stages", "busy", "used"];
+
+/// Whether a count, or every count of a table, is 0.
+fn is_nothing(value: &Value) -> bool {
+    match value {
+        Value::Null => true,
+        Value::Number(number) => number.as_u64() == Some(0),
+        Value::Object(map) => map.values().all(is_nothing),
+        _ => false,
+    }
+}
+
 fn differs(place: &str, kept: &Value, found: &Value) -> Option<Difference> {
     let inside =
         |name: &str| if place.is_empty() { name.into() } else { format!("{place}.{name}") };
     let nothing = Value::String("nothing".into());
     match (kept, found) {
         (Value::Object(kept), Value::Object(found)) => {
-            let pairs = kept.iter().map(|(name, kept)| (name, kept, found.get(name)));
+            let counted = place.split('.').any(|part| COUNTS.contains(&part));
+            let lost = found
+                .iter()
+                .filter(|(name, value)| counted && !kept.contains_key(*name) && !is_nothing(value));
+            let lost = lost.map(|(name, value)| (name, &nothing, value));
+            let pairs =
+                kept.iter().map(|(name, kept)| (name, kept, found.get(name).unwrap_or(&nothing)));
             pairs
-                .filter_map(|(name, kept, found)| {
-                    differs(&inside(name), kept, found.unwrap_or(&nothing))
-                })
+                .chain(lost)
+                .filter_map(|(name, kept, found)| differs(&inside(name), kept, found))
                 .next()
         }
         (Value::Array(kept), Value::Array(found)) if kept.len() == found.len() => {
@@ -204,6 +223,11 @@ mod tests {
         let wanted = |place: &str, kept: &str, found: &str| {
             Some((place.to_owned(), kept.to_owned(), found.to_owned()))
         };
+        let counts = |line: Value| json!({"cycles": line});
+        let kept_counts = counts(json!({"training": 5}));
+        let more = |line| difference(&kept_counts, &counts(line)).map(|d| d.place);
+        assert_eq!(more(json!({"training": 5, "evaluation": 0})), None);
+        assert_eq!(more(json!({"training": 5, "x": 3})), Some("cycles.x".to_owned()));
         assert_eq!(place(&json!({"a": 2, "b": {"c": [1, null]}})), wanted("a", "1", "2"));
         assert_eq!(place(&json!({"a": 1, "b": {"c": [1, 0]}})), wanted("b.c.1", "null", "0"));
         assert_eq!(place(&json!({"b": {"c": [1, null]}})), wanted("a", "1", "\"nothing\""));

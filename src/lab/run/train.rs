@@ -116,7 +116,7 @@ pub fn resume(
 /// Carries a run out in a folder that the caller holds: new, or from where it was left. A damaged state is thrown away.
 ///
 /// # Errors
-/// When something does not fit, the disk refuses, the run is finished, or the caller stops it.
+/// When something does not fit, the disk refuses, or the caller stops it.
 pub fn carry_on(
     config: &Config,
     loaded: &Loaded,
@@ -132,10 +132,9 @@ pub fn carry_on(
     let mut run = Run::new(config, text, folder, machine, about, session()?);
     run.keeping = keeping;
     if begun {
-        match run.restore() {
-            Ok(()) => {}
-            Err(error @ RunError::Finished { .. }) => return Err(error),
-            Err(_) => run.start_over(session()?),
+        // what cannot be gone on from, or was finished and cannot be read, is done again
+        if run.restore().is_err() {
+            run.start_over(session()?);
         }
     } else {
         run.folder.write(names::CONFIG, run.text.as_bytes())?;
