@@ -96,10 +96,10 @@ pub mod network {
 #[cfg(feature = "lab")]
 pub use crate::lab::{
     config::{Config, ConfigError, Sources},
-    data::{DataError, DataRoot, Loaded as Data},
+    data::{Data, DataError, DataRoot},
     run::{
-        Event as RunEvent, Keeping, Machine, Outcome as Trained, Progress, RunError, Session,
-        Verdict, evaluate, resume, train, verify,
+        Keeping, Machine, Progress, RunError, RunEvent, Session, Trained, Verdict, evaluate,
+        resume, train, verify,
     },
     store::{
         ARITHMETIC,

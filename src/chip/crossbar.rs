@@ -52,7 +52,7 @@ pub struct StripMut<'a> {
 }
 
 /// A half block of a byte plane.
-struct Part<'a> {
+struct HalfPart<'a> {
     /// Place of the byte in a level.
     shift: u32,
     /// First row and column.
@@ -121,7 +121,7 @@ impl Crossbar {
     pub fn levels(&self) -> impl Iterator<Item = u16> + use<> {
         let Layout { rows, columns } = self.layout;
         let mut levels = vec![0; rows * columns];
-        for Part { shift, row, column, live, cells } in self.parts() {
+        for HalfPart { shift, row, column, live, cells } in self.parts() {
             for (group, cells) in cells.as_chunks::<64>().0.iter().enumerate() {
                 for r in 0..rows.saturating_sub(row + group * 4).min(4) {
                     let to = &mut levels[(row + group * 4 + r) * columns + column..][..live];
@@ -137,7 +137,7 @@ impl Crossbar {
     #[must_use]
     pub fn row_sums(&self) -> Vec<i64> {
         let mut sums = vec![0; self.layout.rows_padded()];
-        for Part { shift, row, live, cells, .. } in self.parts() {
+        for HalfPart { shift, row, live, cells, .. } in self.parts() {
             for (group, cells) in cells.as_chunks::<64>().0.iter().enumerate() {
                 let mut rows = [0u16; 4];
                 for cells in &cells.as_chunks::<4>().0[..live] {
@@ -151,7 +151,7 @@ impl Crossbar {
     }
 
     /// Half blocks of both byte planes.
-    fn parts(&self) -> impl Iterator<Item = Part<'_>> {
+    fn parts(&self) -> impl Iterator<Item = HalfPart<'_>> {
         let planes = [(Some(&self.low), 0), (self.high.as_ref(), 8)];
         let planes = planes.into_iter().filter_map(|(plane, shift)| Some((plane?, shift)));
         let (blocks, columns) = (self.layout.blocks(), self.layout.columns);
@@ -160,7 +160,7 @@ impl Crossbar {
                 let column = at / 2 / blocks * PANEL_COLUMNS + at % 2 * HALF_COLUMNS;
                 let live = columns.saturating_sub(column).min(HALF_COLUMNS);
                 let row = at / 2 % blocks * BLOCK_ROWS;
-                (live > 0).then_some(Part { shift, row, column, live, cells })
+                (live > 0).then_some(HalfPart { shift, row, column, live, cells })
             })
         })
     }

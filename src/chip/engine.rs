@@ -52,7 +52,7 @@ use schedule::Schedule;
 pub use calibrate::Calibration;
 pub use pulses::{Pulses, TilePeaks, active};
 pub use tape::Recorded;
-pub use track::Written;
+pub use track::WritesDone;
 pub use unit::{Centre, ErrorUnit};
 
 /// Which side of a crossbar is driven.
@@ -413,11 +413,6 @@ impl Engine {
     #[must_use]
     pub const fn samples_loaded(&self, phase: Phase) -> u64 {
         self.loaded[phase as usize]
-    }
-
-    /// Restores how many samples were loaded in a phase.
-    pub const fn set_samples_loaded(&mut self, phase: Phase, samples: u64) {
-        self.loaded[phase as usize] = samples;
     }
 
     /// Bank currents by layer since the last call, and starts over.

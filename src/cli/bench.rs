@@ -77,7 +77,7 @@ impl Section {
         }
     }
 
-    fn measure(self, plan: &Plan) -> Vec<table::Table> {
+    fn measure(self, plan: &BenchPlan) -> Vec<table::BenchTable> {
         match self {
             Self::Peak => peak::measure(plan),
             Self::Read => read::measure(plan),
@@ -90,7 +90,7 @@ impl Section {
 }
 
 /// What to measure, and how long.
-struct Plan {
+struct BenchPlan {
     /// Back ends of `peak` and `read`, slowest first.
     backends: Vec<Backend>,
     /// Back end of everything else.
@@ -100,7 +100,7 @@ struct Plan {
     data: DataRoot,
 }
 
-impl Plan {
+impl BenchPlan {
     /// Seconds of a race that would take `seconds` in a full bench.
     fn seconds(&self, seconds: f64) -> f64 {
         if self.quick { seconds / 15.0 } else { seconds }
@@ -121,7 +121,7 @@ pub(super) fn execute(args: &BenchArgs) -> Done {
         }
     };
     let data = data_root(args.data_dir.clone());
-    let plan = Plan { backends, best, quick: args.quick, threads: args.threads, data };
+    let plan = BenchPlan { backends, best, quick: args.quick, threads: args.threads, data };
     let (brand, features) = (machine::brand(), machine::features());
     let names: Vec<&str> = Backend::available().into_iter().map(Backend::name).collect();
     if args.json {

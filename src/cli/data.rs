@@ -7,7 +7,7 @@ use clap::Subcommand;
 use serde_json::json;
 
 use super::{Done, data_root, say, usage};
-use crate::lab::data::{self, FetchEvent, Origin, State};
+use crate::lab::data::{self, FetchEvent, Origin, SetState};
 
 #[derive(Debug, Subcommand)]
 pub(super) enum DataCommand {
@@ -52,10 +52,10 @@ fn list(data_dir: Option<PathBuf>, json: bool) {
     let root = data_root(data_dir);
     for entry in data::list(&root) {
         let state = match &entry.state {
-            State::BuiltIn => "built in".to_owned(),
-            State::Present => "here".to_owned(),
-            State::Missing => "missing".to_owned(),
-            State::Damaged(why) => format!("damaged: {why}"),
+            SetState::BuiltIn => "built in".to_owned(),
+            SetState::Present => "here".to_owned(),
+            SetState::Missing => "missing".to_owned(),
+            SetState::Damaged(why) => format!("damaged: {why}"),
         };
         let [train, test] = entry.examples;
         if json {

@@ -5,7 +5,7 @@ use serde_json::json;
 
 use super::{Done, Failure, say, usage};
 use crate::chip::hardware::{Adc, AdcRange, Hardware, PulseCode, Subtract, Timing};
-use crate::lab::config::{self, Config, Constant, Sources, Table, builtin_models, load_model};
+use crate::lab::config::{self, Config, Constant, CostTable, Sources, builtin_models, load_model};
 use crate::lab::price::{bounds, figures, peak, prefixed};
 
 /// Error words that `hw show` reckons with: those of ten classes.
@@ -100,9 +100,9 @@ fn show(name: &str, settings: &[String]) -> Done {
         }
     }
     for (table, heading, unit) in [
-        (Table::Energy, "Joules an event, typical (low to high):", "J"),
-        (Table::Power, "Watts, typical (low to high):", "W"),
-        (Table::Area, "Areas, typical (low to high):", "m2"),
+        (CostTable::Energy, "Joules an event, typical (low to high):", "J"),
+        (CostTable::Power, "Watts, typical (low to high):", "W"),
+        (CostTable::Area, "Areas, typical (low to high):", "m2"),
     ] {
         let constants: Vec<_> =
             config.constants.iter().filter(|c| c.quantity.table == table).collect();

@@ -9,7 +9,7 @@ use serde_json::json;
 
 use super::progress::Meter;
 use super::{Done, Failure, Shared, configuration, environment, say, usage};
-use crate::lab::run::{self, Event, Machine, Outcome, RunError, Verdict};
+use crate::lab::run::{self, Machine, RunError, RunEvent, Trained, Verdict};
 use crate::lab::store::index::{INDEX, Store};
 use crate::lab::store::record::{TestOutcome, TestRecord};
 use crate::lab::sweep::{self, Sampled};
@@ -99,9 +99,9 @@ pub(super) fn train(args: &TrainArgs) -> Done {
     let (quiet, json) = (shared.quiet || shared.json, shared.json);
     let mut meter = Meter::new(quiet, 0);
     let mut folder = PathBuf::new();
-    let mut on_event = |event: Event<'_>| {
+    let mut on_event = |event: RunEvent<'_>| {
         match event {
-            Event::Started { folder: path, data, warnings, epoch, epochs } => {
+            RunEvent::Started { folder: path, data, warnings, epoch, epochs } => {
                 folder = path.into();
                 meter = Meter::new(quiet, epochs);
                 if json {
@@ -125,13 +125,13 @@ pub(super) fn train(args: &TrainArgs) -> Done {
                     }
                 }
             }
-            Event::Batch(progress) => meter.batch(progress),
-            Event::Warning(warning) if json => {
+            RunEvent::Batch(progress) => meter.batch(progress),
+            RunEvent::Warning(warning) if json => {
                 say(&json!({"event": "warning", "message": warning}).to_string());
             }
-            Event::Warning(warning) if quiet => eprintln!("warning: {warning}"),
-            Event::Warning(warning) => meter.line(&format!("warning: {warning}")),
-            Event::Epoch(record, seconds) => {
+            RunEvent::Warning(warning) if quiet => eprintln!("warning: {warning}"),
+            RunEvent::Warning(warning) => meter.line(&format!("warning: {warning}")),
+            RunEvent::Epoch(record, seconds) => {
                 meter.epoch(record, seconds);
                 if json {
                     say(&json!({"event": "epoch", "record": record, "train_seconds": seconds})
@@ -163,7 +163,7 @@ pub(super) fn train(args: &TrainArgs) -> Done {
     Ok(())
 }
 
-fn done(run: &str, outcome: &Outcome) -> serde_json::Value {
+fn done(run: &str, outcome: &Trained) -> serde_json::Value {
     let (receipt, seconds) = (&outcome.receipt, outcome.timing.train_seconds());
     let last = outcome.records.last();
     let images: u64 =

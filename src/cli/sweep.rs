@@ -12,7 +12,9 @@ use super::run::stop_flag;
 use super::{Done, Failure, Shared, environment, say};
 use crate::lab::run::{Keeping, Machine};
 use crate::lab::store::index::Store;
-use crate::lab::sweep::{self, Carried, Event, Options, Plan, Shard, Sweep, SweepError, Task};
+use crate::lab::sweep::{
+    self, Carried, Options, PlannedRun, Shard, Sweep, SweepError, SweepEvent, SweepPlan,
+};
 
 #[derive(Debug, Args)]
 pub(super) struct SweepArgs {
@@ -77,7 +79,7 @@ pub(super) fn execute(args: &SweepArgs) -> Done {
     let options =
         Options { backend: machine.backend(), jobs: machine.threads(), keeping, shard: args.shard };
     let meter = Mutex::new(SweepMeter::new(shared.quiet || shared.json));
-    let on_event = |event: Event<'_>| {
+    let on_event = |event: SweepEvent<'_>| {
         let mut meter = meter.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
         tell(&mut meter, &plan, &event);
         if shared.json {
@@ -120,7 +122,7 @@ pub(super) fn execute(args: &SweepArgs) -> Done {
 }
 
 /// What the sweep is, in a few lines.
-fn announce(shared: &Shared, plan: &Plan, path: &std::path::Path) {
+fn announce(shared: &Shared, plan: &SweepPlan, path: &std::path::Path) {
     let sweep = &plan.sweep;
     let refused = plan.points.iter().filter(|planned| planned.key.is_err()).count();
     if shared.json {
@@ -152,7 +154,7 @@ fn announce(shared: &Shared, plan: &Plan, path: &std::path::Path) {
 }
 
 /// `level-bits: 216 points = 12 level_bits x 2 rounding x 3 rule x 3 seeds, 216 runs`.
-fn describe(plan: &Plan) -> String {
+fn describe(plan: &SweepPlan) -> String {
     let sweep = &plan.sweep;
     let mut parts: Vec<String> = match sweep.sample {
         None => {
@@ -179,18 +181,18 @@ fn describe(plan: &Plan) -> String {
     )
 }
 
-fn dry_run(args: &SweepArgs, plan: &Plan, machine: Machine, path: &std::path::Path) -> Done {
+fn dry_run(args: &SweepArgs, plan: &SweepPlan, machine: Machine, path: &std::path::Path) -> Done {
     let shared = &args.shared;
     announce(shared, plan, path);
     let mine = |at: &usize| args.shard.is_none_or(|shard| shard.has(*at));
     let tasks = (0..plan.tasks.len()).filter(mine).map(|at| &plan.tasks[at]);
-    let tasks: Vec<&Task> = tasks.collect();
+    let tasks: Vec<&PlannedRun> = tasks.collect();
     let store = Store::existing(path).ok();
-    let finished = |task: &&Task| {
+    let finished = |task: &&PlannedRun| {
         store.as_ref().is_some_and(|store| matches!(store.row(&task.key), Ok(Some(_))))
     };
     let all = tasks.len();
-    let todo: Vec<&Task> = tasks.into_iter().filter(|task| !finished(task)).collect();
+    let todo: Vec<&PlannedRun> = tasks.into_iter().filter(|task| !finished(task)).collect();
     let one = Machine::new(machine.backend(), 1)?;
     let estimate = sweep::estimate(plan, &todo, one)?;
     let jobs = machine.threads().min(todo.len()).max(1);
@@ -214,42 +216,42 @@ fn dry_run(args: &SweepArgs, plan: &Plan, machine: Machine, path: &std::path::Pa
     Ok(())
 }
 
-fn tell(meter: &mut SweepMeter, plan: &Plan, event: &Event<'_>) {
+fn tell(meter: &mut SweepMeter, plan: &SweepPlan, event: &SweepEvent<'_>) {
     match event {
-        Event::Started { finished, todo, work } => meter.start(*finished, *todo, *work),
-        Event::Work(work) => meter.work(*work),
-        Event::Finished { task, row, seconds, elsewhere, .. } => {
+        SweepEvent::Started { finished, todo, work } => meter.start(*finished, *todo, *work),
+        SweepEvent::Work(work) => meter.work(*work),
+        SweepEvent::Finished { task, row, seconds, elsewhere, .. } => {
             let figure = &plan.sweep.figures.y;
             let value = row.results.get(figure).and_then(serde_json::Value::as_f64);
             let value = value.map_or_else(|| "-".into(), |value| format!("{value:.4}"));
             let took = if *elsewhere { "elsewhere".into() } else { format!("{seconds:.1} s") };
             meter.finished(&format!("{}  {figure} {value}  {took}", plan.words(task.point)));
         }
-        Event::Failed { task, error } => {
+        SweepEvent::Failed { task, error } => {
             meter.line(&format!("failed: {}: {error}", plan.words(task.point)));
         }
-        Event::Waiting { runs } => {
+        SweepEvent::Waiting { runs } => {
             meter.line(&format!("waiting for {runs} runs that other processes are at"));
         }
     }
 }
 
-fn tell_json(plan: &Plan, event: &Event<'_>) {
+fn tell_json(plan: &SweepPlan, event: &SweepEvent<'_>) {
     let line = match event {
-        Event::Work(_) => return,
-        Event::Started { finished, todo, .. } => {
+        SweepEvent::Work(_) => return,
+        SweepEvent::Started { finished, todo, .. } => {
             json!({"event": "started", "finished": finished, "todo": todo})
         }
-        Event::Finished { task, row, seconds, elsewhere, finished } => {
+        SweepEvent::Finished { task, row, seconds, elsewhere, finished } => {
             let point = &plan.points[task.point].point;
             json!({"event": "run", "key": task.key, "point": point.number, "values": point.values,
                 "seed": point.seed, "results": row.results, "state_hash": row.state_hash,
                 "seconds": seconds, "elsewhere": elsewhere, "finished": finished})
         }
-        Event::Failed { task, error } => {
+        SweepEvent::Failed { task, error } => {
             json!({"event": "failed", "key": task.key, "what": plan.words(task.point), "message": error})
         }
-        Event::Waiting { runs } => json!({"event": "waiting", "runs": runs}),
+        SweepEvent::Waiting { runs } => json!({"event": "waiting", "runs": runs}),
     };
     say(&line.to_string());
 }

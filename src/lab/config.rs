@@ -19,7 +19,7 @@ pub use check::{Config, DataConfig, Select, TrainOn};
 pub use file::{ExperimentFile, HardwareFile};
 pub use hardware::{Model, builtin_models, load_model, model_names};
 pub use layers::{Overlay, Sources, load, overlay, setting, setting_table};
-pub use quantity::{Constant, Constants, Kind, Per, QUANTITIES, Quantity, Table};
+pub use quantity::{Constant, Constants, CostTable, Kind, Per, QUANTITIES, Quantity};
 
 /// Why a configuration cannot be used. Each message says where, what was found, what is allowed.
 #[derive(Debug, thiserror::Error)]

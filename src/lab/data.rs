@@ -23,6 +23,6 @@ mod source;
 pub use catalog::{CATALOG, CatalogEntry, CatalogFile, MirrorForm, NpmForm};
 pub use error::DataError;
 pub use fetch::{FetchError, FetchEvent, Origin, fetch};
-pub use list::{Entry, State, list};
-pub use load::{Loaded, content_hash, load};
+pub use list::{Entry, SetState, list};
+pub use load::{Data, content_hash, load};
 pub use source::{DataRoot, FileSet, ImageShape, NamedSet, ParityBits, PartFile, Source};

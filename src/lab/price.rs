@@ -35,6 +35,6 @@ pub use bill::{Bill, Group, Idle, Line, Missing, Range, Share, price};
 pub use changes::{Change, changes};
 pub use cost::Cost;
 pub use peak::{Figure, Peak, areas, figures, peak};
-pub use plan::{Plan, PlanLayer};
+pub use plan::{Footprint, LayerFootprint};
 pub use stage::{StageUse, stages};
 pub use unit::{bounds, prefixed};

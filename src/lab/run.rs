@@ -1,7 +1,7 @@
 //! Carrying out a configuration: train, continue, verify, evaluate, report.
 //!
 //! A [`Session`] is a training in memory that makes records; [`train`] keeps it in a folder, [`verify()`] compares it with
-//! one. Neither prints: callers get [`Event`]s.
+//! one. Neither prints: callers get [`RunEvent`]s.
 
 mod classify;
 mod profile;
@@ -19,7 +19,7 @@ pub use report::{ReportMade, report};
 pub use repriced::{Prices, Repriced, reprice, reprice_as};
 pub use session::Session;
 pub use task::Progress;
-pub use train::{Event, Keeping, Outcome, address_of, carry_on, evaluate, resume, train};
+pub use train::{Keeping, RunEvent, Trained, address_of, carry_on, evaluate, resume, train};
 pub use verify::{Verdict, verify};
 
 use crate::chip::crossbar::kernel::Backend;

@@ -20,10 +20,10 @@ mod sample;
 mod table;
 
 pub use axis::{Axis, Choice, Value};
-pub use carry::{Carried, Event, Options, carry_out};
+pub use carry::{Carried, Options, SweepEvent, carry_out};
 pub use file::{Sample, Sweep};
 pub use merge::{Merged, merge, reindex};
-pub use plan::{Estimate, Plan, Planned, Shard, Task, estimate, plan};
+pub use plan::{Estimate, Planned, PlannedRun, Shard, SweepPlan, estimate, plan};
 pub use points::Point;
 pub use report::{SweepPage, report};
 pub use row::{RESULTS, ResultColumn, ResultKind, Row, row, row_as};

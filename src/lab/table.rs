@@ -9,7 +9,7 @@ pub use write::{Format, WriteError};
 
 /// What a column's numbers are measured in; says how to print them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Unit {
+pub enum ColumnUnit {
     /// A plain number or a word.
     Plain,
     /// Part of a whole, 0 to 1; printed as percent.
@@ -24,7 +24,7 @@ pub enum Unit {
     Joules,
 }
 
-impl Unit {
+impl ColumnUnit {
     /// Its sign, empty for plain numbers.
     #[must_use]
     pub const fn sign(self) -> &'static str {
@@ -114,7 +114,7 @@ pub struct Column {
     /// Words for people, such as `test accuracy`.
     pub label: String,
     /// What numbers are measured in.
-    pub unit: Unit,
+    pub unit: ColumnUnit,
     /// What it is for.
     pub role: Role,
     /// Cells.

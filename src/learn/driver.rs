@@ -6,7 +6,7 @@
 
 use super::error::ErrorUnit;
 use super::rule::{Rule, Step, UpdateMode};
-use crate::chip::engine::{Engine, Operation, Side, Write, Written};
+use crate::chip::engine::{Engine, Operation, Side, Write, WritesDone};
 use crate::chip::state::{Section, State, StateError, Visitor, visit_counts};
 
 /// How a network learns.
@@ -86,7 +86,7 @@ impl Driver {
                 let mut list = Vec::new();
                 errors(&self.engine, 0, &mut list);
                 self.update(&list);
-                self.engine.written(Written::Batch);
+                self.engine.written(WritesDone::Batch);
             }
             UpdateMode::Online => {
                 for (sample, codes) in codes.chunks_exact(inputs).enumerate() {
@@ -94,7 +94,7 @@ impl Driver {
                     let mut list = Vec::new();
                     errors(&self.engine, sample, &mut list);
                     self.update(&list);
-                    self.engine.written(Written::Sample);
+                    self.engine.written(WritesDone::Sample);
                 }
             }
         }

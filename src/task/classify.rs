@@ -10,4 +10,4 @@ mod trainer;
 pub use classifier::Classifier;
 pub use examples::{Examples, ExamplesError, Split};
 pub use experiment::{Augment, Experiment, Seeded};
-pub use trainer::{Evaluation, Progress, Stop, Trainer};
+pub use trainer::{EpochProgress, Evaluation, Stop, Trainer};

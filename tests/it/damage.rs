@@ -10,7 +10,7 @@ use std::path::Path;
 use dalean::chip::crossbar::kernel::Backend;
 use dalean::lab::config::{Sources, load};
 use dalean::lab::data::DataRoot;
-use dalean::lab::run::{self, Event, Machine, RunError, Verdict};
+use dalean::lab::run::{self, Machine, RunError, RunEvent, Verdict};
 use dalean::lab::store::hash;
 use safetensors::SafeTensors;
 use serde_json::Value;
@@ -46,7 +46,7 @@ fn lay(folder: &Path, files: &Files) {
 fn made(finished: bool) -> Files {
     let work = tempfile::tempdir().unwrap();
     let config = load(&Sources { experiment: Some(("it", EVERYTHING)), ..Sources::default() });
-    let mut go_on = |event: Event<'_>| !matches!(event, Event::Batch(progress) if progress.epoch == 1 && !finished);
+    let mut go_on = |event: RunEvent<'_>| !matches!(event, RunEvent::Batch(progress) if progress.epoch == 1 && !finished);
     let outcome = run::train(&config.unwrap(), &root(), work.path(), machine(), &mut go_on);
     match outcome {
         Ok(_) => assert!(finished),

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use dalean::chip::crossbar::kernel::Backend;
 use dalean::lab::config::{Sources, load};
-use dalean::lab::data::{self, DataRoot, ImageShape, Loaded, NamedSet, Source};
+use dalean::lab::data::{self, Data, DataRoot, ImageShape, NamedSet, Source};
 use dalean::lab::run::{Machine, Session};
 use dalean::lab::sweep::Sweep;
 use dalean::task::classify::{Examples, Split};
@@ -30,7 +30,7 @@ fn examples() -> PathBuf {
 }
 
 /// As many generated examples as two batches need, of the shape of a fetched set.
-fn generated(set: NamedSet, count: usize) -> Loaded {
+fn generated(set: NamedSet, count: usize) -> Data {
     let image = match set {
         NamedSet::Cifar10 => ImageShape { height: 32, width: 32, channels: 3 },
         _ => ImageShape { height: 28, width: 28, channels: 1 },
@@ -42,7 +42,7 @@ fn generated(set: NamedSet, count: usize) -> Loaded {
         Examples::new(values, labels, features, 255, 10).unwrap()
     };
     let split = Split { train: part(count), validation: part(20), test: part(20) };
-    Loaded::new(&format!("generated in place of {set}"), split, Some(image)).unwrap()
+    Data::new(&format!("generated in place of {set}"), split, Some(image)).unwrap()
 }
 
 #[test]

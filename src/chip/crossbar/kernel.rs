@@ -63,7 +63,7 @@ pub use self::{
     conv::{ConvPlan, ConvScratch, ConvShape, ConvTurned, Image, Pixels},
     data::{
         Banks, Cells, Conversion, Dither, Drives, Ends, Extremes, Greatest, Half, LookUp, Peaks,
-        Pulsed, Rails, Scratch, Single, TOGETHER, Write, WriteCounts, is_driven,
+        Pulsed, Rails, Scratch, Single, TOGETHER, WriteCounts, WriteLaw, is_driven,
     },
     sums::Sums,
     team::Team,
@@ -334,7 +334,7 @@ impl Kernel {
     /// Groups of four rows, a bit each, with a sum that does not round to 0 whatever its dither word of `bits` bits. In
     /// all others nothing is drawn, nothing moves and nothing is counted.
     #[must_use]
-    pub fn loud<'a>(&self, sums: impl Into<Sums<'a>>, write: &Write, bits: u32) -> u16 {
+    pub fn loud<'a>(&self, sums: impl Into<Sums<'a>>, write: &WriteLaw, bits: u32) -> u16 {
         call!(self, loud(sums.into(), write, bits))
     }
 
@@ -352,12 +352,13 @@ impl Kernel {
     /// Rounds, bounds and programs a half block: requests become pulses, and pulses levels.
     ///
     /// # Panics
-    /// When the window is empty, numbers lie outside the ranges of [`Write`], or a remainder has no bits.
+    /// When the window is empty, numbers lie outside the ranges of [`WriteLaw`], or a remainder has
+    /// no bits.
     pub fn program<'a>(
         &self,
         mut cells: Cells<'_>,
         sums: impl Into<Sums<'a>>,
-        write: &Write,
+        write: &WriteLaw,
         dither: Dither<'_>,
     ) -> WriteCounts {
         assert!(write.floor <= write.ceiling, "the window is not empty");
@@ -379,7 +380,7 @@ impl Kernel {
         &self,
         mut cells: Cells<'_>,
         sums: Sums<'_>,
-        write: &Write,
+        write: &WriteLaw,
         dither: Dither<'_>,
     ) -> WriteCounts {
         let mut pulses = Pulses([0; HALF_CELLS]);

@@ -7,7 +7,7 @@
 use std::ops::Range;
 
 use super::StripMut;
-use super::kernel::{Cells, Dither, Draws, Half, Kernel, Single, Write, WriteCounts, is_driven};
+use super::kernel::{Cells, Dither, Draws, Half, Kernel, Single, WriteCounts, WriteLaw, is_driven};
 use super::layout::{BLOCK_CELLS, HALF_CELLS, HALF_COLUMNS, PANEL_COLUMNS};
 use super::pulses::{Collect, Collected, Collector, RowPeaks};
 use super::words::Words;
@@ -26,7 +26,7 @@ pub struct WriteRequest<'a> {
     /// Samples, padded with zero drives.
     pub stride: usize,
     /// Rounding, bound and window.
-    pub write: Write,
+    pub write: WriteLaw,
     /// Kind of dither.
     pub dither_bits: DitherBits,
     /// Where dither words come from.

@@ -14,7 +14,7 @@ use std::ops::Range;
 
 use super::Engine;
 use super::each::each;
-use super::read::{Histogram, Mode, Part, Reader, Seen};
+use super::read::{Histogram, Mode, PanelPart, Reader, Seen};
 use crate::chip::crossbar::kernel::{Kernel, LookUp, Scratch, TOGETHER};
 use crate::chip::crossbar::layout::{BLOCK_ROWS, PANEL_COLUMNS};
 use crate::chip::hardware::{Adc, Hardware, Subtract};
@@ -219,7 +219,7 @@ fn put_out_group(
             }
             continue;
         }
-        let part = Part { panel, live, samples: group.clone() };
+        let part = PanelPart { panel, live, samples: group.clone() };
         let kept = out.accumulators.as_deref_mut().map(|all| &mut all[at..]);
         if reader.is_narrow() {
             let sums = &mut sums[..cells];

@@ -86,7 +86,7 @@ impl Seen {
 
 /// A panel and some samples.
 #[derive(Clone)]
-pub(super) struct Part {
+pub(super) struct PanelPart {
     pub(super) panel: usize,
     /// Columns of the panel that exist.
     pub(super) live: usize,
@@ -190,7 +190,7 @@ impl<'a> Reader<'a> {
     pub(super) fn read_narrow(
         &self,
         kernel: &Kernel,
-        part: &Part,
+        part: &PanelPart,
         scratch: &mut Scratch,
         sums: &mut [i32],
         seen: &mut Seen,
@@ -218,10 +218,10 @@ impl<'a> Reader<'a> {
         kernel: &Kernel,
         at: usize,
         converters: &[Converter],
-        part: &Part,
+        part: &PanelPart,
         (scratch, sums, seen): (&mut Scratch, &mut [i32], &mut Seen),
     ) {
-        let Part { panel, live, samples } = part.clone();
+        let PanelPart { panel, live, samples } = part.clone();
         let pair = &self.pairs[at];
         let [excites, inhibits] = &pair.reads;
         let saturated = &mut seen.saturated[2 * at..2 * at + 2];
@@ -259,11 +259,11 @@ impl<'a> Reader<'a> {
         &self,
         kernel: &Kernel,
         pair: &Pair<'_>,
-        part: &Part,
+        part: &PanelPart,
         scratch: &mut Scratch,
         sums: &mut [i32],
     ) {
-        let Part { panel, samples, .. } = part.clone();
+        let PanelPart { panel, samples, .. } = part.clone();
         let [excites, inhibits] = &pair.reads;
         let ([e], [i]) = (&excites[..], &inhibits[..]) else { unreachable!("read in one piece") };
         for ((array, read), out) in pair.arrays.iter().zip([e, i]).zip(&mut scratch.currents) {
@@ -283,7 +283,7 @@ impl<'a> Reader<'a> {
     pub(super) fn read_wide(
         &self,
         kernel: &Kernel,
-        part: &Part,
+        part: &PanelPart,
         sums: &mut [i64],
         seen: &mut Seen,
     ) {
@@ -307,10 +307,10 @@ impl<'a> Reader<'a> {
         kernel: &Kernel,
         pair: &Pair<'_>,
         read: usize,
-        part: &Part,
+        part: &PanelPart,
         [e, i]: [&mut [i64]; 2],
     ) {
-        let Part { panel, samples, .. } = part.clone();
+        let PanelPart { panel, samples, .. } = part.clone();
         for ((array, reads), out) in pair.arrays.iter().zip(&pair.reads).zip([e, i]) {
             let read = &reads[read];
             let drives = self.drives(read);

@@ -3,7 +3,7 @@
 
 use std::ops::Range;
 
-use super::{Operation, Side, Write, Written};
+use super::{Operation, Side, Write, WritesDone};
 
 /// An operation with numbers of its own, or what happens between operations.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -37,7 +37,7 @@ pub enum Recorded {
         errors: Vec<i32>,
     },
     /// Writes are done, on a chip whose converters track.
-    Written(Written),
+    Written(WritesDone),
     /// `ERR`.
     Error {
         /// Which layer.

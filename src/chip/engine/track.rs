@@ -15,7 +15,7 @@ use crate::chip::population::Stream;
 
 /// Writes that are done.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Written {
+pub enum WritesDone {
     /// Those of a batch.
     Batch,
     /// Those of one sample, of many that are written one by one.
@@ -49,14 +49,14 @@ impl Engine {
     }
 
     /// Writes are done: where converters track, their ranges may be looked at.
-    pub fn written(&mut self, written: Written) {
+    pub fn written(&mut self, written: WritesDone) {
         if !self.tracks() {
             return;
         }
         if let Some(tape) = &mut self.tape {
             tape.push(Recorded::Written(written));
         }
-        if written == Written::Sample {
+        if written == WritesDone::Sample {
             self.unlooked += 1;
             if self.unlooked < AdcRange::TRACKING_SAMPLES {
                 return;

@@ -144,7 +144,7 @@ impl Engine {
         let gates: Vec<_> =
             wiring.pathways().iter().map(|pathway| of(pathway.target, pathway.polarity)).collect();
         let (write, window) = (self.hardware.write.clone(), self.hardware.cell.window);
-        let base = kernel::Write {
+        let base = kernel::WriteLaw {
             shift: shift + wiring.shift_extra(),
             mantissa: i32::try_from(self.mantissa).expect("1..=15"),
             negate: false,
@@ -162,7 +162,7 @@ impl Engine {
             WriteRequest {
                 turned: &turned[spec.drives_of(pathway.source).index()],
                 stride,
-                write: kernel::Write { negate: pathway.polarity == Polarity::Inhibits, ..base },
+                write: kernel::WriteLaw { negate: pathway.polarity == Polarity::Inhibits, ..base },
                 dither_bits: write.dither_bits,
                 dither_pattern: write.dither_pattern,
                 place: Place {

@@ -2,9 +2,9 @@
 
 use std::hint::black_box;
 
-use super::table::{Cell, Column, Table, shown};
+use super::table::{BenchTable, Cell, Column, shown};
 use super::time::{Arm, race};
-use super::{Plan, chance, giga, kernels, peak};
+use super::{BenchPlan, chance, giga, kernels, peak};
 use crate::chip::crossbar::Crossbar;
 use crate::chip::crossbar::kernel::{
     Backend, ConvPlan, ConvScratch, ConvShape, ConvTurned, Half, Image, Kernel, Pixels,
@@ -28,10 +28,10 @@ const COLUMNS: &[Column] = &[
     shown("peak_percent", "% of peak", 1),
 ];
 
-pub(super) fn measure(plan: &Plan) -> Vec<Table> {
+pub(super) fn measure(plan: &BenchPlan) -> Vec<BenchTable> {
     let title =
         "conv: 3x3, stride 1, pad 1, batch 8; all panels, ideal converters; sums of an update";
-    let mut table = Table::new("conv", title, COLUMNS);
+    let mut table = BenchTable::new("conv", title, COLUMNS);
     for [channels, columns, pixels] in SHAPES {
         let shape =
             ConvShape { channels, height: pixels, width: pixels, side: 3, stride: 1, pad: 1 };
@@ -46,7 +46,13 @@ pub(super) fn measure(plan: &Plan) -> Vec<Table> {
     vec![table]
 }
 
-fn measure_one(plan: &Plan, backend: Backend, shape: ConvShape, columns: usize, table: &mut Table) {
+fn measure_one(
+    plan: &BenchPlan,
+    backend: Backend,
+    shape: ConvShape,
+    columns: usize,
+    table: &mut BenchTable,
+) {
     let kernels = kernels(&[backend]);
     let kernel = &kernels[0].1;
     let conv = ConvPlan::new(shape, BATCH, Pixels::Blocks);

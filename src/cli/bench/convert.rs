@@ -5,9 +5,9 @@ use std::hint::black_box;
 use aligned_vec::AVec;
 
 use super::read::read_panel;
-use super::table::{Cell, Column, Table, shown};
+use super::table::{BenchTable, Cell, Column, shown};
 use super::time::{Arm, Time, race};
-use super::{Plan, chance, giga, groups, kernels, panels_timed};
+use super::{BenchPlan, chance, giga, groups, kernels, panels_timed};
 use crate::chip::crossbar::Crossbar;
 use crate::chip::crossbar::kernel::{
     Backend, Banks, Conversion, Drives, Greatest, Kernel, Scratch,
@@ -35,9 +35,9 @@ const COLUMNS: &[Column] = &[
     shown("times_one_shot", "x one-shot", 2),
 ];
 
-pub(super) fn measure(plan: &Plan) -> Vec<Table> {
+pub(super) fn measure(plan: &BenchPlan) -> Vec<BenchTable> {
     let title = "convert: both banks of an array, 8-bit converters, batch 128";
-    let mut table = Table::new("convert", title, COLUMNS);
+    let mut table = BenchTable::new("convert", title, COLUMNS);
     for [rows, columns] in SHAPES {
         measure_one(plan, Layout { rows, columns }, &mut table);
     }
@@ -51,7 +51,7 @@ pub(super) fn measure(plan: &Plan) -> Vec<Table> {
     vec![table]
 }
 
-fn measure_one(plan: &Plan, layout: Layout, table: &mut Table) {
+fn measure_one(plan: &BenchPlan, layout: Layout, table: &mut BenchTable) {
     let hardware = chance::hardware(&[]);
     let arrays = [1, 2].map(|number| chance::array(number, layout, &hardware));
     let codes = [3, 4].map(|number| chance::drives(number, layout, BATCH));

@@ -2,9 +2,9 @@
 
 use std::hint::black_box;
 
-use super::table::{Column, Table, shown};
+use super::table::{BenchTable, Column, shown};
 use super::time::{Arm, race};
-use super::{Plan, giga, kernels};
+use super::{BenchPlan, giga, kernels};
 use crate::chip::crossbar::kernel::Kernel;
 
 /// Rounds of a run.
@@ -29,14 +29,15 @@ pub(super) fn arm(kernel: &Kernel) -> Arm<'_> {
     })
 }
 
-pub(super) fn measure(plan: &Plan) -> Vec<Table> {
+pub(super) fn measure(plan: &BenchPlan) -> Vec<BenchTable> {
     let kernels = kernels(&plan.backends);
     let able: Vec<_> = kernels.iter().filter(|(_, kernel)| products(kernel) > 0.0).collect();
     if able.is_empty() {
         return Vec::new();
     }
     let times = race(able.iter().map(|(_, kernel)| arm(kernel)).collect(), plan.seconds(3.0));
-    let mut table = Table::new("peak", "peak: products in registers, random operands", COLUMNS);
+    let mut table =
+        BenchTable::new("peak", "peak: products in registers, random operands", COLUMNS);
     for ((backend, kernel), time) in able.into_iter().zip(times) {
         let instruction = match backend.name() {
             "amx" => "tdpbuud",

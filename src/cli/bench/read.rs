@@ -5,9 +5,9 @@ use std::hint::black_box;
 use ndarray::Array2;
 use ndarray::linalg::general_mat_mul;
 
-use super::table::{Cell, Column, Table, shown};
+use super::table::{BenchTable, Cell, Column, shown};
 use super::time::{Arm, race};
-use super::{Plan, chance, giga, groups, kernels, panels_timed, peak};
+use super::{BenchPlan, chance, giga, groups, kernels, panels_timed, peak};
 use crate::chip::crossbar::Crossbar;
 use crate::chip::crossbar::kernel::{Drives, Kernel, Scratch};
 use crate::chip::crossbar::layout::{Layout, PANEL_COLUMNS};
@@ -27,10 +27,10 @@ const COLUMNS: &[Column] = &[
     shown("times_float", "x f32", 1),
 ];
 
-pub(super) fn measure(plan: &Plan) -> Vec<Table> {
+pub(super) fn measure(plan: &BenchPlan) -> Vec<BenchTable> {
     let hardware = chance::hardware(&[]);
     let title = "read: all panels of an array, ideal converters";
-    let mut table = Table::new("read", title, COLUMNS);
+    let mut table = BenchTable::new("read", title, COLUMNS);
     for [rows, columns] in SHAPES {
         let array = chance::array(1, Layout { rows, columns }, &hardware);
         for batch in BATCHES {
@@ -43,7 +43,7 @@ pub(super) fn measure(plan: &Plan) -> Vec<Table> {
     vec![table]
 }
 
-fn measure_one(plan: &Plan, array: &Crossbar, batch: usize, table: &mut Table) {
+fn measure_one(plan: &BenchPlan, array: &Crossbar, batch: usize, table: &mut BenchTable) {
     let layout = array.layout();
     let Layout { rows, columns } = layout;
     let kernels = kernels(&plan.backends);

@@ -6,9 +6,9 @@ use ndarray::Array2;
 
 use super::float::FloatNet;
 use super::net::Net;
-use super::table::{Cell, Column, Table, kept, shown};
+use super::table::{BenchTable, Cell, Column, kept, shown};
 use super::time::{Arm, Time, race};
-use super::{Plan, chance, giga};
+use super::{BenchPlan, chance, giga};
 use crate::chip::crossbar::kernel::Backend;
 use crate::lab::data::{self, DataError, NamedSet, Source};
 use crate::task::classify::Examples;
@@ -68,7 +68,7 @@ struct Reference {
     rate: f64,
 }
 
-pub(super) fn measure(plan: &Plan) -> Vec<Table> {
+pub(super) fn measure(plan: &BenchPlan) -> Vec<BenchTable> {
     let made_up = chance::images(IMAGES);
     let few = made_up.clone().split_at(EPOCH_BATCHES * BATCH).0;
     let root = &plan.data;
@@ -80,7 +80,7 @@ pub(super) fn measure(plan: &Plan) -> Vec<Table> {
         }
         Err(error) => (None, Some(format!("MNIST cannot be read: {error}"))),
     };
-    let mut table = Table::new("step", "step: one update of a whole network", COLUMNS);
+    let mut table = BenchTable::new("step", "step: one update of a whole network", COLUMNS);
     small(plan, (&made_up, &few, mnist.as_ref()), &mut table);
     wide(plan, &made_up, &mut table);
     online(plan, mnist.as_ref().unwrap_or(&made_up), mnist.is_some(), &mut table);
@@ -106,9 +106,9 @@ fn settings(hidden: &str, rate: &str, more: &[&str]) -> Vec<String> {
 }
 
 fn small<'a>(
-    plan: &Plan,
+    plan: &BenchPlan,
     (made_up, few, mnist): (&'a Examples, &'a Examples, Option<&'a Examples>),
-    table: &mut Table,
+    table: &mut BenchTable,
 ) {
     let entry = |what, more: &[&str]| Entry {
         net: Net::new(&settings("[256,256]", "10", more), plan.best, made_up),
@@ -152,7 +152,7 @@ fn small<'a>(
     compare("784-256-256-10", entries, Some(&sizes), plan.seconds(12.0), table);
 }
 
-fn wide(plan: &Plan, images: &Examples, table: &mut Table) {
+fn wide(plan: &BenchPlan, images: &Examples, table: &mut BenchTable) {
     // a rate at which the wide net does not diverge
     let entries = vec![Entry {
         net: Net::new(&settings("[1024,1024]", "4", &[]), plan.best, images),
@@ -168,7 +168,7 @@ fn wide(plan: &Plan, images: &Examples, table: &mut Table) {
 }
 
 /// Batches of one image, each read and written on its own.
-fn online(plan: &Plan, images: &Examples, real: bool, table: &mut Table) {
+fn online(plan: &BenchPlan, images: &Examples, real: bool, table: &mut BenchTable) {
     let entry = |what, centre: &str| {
         let own = ["learning.batch=1", "learning.mode=online", centre];
         Entry {
@@ -195,7 +195,7 @@ fn compare(
     mut entries: Vec<Entry<'_>>,
     float: Option<&[usize]>,
     seconds: f64,
-    table: &mut Table,
+    table: &mut BenchTable,
 ) {
     let mut arms: Vec<Arm<'_>> = entries
         .iter_mut()

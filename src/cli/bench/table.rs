@@ -68,7 +68,7 @@ pub(super) const fn kept(key: &'static str) -> Column {
 
 /// Figures of one kind.
 #[derive(Debug)]
-pub(super) struct Table {
+pub(super) struct BenchTable {
     /// `event` of each row in JSON.
     pub(super) event: &'static str,
     /// What was measured, in one line.
@@ -79,7 +79,7 @@ pub(super) struct Table {
     pub(super) rows: Vec<Vec<Cell>>,
 }
 
-impl Table {
+impl BenchTable {
     /// An empty table.
     pub(super) fn new(
         event: &'static str,
@@ -167,8 +167,8 @@ mod tests {
         kept("seconds_median"),
     ];
 
-    fn table() -> Table {
-        let mut table = Table::new("read", "reads", COLUMNS);
+    fn table() -> BenchTable {
+        let mut table = BenchTable::new("read", "reads", COLUMNS);
         table.row(vec!["scalar".into(), 1usize.into(), 0.25.into(), None.into()]);
         table.row(vec!["amx".into(), 128usize.into(), 1825.04.into(), 1.5.into()]);
         table.notes.push("best of all rounds".into());

@@ -2,10 +2,10 @@
 
 use std::hint::black_box;
 
-use super::table::{Column, Table, shown};
+use super::table::{BenchTable, Column, shown};
 use super::time::{Arm, race};
-use super::{Plan, chance, kernels, panels_timed};
-use crate::chip::crossbar::kernel::{Backend, Half, Kernel, Write};
+use super::{BenchPlan, chance, kernels, panels_timed};
+use crate::chip::crossbar::kernel::{Backend, Half, Kernel, WriteLaw};
 use crate::chip::crossbar::layout::{BLOCK_ROWS, HALF_CELLS, HALF_COLUMNS, Layout, PANEL_COLUMNS};
 use crate::chip::crossbar::{Collect, Crossbar, WriteRequest};
 use crate::chip::hardware::Hardware;
@@ -39,9 +39,9 @@ const COLUMNS: &[Column] = &[
     shown("times_accumulate", "x accumulate", 2),
 ];
 
-pub(super) fn measure(plan: &Plan) -> Vec<Table> {
+pub(super) fn measure(plan: &BenchPlan) -> Vec<BenchTable> {
     let title = "update: an array, batch 128, dense random drives and gates";
-    let mut table = Table::new("update", title, COLUMNS);
+    let mut table = BenchTable::new("update", title, COLUMNS);
     for [rows, columns] in SHAPES {
         measure_one(plan, Layout { rows, columns }, &mut table);
     }
@@ -51,7 +51,7 @@ pub(super) fn measure(plan: &Plan) -> Vec<Table> {
     vec![table]
 }
 
-fn measure_one(plan: &Plan, layout: Layout, table: &mut Table) {
+fn measure_one(plan: &BenchPlan, layout: Layout, table: &mut BenchTable) {
     let kernels = kernels(&[plan.best]);
     let kernel = &kernels[0].1;
     let panels = panels_timed(plan.best, layout);
@@ -119,7 +119,7 @@ fn written<'a>(
     let mut request = WriteRequest {
         turned: blocks,
         stride: BATCH,
-        write: Write {
+        write: WriteLaw {
             shift: SHIFT,
             mantissa: 1,
             negate: false,

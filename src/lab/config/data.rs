@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use super::check::wrong;
 use super::file::DataFile;
 use super::{Config, ConfigError};
-use crate::lab::data::{self, DataError, DataRoot, FileSet, Loaded, PartFile, Source};
+use crate::lab::data::{self, Data, DataError, DataRoot, FileSet, PartFile, Source};
 
 /// Checks that every key of `[data]` means something there, and writes defaults back.
 pub(super) fn resolve(data: &mut DataFile) -> Result<DataFile, ConfigError> {
@@ -54,7 +54,7 @@ pub(super) fn resolve(data: &mut DataFile) -> Result<DataFile, ConfigError> {
     Ok(data.clone())
 }
 
-impl Loaded {
+impl Data {
     /// Loads the data that a configuration names; known sets are looked for in `root` unless they are built in.
     ///
     /// ```

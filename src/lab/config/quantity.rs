@@ -19,7 +19,7 @@ use crate::chip::ledger::Event;
 
 /// A table of a hardware model.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Table {
+pub enum CostTable {
     /// Joules an event.
     Energy,
     /// Watts.
@@ -28,7 +28,7 @@ pub enum Table {
     Area,
 }
 
-impl Table {
+impl CostTable {
     /// Name in files.
     #[must_use]
     pub const fn name(self) -> &'static str {
@@ -74,7 +74,7 @@ pub enum Per {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Quantity {
     /// Where it is given.
-    pub table: Table,
+    pub table: CostTable,
     /// Its key, without the unit.
     pub name: &'static str,
     /// What it is counted by.
@@ -86,15 +86,15 @@ pub struct Quantity {
 }
 
 const fn energy(name: &'static str, event: Event, sane: [f64; 2], why: &'static str) -> Quantity {
-    Quantity { table: Table::Energy, name, per: Per::Event(event), sane, why }
+    Quantity { table: CostTable::Energy, name, per: Per::Event(event), sane, why }
 }
 
 const fn power(name: &'static str, per: Per, sane: [f64; 2], why: &'static str) -> Quantity {
-    Quantity { table: Table::Power, name, per, sane, why }
+    Quantity { table: CostTable::Power, name, per, sane, why }
 }
 
 const fn area(name: &'static str, per: Per, sane: [f64; 2], why: &'static str) -> Quantity {
-    Quantity { table: Table::Area, name, per, sane, why }
+    Quantity { table: CostTable::Area, name, per, sane, why }
 }
 
 /// Every quantity a model can give. An event without a line here costs nothing by itself: it says what came of
@@ -290,7 +290,7 @@ impl Constants {
 
     /// The number of a quantity, by table and name.
     #[must_use]
-    pub fn get(&self, table: Table, name: &str) -> Option<&Constant> {
+    pub fn get(&self, table: CostTable, name: &str) -> Option<&Constant> {
         self.0.iter().find(|c| c.quantity.table == table && c.quantity.name == name)
     }
 
@@ -328,22 +328,25 @@ impl Constants {
 }
 
 /// Every number of a file with its table and key.
-pub(super) fn numbers(file: &HardwareFile) -> Vec<(Table, &str, &NumberFile)> {
-    let energy = file.energy.iter().flatten().map(|(key, n)| (Table::Energy, &*key.0, n));
-    let power = file.power.iter().flatten().map(|(key, n)| (Table::Power, &*key.0, n));
-    let area = file.area.iter().flatten().map(|(key, n)| (Table::Area, &*key.0, n));
+pub(super) fn numbers(file: &HardwareFile) -> Vec<(CostTable, &str, &NumberFile)> {
+    let energy = file.energy.iter().flatten().map(|(key, n)| (CostTable::Energy, &*key.0, n));
+    let power = file.power.iter().flatten().map(|(key, n)| (CostTable::Power, &*key.0, n));
+    let area = file.area.iter().flatten().map(|(key, n)| (CostTable::Area, &*key.0, n));
     energy.chain(power).chain(area).collect()
 }
 
 /// Quantity and unit of a key.
-fn parse(table: Table, key: &str) -> Option<(&'static Quantity, f64)> {
+fn parse(table: CostTable, key: &str) -> Option<(&'static Quantity, f64)> {
     let (name, unit) = key.rsplit_once('_')?;
     let &(_, worth) = table.units().iter().find(|(known, _)| *known == unit)?;
     let quantity = QUANTITIES.iter().find(|q| q.table == table && q.name == name)?;
     Some((quantity, worth))
 }
 
-fn read_key<'de, D: Deserializer<'de>>(table: Table, deserializer: D) -> Result<String, D::Error> {
+fn read_key<'de, D: Deserializer<'de>>(
+    table: CostTable,
+    deserializer: D,
+) -> Result<String, D::Error> {
     let key = String::deserialize(deserializer)?;
     if parse(table, &key).is_some() {
         return Ok(key);
@@ -367,7 +370,7 @@ macro_rules! keys_of {
 
         impl<'de> Deserialize<'de> for $name {
             fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-                read_key(Table::$table, deserializer).map(Self)
+                read_key(CostTable::$table, deserializer).map(Self)
             }
         }
     )*};

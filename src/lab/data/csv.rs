@@ -102,7 +102,7 @@ pub enum CsvError {
 
 /// Examples as they stand in the file.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Table {
+pub struct CsvTable {
     /// Values of an example: the columns but the label, in order.
     pub features: usize,
     /// Example after example.
@@ -116,7 +116,7 @@ pub struct Table {
 /// # Errors
 /// When a line is not made of at least two integers 0 to 255, when lines differ in length, or when the
 /// label column is missing.
-pub fn read(bytes: &[u8], label: &LabelColumn) -> Result<Table, CsvError> {
+pub fn read(bytes: &[u8], label: &LabelColumn) -> Result<CsvTable, CsvError> {
     let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
     let mut lines = ::csv::ReaderBuilder::new()
         .has_headers(false)
@@ -124,7 +124,7 @@ pub fn read(bytes: &[u8], label: &LabelColumn) -> Result<Table, CsvError> {
         .trim(::csv::Trim::All)
         .from_reader(bytes);
     let mut record = ::csv::ByteRecord::new();
-    let mut table = Table { features: 0, values: Vec::new(), labels: Vec::new() };
+    let mut table = CsvTable { features: 0, values: Vec::new(), labels: Vec::new() };
     let mut shape: Option<(usize, usize)> = None;
     while lines.read_byte_record(&mut record)? {
         let line = record.position().map_or(0, ::csv::Position::line);

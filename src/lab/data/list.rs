@@ -10,7 +10,7 @@ use super::{
 
 /// Whether a set can be used.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub enum State {
+pub enum SetState {
     /// Part of the program.
     BuiltIn,
     /// Fetched, its hashes checked.
@@ -27,10 +27,10 @@ pub struct Entry {
     /// The set.
     pub set: NamedSet,
     /// Whether it can be used.
-    pub state: State,
+    pub state: SetState,
     /// Examples to learn from (validation included) and to test on.
     pub examples: [usize; 2],
-    /// [`super::Loaded::hash`] of a set that can be used.
+    /// [`super::Data::hash`] of a set that can be used.
     pub hash: Option<String>,
     /// Terms of use.
     pub licence: &'static str,
@@ -58,10 +58,10 @@ fn entry(set: NamedSet, root: &DataRoot) -> Entry {
         (Err(_), None) => [0, 0],
     };
     let state = match &loaded {
-        Ok(_) if catalogued.is_none() => State::BuiltIn,
-        Ok(_) => State::Present,
-        Err(DataError::Missing { .. }) => State::Missing,
-        Err(other) => State::Damaged(other.to_string()),
+        Ok(_) if catalogued.is_none() => SetState::BuiltIn,
+        Ok(_) => SetState::Present,
+        Err(DataError::Missing { .. }) => SetState::Missing,
+        Err(other) => SetState::Damaged(other.to_string()),
     };
     let licence = match (catalogued, set) {
         (Some(entry), _) => entry.licence,
@@ -83,14 +83,14 @@ mod tests {
         let entries = list(&DataRoot::new(root.path()));
         assert_eq!(entries.len(), 12);
         for entry in &entries {
-            let built_in = entry.state == State::BuiltIn;
+            let built_in = entry.state == SetState::BuiltIn;
             assert_eq!(built_in, entry.hash.is_some() && entry.how_to_get.is_empty());
-            assert!(built_in || entry.state == State::Missing);
+            assert!(built_in || entry.state == SetState::Missing);
         }
         assert_eq!(entries[0].examples, [3823, 1797]);
         assert_eq!((entries[3].examples, entries[4].examples), ([50_000, 10_000], [4, 4]));
         std::fs::create_dir(root.path().join("mnist")).unwrap();
         std::fs::write(root.path().join("mnist/t10k-labels-idx1-ubyte"), "x").unwrap();
-        assert!(matches!(&list(&DataRoot::new(root.path()))[1].state, State::Damaged(_)));
+        assert!(matches!(&list(&DataRoot::new(root.path()))[1].state, SetState::Damaged(_)));
     }
 }

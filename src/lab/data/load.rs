@@ -32,7 +32,7 @@ const FILE_BYTES_MAX: u64 = 1 << 32;
 /// A data set, ready for a run. Copies share their examples.
 #[derive(Debug, Clone)]
 #[non_exhaustive]
-pub struct Loaded {
+pub struct Data {
     /// The examples.
     pub split: Split,
     /// What they are, in one line.
@@ -43,7 +43,7 @@ pub struct Loaded {
     pub image: Option<ImageShape>,
 }
 
-impl Loaded {
+impl Data {
     /// Examples of one's own, as a data set.
     ///
     /// ```
@@ -77,14 +77,14 @@ impl Loaded {
 ///
 /// # Errors
 /// When a set is missing or damaged, or a file cannot be read or does not make examples.
-pub fn load(source: &Source, root: &DataRoot) -> Result<Loaded, DataError> {
+pub fn load(source: &Source, root: &DataRoot) -> Result<Data, DataError> {
     match source {
         Source::Named(set) => named(*set, root),
         Source::Files(files) => own::load(files),
     }
 }
 
-fn named(set: NamedSet, root: &DataRoot) -> Result<Loaded, DataError> {
+fn named(set: NamedSet, root: &DataRoot) -> Result<Data, DataError> {
     let xor = ParityBits::new(2).expect("2 bits are enough");
     let (split, image, note) = match set {
         NamedSet::Xor => (builtin::parity(xor), None, "; all parts are the same"),
@@ -109,7 +109,7 @@ fn cut_tail([train, test]: [Examples; 2]) -> Split {
 }
 
 /// Describes and hashes a split.
-pub(crate) fn finish(name: &str, split: Split, image: Option<ImageShape>, note: &str) -> Loaded {
+pub(crate) fn finish(name: &str, split: Split, image: Option<ImageShape>, note: &str) -> Data {
     let Split { train, validation, test } = &split;
     let description = format!(
         "{name}: {} training, {} validation, {} test examples of {} values 0 to {}, {} classes{note}",
@@ -120,7 +120,7 @@ pub(crate) fn finish(name: &str, split: Split, image: Option<ImageShape>, note: 
         train.full_scale(),
         train.classes(),
     );
-    Loaded { description, hash: content_hash(&split), image, split }
+    Data { description, hash: content_hash(&split), image, split }
 }
 
 /// The hash of a split.
@@ -224,7 +224,7 @@ fn read_file(path: &Path, limit: u64) -> Result<Vec<u8>, DataError> {
 mod tests {
     use super::*;
 
-    fn load_named(set: &str, root: &Path) -> Result<Loaded, DataError> {
+    fn load_named(set: &str, root: &Path) -> Result<Data, DataError> {
         load(&Source::Named(set.parse().unwrap()), &DataRoot::new(root))
     }
 
@@ -233,7 +233,7 @@ mod tests {
         let nowhere = Path::new("no such folder");
         let digits = load_named("optdigits", nowhere).unwrap();
         let sizes =
-            |l: &Loaded| [&l.split.train, &l.split.validation, &l.split.test].map(Examples::len);
+            |l: &Data| [&l.split.train, &l.split.validation, &l.split.test].map(Examples::len);
         assert_eq!(sizes(&digits), [3505, 318, 1797]);
         assert_eq!(
             digits.description,

@@ -9,7 +9,7 @@ use super::{
     csv,
     error::DataError,
     idx,
-    load::{Loaded, finish, read_own},
+    load::{Data, finish, read_own},
     npy::Floats,
     npz,
     source::{FileSet, ImageShape, PartFile},
@@ -20,7 +20,7 @@ const TEST_EVERY: usize = 6;
 const VALIDATION_EVERY: usize = 12;
 
 /// A part as it stands in its files.
-struct Part {
+struct OwnPart {
     values: Vec<u8>,
     labels: Vec<u8>,
     features: usize,
@@ -29,7 +29,7 @@ struct Part {
 }
 
 /// Loads a set of files.
-pub(crate) fn load(files: &FileSet) -> Result<Loaded, DataError> {
+pub(crate) fn load(files: &FileSet) -> Result<Data, DataError> {
     let scale = files.full_scale.unwrap_or(255);
     if scale == 0 {
         return Err(DataError::FullScale);
@@ -38,7 +38,7 @@ pub(crate) fn load(files: &FileSet) -> Result<Loaded, DataError> {
         return Err(DataError::Classes { found });
     }
     let train = read_part(&files.train, scale)?;
-    let read = |file: &Option<PartFile>| -> Result<Option<Part>, DataError> {
+    let read = |file: &Option<PartFile>| -> Result<Option<OwnPart>, DataError> {
         file.as_ref().map(|file| read_part(file, scale)).transpose()
     };
     let (validation, test) = (read(&files.validation)?, read(&files.test)?);
@@ -55,7 +55,7 @@ pub(crate) fn load(files: &FileSet) -> Result<Loaded, DataError> {
     let top = parts().flat_map(|part| &part.labels).copied().max().unwrap_or(0);
     let classes = files.classes.unwrap_or(usize::from(top) + 1);
 
-    let make = |file: &PartFile, part: Part| {
+    let make = |file: &PartFile, part: OwnPart| {
         let path = || file.path().to_owned();
         if part.features != features {
             let (found, wanted) = (part.features, features);
@@ -108,7 +108,7 @@ fn cut(
     Ok(taken)
 }
 
-fn read_part(file: &PartFile, scale: u8) -> Result<Part, DataError> {
+fn read_part(file: &PartFile, scale: u8) -> Result<OwnPart, DataError> {
     match file {
         PartFile::Idx { values, labels } => {
             let read = |path: &Path| {
@@ -132,8 +132,8 @@ fn read_part(file: &PartFile, scale: u8) -> Result<Part, DataError> {
         PartFile::Csv { path, label } => {
             let table = csv::read(&read_own(path)?, label)
                 .map_err(|source| DataError::Csv { path: path.clone(), source })?;
-            let csv::Table { features, values, labels } = table;
-            Ok(Part { values, labels, features, image: None, scaled: false })
+            let csv::CsvTable { features, values, labels } = table;
+            Ok(OwnPart { values, labels, features, image: None, scaled: false })
         }
     }
 }
@@ -144,7 +144,7 @@ fn arrays(
     (dims, values): (Vec<usize>, Vec<u8>),
     (label_dims, labels): (Vec<usize>, Vec<u8>),
     scaled: bool,
-) -> Result<Part, DataError> {
+) -> Result<OwnPart, DataError> {
     let examples = dims.first().copied().unwrap_or(0);
     let flat = label_dims.first() == Some(&examples) && labels.len() == examples;
     if !flat {
@@ -162,7 +162,7 @@ fn arrays(
         }
         _ => (None, values),
     };
-    Ok(Part { values, labels, features, image, scaled })
+    Ok(OwnPart { values, labels, features, image, scaled })
 }
 
 /// Pixels whose channels stand side by side, put plane after plane.

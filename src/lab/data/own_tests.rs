@@ -55,7 +55,7 @@ fn only(train: PartFile) -> FileSet {
     FileSet { train, validation: None, test: None, full_scale: None, classes: None, image: None }
 }
 
-fn loaded(files: FileSet) -> Result<Loaded, String> {
+fn loaded(files: FileSet) -> Result<Data, String> {
     crate::lab::data::load(&Source::Files(Box::new(files)), &DataRoot::new("unused"))
         .map_err(|e| e.to_string())
 }
@@ -106,7 +106,7 @@ fn colours_side_by_side_become_planes() {
     let files = Files::new();
     let values: Vec<u8> = (0..24).collect();
     let part = files.idx("t", &[2, 2, 2, 3], &values, &[0, 1]);
-    let Part { values, image, .. } = read_part(&part, 255).unwrap();
+    let OwnPart { values, image, .. } = read_part(&part, 255).unwrap();
     assert_eq!(values[..12], [0, 3, 6, 9, 1, 4, 7, 10, 2, 5, 8, 11]);
     assert_eq!(image, Some(ImageShape { height: 2, width: 2, channels: 3 }));
 }

@@ -5,10 +5,10 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 
 use super::changes::Change;
-use super::plan::Plan;
+use super::plan::Footprint;
 use crate::chip::hardware::Hardware;
 use crate::chip::ledger::Event;
-use crate::lab::config::{Constants, Kind, Per, QUANTITIES, Table};
+use crate::lab::config::{Constants, CostTable, Kind, Per, QUANTITIES};
 use crate::lab::store::ledger::{CountRecord, LedgerRecord};
 
 /// Low, typical, high.
@@ -95,7 +95,7 @@ pub struct Bill<'a> {
 #[must_use]
 pub fn price<'a>(
     ledger: &'a LedgerRecord,
-    plan: &Plan,
+    plan: &Footprint,
     hardware: &Hardware,
     constants: &Constants,
     changes: &[Change],
@@ -149,7 +149,7 @@ pub fn price<'a>(
             None
         }
     };
-    let powers = constants.iter().filter(|c| c.quantity.table == Table::Power);
+    let powers = constants.iter().filter(|c| c.quantity.table == CostTable::Power);
     let idle: Vec<_> = powers
         .map(|constant| {
             let parts = plan.parts(constant.quantity.per, hardware);
@@ -307,7 +307,7 @@ impl Bill<'_> {
 mod tests {
     use super::*;
     use crate::lab::config::{self, Sources};
-    use crate::lab::price::PlanLayer;
+    use crate::lab::price::LayerFootprint;
     use crate::lab::store::ledger::CyclesRecord;
 
     fn line(phase: &str, layer: usize, event: &str, count: u64) -> CountRecord {
@@ -359,7 +359,8 @@ mod tests {
     #[test]
     fn counts_times_constants_and_watts_times_seconds() {
         let (config, ledger) = (chip(), ledger());
-        let plan = Plan { layers: vec![PlanLayer { rows: 300, columns: 256, targets: 1 }] };
+        let plan =
+            Footprint { layers: vec![LayerFootprint { rows: 300, columns: 256, targets: 1 }] };
         let bill = price(&ledger, &plan, &config.hardware, &config.constants, &[]);
         // 4000 conversions, 500 holds, two tiles for 10 ms
         let wanted = [4e-9 + 2e-11, 8e-9 + 2e-12 + 2e-11, 16e-9 + 2e-12 + 2e-11];
@@ -387,7 +388,7 @@ mod tests {
     fn what_another_chip_would_do_otherwise_is_not_priced() {
         let (config, ledger) = (chip(), ledger());
         let change = Change { key: "tile.rows", events: &[Event::Holds], time: true };
-        let plan = Plan::default();
+        let plan = Footprint::default();
         let bill = price(&ledger, &plan, &config.hardware, &config.constants, &[change]);
         assert!(close(bill.total()[1], 8e-9) && bill.seconds.is_none());
         let whys = bill.missing.iter().map(|m| (&*m.what, m.why.contains("tile.rows")));

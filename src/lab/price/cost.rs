@@ -2,7 +2,7 @@
 
 use super::bill::{Bill, Group, Missing, Range, Share};
 use crate::chip::ledger::Event;
-use crate::lab::config::{Constants, Table};
+use crate::lab::config::{Constants, CostTable};
 use crate::lab::store::ledger::LedgerRecord;
 
 /// Totals of a run.
@@ -38,7 +38,7 @@ impl Cost {
     /// Totals of a bill.
     #[must_use]
     pub fn of(bill: &Bill<'_>, ledger: &LedgerRecord, constants: &Constants) -> Self {
-        let priced = constants.iter().any(|c| c.quantity.table == Table::Energy);
+        let priced = constants.iter().any(|c| c.quantity.table == CostTable::Energy);
         let each = Event::ALL.into_iter().filter_map(|event| {
             let constant = constants.of(event)?;
             Some((event.name(), constant.quantity.name, constant.value[1]))

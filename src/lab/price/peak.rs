@@ -9,9 +9,9 @@
 //! A tile holds two banks of R x C cells. See docs/MODEL.md, 4.6.
 
 use super::Range;
-use super::plan::Plan;
+use super::plan::Footprint;
 use crate::chip::hardware::{Hardware, Timing};
-use crate::lab::config::{Constants, Table};
+use crate::lab::config::{Constants, CostTable};
 
 /// A duration on a full tile.
 #[derive(Debug, Clone, PartialEq)]
@@ -83,11 +83,11 @@ pub fn peak(hardware: &Hardware, tiles: u64, slices: u64, cells: u64) -> Option<
 /// Square metres of a plan's parts, by component, as far as the model gives them.
 #[must_use]
 pub fn areas(
-    plan: &Plan,
+    plan: &Footprint,
     hardware: &Hardware,
     constants: &Constants,
 ) -> Vec<(&'static str, Range)> {
-    let given = constants.iter().filter(|c| c.quantity.table == Table::Area);
+    let given = constants.iter().filter(|c| c.quantity.table == CostTable::Area);
     given
         .map(|c| {
             let parts = plan.parts(c.quantity.per, hardware) as f64;

@@ -7,7 +7,7 @@ use crate::lab::store::record::PathwayRecord;
 
 /// Arrays of one layer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct PlanLayer {
+pub struct LayerFootprint {
     /// Rows of an array.
     pub rows: u64,
     /// Columns of an array.
@@ -18,16 +18,16 @@ pub struct PlanLayer {
 
 /// Arrays of a network.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
-pub struct Plan {
+pub struct Footprint {
     /// Layers, from the input.
-    pub layers: Vec<PlanLayer>,
+    pub layers: Vec<LayerFootprint>,
 }
 
-impl Plan {
+impl Footprint {
     /// The plan of a network on an engine.
     #[must_use]
     pub fn of_layers(layers: &[Layer]) -> Self {
-        let layer = |layer: &Layer| PlanLayer {
+        let layer = |layer: &Layer| LayerFootprint {
             rows: layer.layout.rows as u64,
             columns: layer.layout.columns as u64,
             targets: layer.spec.wiring.targets().len() as u64,
@@ -38,17 +38,17 @@ impl Plan {
     /// The plan of a run, from what it recorded of its pathways.
     #[must_use]
     pub fn of_records(pathways: &[PathwayRecord]) -> Self {
-        let mut layers: Vec<(PlanLayer, u64)> = Vec::new();
+        let mut layers: Vec<(LayerFootprint, u64)> = Vec::new();
         for one in pathways {
             let [rows, columns] = one.shape.map(|side| side as u64);
             if one.layer == layers.len() {
-                layers.push((PlanLayer { rows, columns, targets: 0 }, 0));
+                layers.push((LayerFootprint { rows, columns, targets: 0 }, 0));
             }
             if let Some((_, arrays)) = layers.last_mut() {
                 *arrays += 1;
             }
         }
-        let layers = layers.into_iter().map(|(layer, arrays)| PlanLayer {
+        let layers = layers.into_iter().map(|(layer, arrays)| LayerFootprint {
             // a target has two banks
             targets: arrays / 2,
             ..layer
@@ -60,7 +60,8 @@ impl Plan {
     #[must_use]
     pub fn tiles(&self, hardware: &Hardware) -> u64 {
         let (rows, columns) = (hardware.tile.rows as u64, hardware.tile.columns as u64);
-        let of = |l: &PlanLayer| l.targets * l.rows.div_ceil(rows) * l.columns.div_ceil(columns);
+        let of =
+            |l: &LayerFootprint| l.targets * l.rows.div_ceil(rows) * l.columns.div_ceil(columns);
         self.layers.iter().map(of).sum()
     }
 

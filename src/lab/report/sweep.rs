@@ -43,7 +43,7 @@ pub struct SweepView<'a> {
     /// (text, role `Name`) is the page-relative address of the run's own report.
     pub table: &'a Table,
     /// The axes, in the order of the sweep file.
-    pub axes: &'a [Axis],
+    pub axes: &'a [ShownAxis],
     /// What the figures show unless the reader chooses otherwise.
     pub figures: Figures,
     /// Points that cannot be run, with the reason.
@@ -56,7 +56,7 @@ pub struct SweepView<'a> {
 
 /// One axis of a sweep; its column in the table has the same name.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Axis {
+pub struct ShownAxis {
     /// Name of the column.
     pub name: String,
     /// Words for people.

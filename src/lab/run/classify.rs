@@ -99,7 +99,7 @@ impl Task for Classify {
         if again && trainer.epoch() > 0 {
             let _ = trainer.calibrate(train);
         }
-        let learnt = trainer.learn(train, &mut |classify::Progress {
+        let learnt = trainer.learn(train, &mut |classify::EpochProgress {
                                                     epoch,
                                                     samples,
                                                     samples_total,

@@ -7,7 +7,7 @@ use crate::chip::hardware::Hardware;
 use crate::chip::ledger::Event;
 use crate::lab::config::{Config, Constants};
 use crate::lab::data::{self, DataRoot};
-use crate::lab::price::{Bill, Plan, StageUse, price, stages};
+use crate::lab::price::{Bill, Footprint, StageUse, price, stages};
 use crate::lab::store::ledger::{CyclesRecord, LedgerRecord};
 
 /// One update or one inference.
@@ -31,7 +31,7 @@ pub struct Profile {
     /// The first update, and an inference after it.
     pub acts: [Act; 2],
     /// Arrays of the network.
-    pub plan: Plan,
+    pub plan: Footprint,
     /// The chip.
     pub hardware: Hardware,
     /// Its constants.
@@ -51,7 +51,7 @@ pub fn profile(config: &Config, root: &DataRoot, machine: Machine) -> Result<Pro
     session.updates(1)?;
     let engine = session.engines()[0];
     let step = LedgerRecord::since(engine, Phase::Training, &before);
-    let plan = Plan::of_layers(engine.layers());
+    let plan = Footprint::of_layers(engine.layers());
     let samples = (session.epoch_size().0 as u64).min(u64::from(config.batch.get()));
     let before = ledger(&session, Phase::Evaluation);
     session.infer();

@@ -13,7 +13,7 @@ use super::session::chosen;
 use super::train::read_config;
 use crate::lab::config::Config;
 use crate::lab::data::{self, DataRoot, ImageShape};
-use crate::lab::price::{Cost, Plan, price};
+use crate::lab::price::{Cost, Footprint, price};
 use crate::lab::report::{self, Heat, Picture, RunView};
 use crate::lab::store::checkpoint::{self, CheckpointError, Identity};
 use crate::lab::store::folder::{self, FolderError, RunFolder, names};
@@ -93,7 +93,7 @@ pub fn report(path: &Path, data_root: Option<&DataRoot>) -> Result<ReportMade, R
 
 /// What a run cost on its own chip.
 pub(super) fn cost(config: &Config, ledger: &LedgerRecord, records: &[EpochRecord]) -> Cost {
-    let plan = Plan::of_records(records.last().map_or(&[], |record| &record.pathways));
+    let plan = Footprint::of_records(records.last().map_or(&[], |record| &record.pathways));
     let bill = price(ledger, &plan, &config.hardware, &config.constants, &[]);
     Cost::of(&bill, ledger, &config.constants)
 }

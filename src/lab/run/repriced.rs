@@ -7,7 +7,7 @@ use super::train::read_config;
 use super::{RunError, records};
 use crate::chip::hardware::Hardware;
 use crate::lab::config::{Config, Constants, Model, load_model};
-use crate::lab::price::{Bill, Change, Cost, Plan, changes, price};
+use crate::lab::price::{Bill, Change, Cost, Footprint, changes, price};
 use crate::lab::store::folder::{self, FolderError, names};
 use crate::lab::store::hash;
 use crate::lab::store::ledger::LedgerRecord;
@@ -27,7 +27,7 @@ pub struct Repriced {
     pub not_simulated: BTreeMap<String, String>,
     /// [`Prices::fingerprint`] of the chip whose constants are used.
     pub fingerprint: String,
-    plan: Plan,
+    plan: Footprint,
     hardware: Hardware,
     constants: Constants,
 }
@@ -98,7 +98,7 @@ pub fn reprice_as(path: &Path, other: Option<Prices>) -> Result<Repriced, RunErr
     let Some(record) = records.last() else {
         return Err(damaged(names::METRICS, "has no record".into()).into());
     };
-    let plan = Plan::of_records(&record.pathways);
+    let plan = Footprint::of_records(&record.pathways);
     let made_on = config.hardware_name.clone();
     let changes = other.as_ref().map_or_else(Vec::new, |o| changes(&config.hardware, &o.hardware));
     let prices = other.unwrap_or_else(|| Prices::of(&config));

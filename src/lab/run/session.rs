@@ -7,7 +7,7 @@ use super::{Machine, RunError};
 use crate::chip::engine::{Engine, Phase, Recorded};
 use crate::chip::ledger::Event;
 use crate::lab::config::{Config, Select};
-use crate::lab::data::Loaded;
+use crate::lab::data::Data;
 use crate::lab::store::checkpoint::{self, CheckpointError, Identity};
 use crate::lab::store::record::{
     DataRecord, EpochRecord, LayerRecord, Note, PathwayRecord, TestOutcome,
@@ -37,7 +37,7 @@ impl Session {
     ///
     /// # Panics
     /// When threads cannot be started.
-    pub fn new(config: &Config, data: Loaded, machine: Machine) -> Result<Self, RunError> {
+    pub fn new(config: &Config, data: Data, machine: Machine) -> Result<Self, RunError> {
         let record = DataRecord::of(&data);
         let given = config.given(record.features, record.classes, record.image)?;
         let task = task::build(config, data, machine)?;

@@ -11,7 +11,7 @@ use super::{Machine, RunError};
 use crate::chip::engine::Currents;
 use crate::chip::state::State;
 use crate::lab::config::Config;
-use crate::lab::data::Loaded;
+use crate::lab::data::Data;
 use crate::lab::store::record::{DataRecord, Note, Outcome, Score, TestOutcome};
 use crate::learn::driver::Driver;
 use crate::learn::statistics::PathwayStatistics;
@@ -90,7 +90,7 @@ pub(super) trait Task: fmt::Debug {
 /// Builds what a configuration asks to be learnt.
 pub(super) fn build(
     config: &Config,
-    data: Loaded,
+    data: Data,
     machine: Machine,
 ) -> Result<Box<dyn Task>, RunError> {
     let record = DataRecord::of(&data);

@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 use super::session::chosen;
 use super::{Machine, Progress, RunError, Session, proof};
 use crate::lab::config::{self, Config, Select, Sources};
-use crate::lab::data::{self, DataRoot, ImageShape, Loaded};
+use crate::lab::data::{self, Data, DataRoot, ImageShape};
 use crate::lab::price::Cost;
 use crate::lab::store::folder::{self, FolderError, RunFolder, names};
 use crate::lab::store::ledger::LedgerRecord;
@@ -21,7 +21,7 @@ use crate::lab::store::{address, hash};
 
 /// What happens while a run is carried out.
 #[derive(Debug)]
-pub enum Event<'a> {
+pub enum RunEvent<'a> {
     /// The run is about to start.
     Started {
         /// Its folder.
@@ -59,7 +59,7 @@ impl Keeping {
 
 /// A finished run.
 #[derive(Debug)]
-pub struct Outcome {
+pub struct Trained {
     /// Its receipt.
     pub receipt: Receipt,
     /// Its records.
@@ -81,8 +81,8 @@ pub fn train(
     data_root: &DataRoot,
     root: &Path,
     machine: Machine,
-    on_event: &mut (dyn FnMut(Event<'_>) -> bool + Send),
-) -> Result<Outcome, RunError> {
+    on_event: &mut (dyn FnMut(RunEvent<'_>) -> bool + Send),
+) -> Result<Trained, RunError> {
     let loaded = data::load(&config.source()?, data_root)?;
     let about = (loaded.description.clone(), loaded.image);
     let session = Session::new(config, loaded, machine)?;
@@ -101,8 +101,8 @@ pub fn resume(
     path: &Path,
     data_root: &DataRoot,
     machine: Machine,
-    on_event: &mut (dyn FnMut(Event<'_>) -> bool + Send),
-) -> Result<Outcome, RunError> {
+    on_event: &mut (dyn FnMut(RunEvent<'_>) -> bool + Send),
+) -> Result<Trained, RunError> {
     let folder = RunFolder::open(path)?;
     let (config, text) = read_config(path)?;
     let loaded = data::load(&config.source()?, data_root)?;
@@ -119,12 +119,12 @@ pub fn resume(
 /// When something does not fit, the disk refuses, or the caller stops it.
 pub fn carry_on(
     config: &Config,
-    loaded: &Loaded,
+    loaded: &Data,
     folder: RunFolder,
     machine: Machine,
     keeping: Keeping,
-    on_event: &mut (dyn FnMut(Event<'_>) -> bool + Send),
-) -> Result<Outcome, RunError> {
+    on_event: &mut (dyn FnMut(RunEvent<'_>) -> bool + Send),
+) -> Result<Trained, RunError> {
     let about = (loaded.description.clone(), loaded.image);
     let session = || Session::new(config, loaded.clone(), machine);
     let text = config.to_toml();
@@ -316,11 +316,11 @@ impl<'a> Run<'a> {
 
     fn carry_out(
         mut self,
-        on_event: &mut (dyn FnMut(Event<'_>) -> bool + Send),
-    ) -> Result<Outcome, RunError> {
+        on_event: &mut (dyn FnMut(RunEvent<'_>) -> bool + Send),
+    ) -> Result<Trained, RunError> {
         let path = self.folder.path().to_path_buf();
         let epochs = self.config.epochs;
-        on_event(Event::Started {
+        on_event(RunEvent::Started {
             folder: &path,
             data: &self.description,
             warnings: &self.session.warnings(),
@@ -333,15 +333,15 @@ impl<'a> Run<'a> {
         }
         while self.session.epoch() < epochs {
             let epoch = self.session.epoch();
-            let learnt = self.session.advance(&mut |progress| on_event(Event::Batch(progress)));
+            let learnt = self.session.advance(&mut |progress| on_event(RunEvent::Batch(progress)));
             let Some((record, seconds)) = learnt else {
                 return Err(RunError::Stopped { epoch, path: path.display().to_string() });
             };
             let note = self.session.note(&record).map(ToString::to_string);
             self.keep(record, seconds)?;
-            on_event(Event::Epoch(self.records.last().expect("just kept"), seconds));
+            on_event(RunEvent::Epoch(self.records.last().expect("just kept"), seconds));
             if let Some(note) = note {
-                on_event(Event::Warning(&note));
+                on_event(RunEvent::Warning(&note));
             }
         }
         self.finish()
@@ -404,7 +404,7 @@ impl<'a> Run<'a> {
         }
     }
 
-    fn finish(mut self) -> Result<Outcome, RunError> {
+    fn finish(mut self) -> Result<Trained, RunError> {
         let state = self.session.checkpoint();
         if self.keeping.states && self.pending {
             self.flush(&state)?;
@@ -458,6 +458,6 @@ impl<'a> Run<'a> {
             self.folder.forget_states();
         }
         let Self { records, timing, .. } = self;
-        Ok(Outcome { receipt, records, timing, summary: page.summary, cost })
+        Ok(Trained { receipt, records, timing, summary: page.summary, cost })
     }
 }

@@ -9,7 +9,7 @@ use std::fmt;
 
 use serde::{Deserialize, Serialize};
 
-use crate::lab::data::Loaded;
+use crate::lab::data::Data;
 use crate::task::classify::Split;
 
 /// Right answers out of how many.
@@ -249,7 +249,7 @@ pub struct DataRecord {
 impl DataRecord {
     /// What was loaded.
     #[must_use]
-    pub fn of(data: &Loaded) -> Self {
+    pub fn of(data: &Data) -> Self {
         let Split { train, validation, test } = &data.split;
         Self {
             hash: data.hash.clone(),

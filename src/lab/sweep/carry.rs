@@ -11,7 +11,7 @@ use std::sync::{Mutex, MutexGuard};
 use std::time::Duration;
 
 use super::row::{row, row_as};
-use super::{Plan, Row, Shard, SweepError, Task};
+use super::{PlannedRun, Row, Shard, SweepError, SweepPlan};
 use crate::chip::crossbar::kernel::Backend;
 use crate::lab::run::{self, Keeping, Machine, Prices, RunError};
 use crate::lab::store::ARITHMETIC;
@@ -36,7 +36,7 @@ pub struct Options {
 
 /// What happens meanwhile.
 #[derive(Debug)]
-pub enum Event<'a> {
+pub enum SweepEvent<'a> {
     /// It is about to start.
     Started {
         /// Runs that are finished already.
@@ -51,7 +51,7 @@ pub enum Event<'a> {
     /// A run is finished.
     Finished {
         /// Which.
-        task: &'a Task,
+        task: &'a PlannedRun,
         /// Its results.
         row: &'a Row,
         /// Seconds its learning took.
@@ -64,7 +64,7 @@ pub enum Event<'a> {
     /// A run failed; the others go on.
     Failed {
         /// Which.
-        task: &'a Task,
+        task: &'a PlannedRun,
         /// Why.
         error: &'a str,
     },
@@ -87,16 +87,16 @@ pub struct Carried {
 }
 
 struct Crew<'a> {
-    plan: &'a Plan,
+    plan: &'a SweepPlan,
     options: Options,
     store: Mutex<&'a mut Store>,
-    queue: Mutex<VecDeque<&'a Task>>,
-    held: Mutex<VecDeque<&'a Task>>,
+    queue: Mutex<VecDeque<&'a PlannedRun>>,
+    held: Mutex<VecDeque<&'a PlannedRun>>,
     finished: AtomicUsize,
     failed: AtomicUsize,
     stop: &'a AtomicBool,
     broken: Mutex<Option<SweepError>>,
-    on_event: &'a (dyn Fn(Event<'_>) + Sync),
+    on_event: &'a (dyn Fn(SweepEvent<'_>) + Sync),
 }
 
 /// What came of a run.
@@ -114,16 +114,17 @@ enum Came {
 /// # Panics
 /// When a thread cannot be started.
 pub fn carry_out(
-    plan: &Plan,
+    plan: &SweepPlan,
     store: &mut Store,
     options: Options,
     stop: &AtomicBool,
-    on_event: &(dyn Fn(Event<'_>) + Sync),
+    on_event: &(dyn Fn(SweepEvent<'_>) + Sync),
 ) -> Result<Carried, SweepError> {
     let (sweep, points) = plan.records();
     store.plan(&sweep, &points)?;
     let mine = |at: &usize| options.shard.is_none_or(|shard| shard.has(*at));
-    let tasks: Vec<&Task> = (0..plan.tasks.len()).filter(mine).map(|at| &plan.tasks[at]).collect();
+    let tasks: Vec<&PlannedRun> =
+        (0..plan.tasks.len()).filter(mine).map(|at| &plan.tasks[at]).collect();
     let mut todo = VecDeque::new();
     for &task in &tasks {
         if store.row(&task.key)?.is_none() {
@@ -132,7 +133,7 @@ pub fn carry_out(
     }
     let finished = tasks.len() - todo.len();
     let work = todo.iter().map(|task| task.work).sum();
-    on_event(Event::Started { finished, todo: todo.len(), work });
+    on_event(SweepEvent::Started { finished, todo: todo.len(), work });
     let jobs = options.jobs.min(todo.len());
     let crew = Crew {
         plan,
@@ -161,7 +162,7 @@ pub fn carry_out(
 }
 
 /// Gives points whose run was priced with other constants than theirs rows of their own.
-fn price_points(plan: &Plan, store: &mut Store) -> Result<(), SweepError> {
+fn price_points(plan: &SweepPlan, store: &mut Store) -> Result<(), SweepError> {
     let mut own = Vec::new();
     for planned in &plan.points {
         let (Ok(key), Some(prices)) = (&planned.key, &planned.prices) else { continue };
@@ -200,7 +201,7 @@ impl<'a> Crew<'a> {
                     let Some(task) = next else { return };
                     if !announced {
                         announced = true;
-                        (self.on_event)(Event::Waiting { runs: left });
+                        (self.on_event)(SweepEvent::Waiting { runs: left });
                     }
                     std::thread::sleep(PAUSE);
                     task
@@ -216,14 +217,20 @@ impl<'a> Crew<'a> {
                 Ok(Came::Done { row, seconds, elsewhere }) => {
                     let finished = self.finished.fetch_add(1, Ordering::SeqCst) + 1;
                     let row = &row;
-                    (self.on_event)(Event::Finished { task, row, seconds, elsewhere, finished });
+                    (self.on_event)(SweepEvent::Finished {
+                        task,
+                        row,
+                        seconds,
+                        elsewhere,
+                        finished,
+                    });
                 }
                 Ok(Came::Held) => lock(&self.held).push_back(task),
                 Ok(Came::Stopped) => return,
                 Err(Trouble::Run(error)) => {
                     self.failed.fetch_add(1, Ordering::SeqCst);
                     let noted = lock(&self.store).refuse(&task.key, &error);
-                    (self.on_event)(Event::Failed { task, error: &error });
+                    (self.on_event)(SweepEvent::Failed { task, error: &error });
                     if let Err(error) = noted {
                         lock(&self.broken).get_or_insert(error.into());
                     }
@@ -235,7 +242,7 @@ impl<'a> Crew<'a> {
         }
     }
 
-    fn run(&self, task: &Task) -> Result<Came, Trouble> {
+    fn run(&self, task: &PlannedRun) -> Result<Came, Trouble> {
         let path = lock(&self.store).folder(&task.key);
         let folder = match RunFolder::take(&path) {
             Ok(folder) => folder,
@@ -248,7 +255,7 @@ impl<'a> Crew<'a> {
             && let Ok((row, seconds)) = row(&path)
         {
             self.index(task, &row, seconds)?;
-            (self.on_event)(Event::Work(task.work));
+            (self.on_event)(SweepEvent::Work(task.work));
             return Ok(Came::Done { row, seconds, elsewhere: true });
         }
         let machine = Machine::new(self.options.backend, 1).expect("one thread");
@@ -261,11 +268,11 @@ impl<'a> Crew<'a> {
             machine,
             self.options.keeping,
             &mut |event| {
-                if let run::Event::Batch(progress) = event {
+                if let run::RunEvent::Batch(progress) = event {
                     let seen =
                         f64::from(progress.epoch) * progress.total as f64 + progress.done as f64;
                     let done = seen - before.replace(seen).unwrap_or(0.0);
-                    (self.on_event)(Event::Work(task.work * done / samples));
+                    (self.on_event)(SweepEvent::Work(task.work * done / samples));
                 }
                 !self.stopped()
             },
@@ -283,7 +290,7 @@ impl<'a> Crew<'a> {
     }
 
     /// Puts a finished run into the index.
-    fn index(&self, task: &Task, row: &Row, seconds: f64) -> Result<(), Trouble> {
+    fn index(&self, task: &PlannedRun, row: &Row, seconds: f64) -> Result<(), Trouble> {
         let kept = lock(&self.store).keep(&[(task.key.clone(), row.to_json(), seconds)]);
         kept.map_err(Trouble::place)
     }
@@ -302,7 +309,7 @@ impl Trouble {
 }
 
 /// Whether a folder holds the finished run of this task.
-fn is_finished(path: &Path, task: &Task) -> bool {
+fn is_finished(path: &Path, task: &PlannedRun) -> bool {
     folder::read_receipt(path).is_ok_and(|receipt| {
         receipt.status == "finished" && receipt.arithmetic == ARITHMETIC && receipt.run == task.key
     })

@@ -8,7 +8,7 @@ use std::time::Instant;
 
 use super::{Point, Sweep, SweepError};
 use crate::lab::config::{self, Config, Overlay, Sources};
-use crate::lab::data::{self, DataRoot, Loaded};
+use crate::lab::data::{self, Data, DataRoot};
 use crate::lab::run::{Machine, Prices, RunError, Session};
 use crate::lab::store::address;
 use crate::lab::store::index::{PointRecord, SweepRecord};
@@ -60,14 +60,14 @@ pub struct Planned {
 
 /// One run; several points may need it.
 #[derive(Debug, Clone)]
-pub struct Task {
+pub struct PlannedRun {
     /// Its key.
     pub key: String,
     /// Its configuration.
     pub config: Config,
-    /// Its data, in [`Plan::data`].
+    /// Its data, in [`SweepPlan::data`].
     pub data: usize,
-    /// The first point that needs it, in [`Plan::points`].
+    /// The first point that needs it, in [`SweepPlan::points`].
     pub point: usize,
     /// How long it takes, roughly: cells x samples.
     pub work: f64,
@@ -75,7 +75,7 @@ pub struct Task {
 
 /// All runs of a sweep.
 #[derive(Debug)]
-pub struct Plan {
+pub struct SweepPlan {
     /// The sweep.
     pub sweep: Sweep,
     /// Points, by number.
@@ -83,18 +83,18 @@ pub struct Plan {
     /// Points before the filters.
     pub before: usize,
     /// Runs: those of the first seed first, so that a table is soon complete if not exact.
-    pub tasks: Vec<Task>,
+    pub tasks: Vec<PlannedRun>,
     /// Data sets.
-    pub data: Vec<Loaded>,
+    pub data: Vec<Data>,
 }
 
 /// Resolves every point. `settings` (`key=value`) lie between the sweep's `base` and its axes.
 ///
 /// # Errors
 /// When data is missing, or no point makes a run.
-pub fn plan(sweep: Sweep, settings: &[String], root: &DataRoot) -> Result<Plan, SweepError> {
+pub fn plan(sweep: Sweep, settings: &[String], root: &DataRoot) -> Result<SweepPlan, SweepError> {
     let (points, before) = sweep.points()?;
-    let mut plan = Plan { points: vec![], before, tasks: vec![], data: vec![], sweep };
+    let mut plan = SweepPlan { points: vec![], before, tasks: vec![], data: vec![], sweep };
     let mut sources: Vec<String> = Vec::new();
     let mut first_error = None;
     let mut known = BTreeMap::new();
@@ -125,8 +125,13 @@ pub fn plan(sweep: Sweep, settings: &[String], root: &DataRoot) -> Result<Plan, 
                 let shared = chips.entry(own.fingerprint()).or_insert_with(|| Arc::new(own));
                 prices = Some(Arc::clone(shared));
                 if known.insert(key.clone(), ()).is_none() {
-                    let task =
-                        Task { key: key.clone(), config, data, point: plan.points.len(), work };
+                    let task = PlannedRun {
+                        key: key.clone(),
+                        config,
+                        data,
+                        point: plan.points.len(),
+                        work,
+                    };
                     plan.tasks.push(task);
                 }
                 Ok(key)
@@ -144,7 +149,7 @@ pub fn plan(sweep: Sweep, settings: &[String], root: &DataRoot) -> Result<Plan, 
         return Err(error);
     }
     let seeds = plan.sweep.seeds.clone();
-    let rank = |task: &Task| {
+    let rank = |task: &PlannedRun| {
         let seed = plan.points[task.point].point.seed;
         (seeds.iter().position(|one| Some(*one) == seed), task.point)
     };
@@ -172,7 +177,7 @@ fn resolve(
 }
 
 /// Checks that a configuration fits data and chip; the address of its run, and how much work it is.
-fn check(config: &Config, data: &Loaded) -> Result<(String, f64), RunError> {
+fn check(config: &Config, data: &Data) -> Result<(String, f64), RunError> {
     let train = &data.split.train;
     let record = DataRecord::of(data);
     let experiment = config.experiment(record.features, record.classes, record.image)?;
@@ -188,7 +193,7 @@ fn check(config: &Config, data: &Loaded) -> Result<(String, f64), RunError> {
     Ok((key, experiment.network.layers.iter().map(cells).sum::<f64>() * planes * samples))
 }
 
-impl Plan {
+impl SweepPlan {
     /// As an index keeps it.
     #[must_use]
     pub fn records(&self) -> (SweepRecord, Vec<PointRecord>) {
@@ -233,7 +238,11 @@ pub struct Estimate {
 ///
 /// # Errors
 /// When a run cannot be started.
-pub fn estimate(plan: &Plan, tasks: &[&Task], machine: Machine) -> Result<Estimate, SweepError> {
+pub fn estimate(
+    plan: &SweepPlan,
+    tasks: &[&PlannedRun],
+    machine: Machine,
+) -> Result<Estimate, SweepError> {
     let probes = PROBES.min(tasks.len());
     let (mut seconds, mut work) = (0.0, 0.0);
     for probe in 0..probes {
@@ -275,7 +284,7 @@ mod tests {
         }
     }
 
-    fn planned(text: &str, settings: &[&str]) -> Result<Plan, String> {
+    fn planned(text: &str, settings: &[&str]) -> Result<SweepPlan, String> {
         let sweep = Sweep::parse("s.toml", text, "").map_err(|e| e.to_string())?;
         let settings: Vec<String> = settings.iter().map(ToString::to_string).collect();
         plan(sweep, &settings, &DataRoot::new("data")).map_err(|e| e.to_string())

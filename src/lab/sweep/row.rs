@@ -10,7 +10,7 @@ use crate::lab::price::Cost;
 use crate::lab::run::{self, Prices, RunError, reprice_as};
 use crate::lab::store::folder;
 use crate::lab::store::record::{EpochRecord, Receipt, Score, TestOutcome};
-use crate::lab::table::Unit;
+use crate::lab::table::ColumnUnit;
 
 /// What the numbers of a column are made of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -31,7 +31,7 @@ pub struct ResultColumn {
     /// Words for people.
     pub label: &'static str,
     /// What it is measured in.
-    pub unit: Unit,
+    pub unit: ColumnUnit,
     /// What its numbers are made of.
     pub kind: ResultKind,
     /// The task whose runs have it; `None`: all.
@@ -88,7 +88,7 @@ macro_rules! task {
 
 macro_rules! results {
     ($($(#[cfg($cfg:meta)])? $name:literal, $label:literal, $unit:ident, $kind:ident $(of $task:literal)?, $of:expr;)*) => {
-        &[$($(#[cfg($cfg)])? ResultColumn { name: $name, label: $label, unit: Unit::$unit, kind: ResultKind::$kind, task: task!($($task)?), of: $of },)*]
+        &[$($(#[cfg($cfg)])? ResultColumn { name: $name, label: $label, unit: ColumnUnit::$unit, kind: ResultKind::$kind, task: task!($($task)?), of: $of },)*]
     };
 }
 

@@ -3,9 +3,9 @@
 use super::axis::Value;
 use super::row::{RESULTS, ResultKind, Row};
 use super::{Sweep, SweepError};
-use crate::lab::report::sweep::{Axis, Figures, Refused};
+use crate::lab::report::sweep::{Figures, Refused, ShownAxis};
 use crate::lab::store::index::{Store, SweepRecord};
-use crate::lab::table::{Column, Role, Table, Unit, Values};
+use crate::lab::table::{Column, ColumnUnit, Role, Table, Values};
 
 /// What a store knows of a sweep.
 #[derive(Debug)]
@@ -15,7 +15,7 @@ pub struct Results {
     /// One row a point.
     pub table: Table,
     /// Axes, as a report shows them.
-    pub axes: Vec<Axis>,
+    pub axes: Vec<ShownAxis>,
     /// What the figures show at first.
     pub figures: Figures,
     /// Points that cannot be run.
@@ -84,7 +84,7 @@ pub fn results(store: &Store, record: &SweepRecord) -> Result<Results, SweepErro
     let mut columns = vec![Column {
         name: "point".into(),
         label: "point".into(),
-        unit: Unit::Plain,
+        unit: ColumnUnit::Plain,
         role: Role::Name,
         values: Values::Whole(points.iter().map(|point| Some(point.number.into())).collect()),
     }];
@@ -92,7 +92,7 @@ pub fn results(store: &Store, record: &SweepRecord) -> Result<Results, SweepErro
         columns.push(Column {
             name: axis.name.clone(),
             label: axis.label.clone(),
-            unit: Unit::Plain,
+            unit: ColumnUnit::Plain,
             role: Role::Axis,
             values: of_values(values.iter().map(|values| &values[at])),
         });
@@ -102,12 +102,12 @@ pub fn results(store: &Store, record: &SweepRecord) -> Result<Results, SweepErro
     if seeds.iter().any(Option::is_some) {
         let (name, label) = ("seed".into(), "seed".into());
         let values = Values::Whole(seeds);
-        columns.push(Column { name, label, unit: Unit::Plain, role: Role::Seed, values });
+        columns.push(Column { name, label, unit: ColumnUnit::Plain, role: Role::Seed, values });
     }
     columns.extend(result_columns(&rows));
     let text = |name: &str, label: &str, values| {
         let (name, label, values) = (name.to_owned(), label.to_owned(), Values::Text(values));
-        Column { name, label, unit: Unit::Plain, role: Role::Name, values }
+        Column { name, label, unit: ColumnUnit::Plain, role: Role::Name, values }
     };
     let status = points.iter().zip(&rows).map(|(point, row)| {
         let status = match (row, &point.refused) {
@@ -140,7 +140,7 @@ pub fn results(store: &Store, record: &SweepRecord) -> Result<Results, SweepErro
         rows.iter().flatten().flat_map(|row| row.not_simulated.iter().cloned()).collect();
     not_simulated.sort();
     not_simulated.dedup();
-    let axes = sweep.axes.iter().zip(&columns[1..]).map(|(axis, column)| Axis {
+    let axes = sweep.axes.iter().zip(&columns[1..]).map(|(axis, column)| ShownAxis {
         name: axis.name.clone(),
         label: axis.label.clone(),
         number: !column.values.is_text(),

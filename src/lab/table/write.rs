@@ -157,13 +157,13 @@ mod tests {
     use parquet::file::reader::{FileReader, SerializedFileReader};
     use parquet::record::Field;
 
-    use super::super::{Column, Role, Unit};
+    use super::super::{Column, ColumnUnit, Role};
     use super::*;
 
     fn table() -> Table {
         let column = |name: &str, values| {
             let (name, label) = (name.to_owned(), name.to_owned());
-            Column { name, label, unit: Unit::Plain, role: Role::Result, values }
+            Column { name, label, unit: ColumnUnit::Plain, role: Role::Result, values }
         };
         Table {
             columns: vec![

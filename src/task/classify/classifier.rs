@@ -3,7 +3,7 @@
 
 use super::examples::Examples;
 use super::experiment::Experiment;
-use super::trainer::{Evaluation, Progress, Stop, Trainer};
+use super::trainer::{EpochProgress, Evaluation, Stop, Trainer};
 use crate::chip::crossbar::kernel::Backend;
 use crate::chip::hardware::{Adc, AdcRange};
 use crate::chip::state::{State, StateError, Visitor};
@@ -81,7 +81,7 @@ impl Classifier {
     ///
     /// # Errors
     /// [`Stop`] when `go_on` says so; the state then lies inside an epoch.
-    pub fn learn(&mut self, go_on: &mut dyn FnMut(Progress) -> bool) -> Result<u64, Stop> {
+    pub fn learn(&mut self, go_on: &mut dyn FnMut(EpochProgress) -> bool) -> Result<u64, Stop> {
         let again = matches!(
             self.trainer.experiment().hardware.adc,
             Adc::Finite { range: AdcRange::Calibrated { every_epoch: true, .. }, .. }

@@ -17,7 +17,7 @@ const READ_BATCH: usize = 256;
 
 /// How far an epoch is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Progress {
+pub struct EpochProgress {
     /// Epoch in progress, from 0.
     pub epoch: u32,
     /// Samples learnt from in this epoch.
@@ -134,7 +134,7 @@ impl Trainer {
     pub fn learn(
         &mut self,
         train: &Examples,
-        go_on: &mut dyn FnMut(Progress) -> bool,
+        go_on: &mut dyn FnMut(EpochProgress) -> bool,
     ) -> Result<u64, Stop> {
         let total = train.len();
         let samples = narrow(total, "fewer than 2^32 examples");
@@ -176,7 +176,7 @@ impl Trainer {
             });
             done += batch.len();
             let (epoch, samples) = (self.epoch, done);
-            if !go_on(Progress { epoch, samples, samples_total: total, correct }) {
+            if !go_on(EpochProgress { epoch, samples, samples_total: total, correct }) {
                 return Err(Stop);
             }
         }

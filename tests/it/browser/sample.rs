@@ -1,13 +1,13 @@
 //! Invented sweeps, as views of tables: a grid like that of a study of level bits, a large one drawn at random, odd ones.
 
-use dalean::lab::report::sweep::{Axis, Figures, Refused, SweepView};
-use dalean::lab::table::{Column, Role, Table, Unit, Values};
+use dalean::lab::report::sweep::{Figures, Refused, ShownAxis, SweepView};
+use dalean::lab::table::{Column, ColumnUnit, Role, Table, Values};
 
 /// A sweep that owns what its view borrows.
 pub(crate) struct Sample {
     pub(crate) name: &'static str,
     pub(crate) table: Table,
-    pub(crate) axes: Vec<Axis>,
+    pub(crate) axes: Vec<ShownAxis>,
     pub(crate) figures: Figures,
     pub(crate) refused: Vec<Refused>,
 }
@@ -34,13 +34,13 @@ impl Dice {
     }
 }
 
-pub(crate) fn column(name: &str, unit: Unit, role: Role, values: Values) -> Column {
+pub(crate) fn column(name: &str, unit: ColumnUnit, role: Role, values: Values) -> Column {
     Column { name: name.into(), label: name.replace('_', " "), unit, role, values }
 }
 
-pub(crate) fn axis(name: &str, number: bool, log: bool, order: &[&str]) -> Axis {
+pub(crate) fn axis(name: &str, number: bool, log: bool, order: &[&str]) -> ShownAxis {
     let order = order.iter().map(|&value| value.to_owned()).collect();
-    Axis { name: name.into(), label: name.replace('_', " "), number, log, order }
+    ShownAxis { name: name.into(), label: name.replace('_', " "), number, log, order }
 }
 
 const ROUNDINGS: [&str; 3] = ["nearest", "stochastic", "separable"];
@@ -117,20 +117,20 @@ impl Sample {
         let real =
             |name: &str, unit, values| column(name, unit, Role::Result, Values::Real(values));
         let columns = vec![
-            column("level_bits", Unit::Plain, Role::Axis, Values::Whole(bits)),
-            column("rounding", Unit::Plain, Role::Axis, Values::Text(roundings)),
-            column("rule", Unit::Plain, Role::Axis, Values::Text(rules)),
-            column("seed", Unit::Plain, Role::Seed, Values::Whole(seeds)),
-            real("test_accuracy", Unit::Fraction, accuracy),
-            real("validation_accuracy", Unit::Fraction, validation),
-            real("joules", Unit::Joules, joules),
-            real("joules_low", Unit::Joules, low),
-            real("joules_high", Unit::Joules, high),
-            real("floor_fraction", Unit::Fraction, floor),
-            column("cycles", Unit::Cycles, Role::Result, Values::Whole(cycles)),
-            column("pulses", Unit::Count, Role::Result, Values::Whole(pulses)),
-            column("state_hash", Unit::Plain, Role::Name, Values::Text(hashes)),
-            column("run", Unit::Plain, Role::Name, Values::Text(runs)),
+            column("level_bits", ColumnUnit::Plain, Role::Axis, Values::Whole(bits)),
+            column("rounding", ColumnUnit::Plain, Role::Axis, Values::Text(roundings)),
+            column("rule", ColumnUnit::Plain, Role::Axis, Values::Text(rules)),
+            column("seed", ColumnUnit::Plain, Role::Seed, Values::Whole(seeds)),
+            real("test_accuracy", ColumnUnit::Fraction, accuracy),
+            real("validation_accuracy", ColumnUnit::Fraction, validation),
+            real("joules", ColumnUnit::Joules, joules),
+            real("joules_low", ColumnUnit::Joules, low),
+            real("joules_high", ColumnUnit::Joules, high),
+            real("floor_fraction", ColumnUnit::Fraction, floor),
+            column("cycles", ColumnUnit::Cycles, Role::Result, Values::Whole(cycles)),
+            column("pulses", ColumnUnit::Count, Role::Result, Values::Whole(pulses)),
+            column("state_hash", ColumnUnit::Plain, Role::Name, Values::Text(hashes)),
+            column("run", ColumnUnit::Plain, Role::Name, Values::Text(runs)),
         ];
         let refused = (1..=3).map(|point| Refused {
             point: 216 + point,
@@ -177,14 +177,19 @@ impl Sample {
             (0.1 + 0.87 * rise - loss + 0.01 * dice.bell()).clamp(0.05, 0.99)
         };
         let all = |values: &[f64]| Values::Real(values.iter().copied().map(Some).collect());
-        columns.push(column("write_noise", Unit::Plain, Role::Axis, all(&noise)));
-        columns.push(column("learning_rate", Unit::Plain, Role::Axis, all(&rate)));
+        columns.push(column("write_noise", ColumnUnit::Plain, Role::Axis, all(&noise)));
+        columns.push(column("learning_rate", ColumnUnit::Plain, Role::Axis, all(&rate)));
         let whole = bits.iter().copied().map(Some).collect();
-        columns.push(column("level_bits", Unit::Plain, Role::Axis, Values::Whole(whole)));
+        columns.push(column("level_bits", ColumnUnit::Plain, Role::Axis, Values::Whole(whole)));
         let words = rules.iter().map(|&rule| Some(RULES[rule].to_owned())).collect();
-        columns.push(column("rule", Unit::Plain, Role::Axis, Values::Text(words)));
+        columns.push(column("rule", ColumnUnit::Plain, Role::Axis, Values::Text(words)));
         let scores = (0..rows).map(|row| done(row).then(|| score(row, &mut dice))).collect();
-        columns.push(column("test_accuracy", Unit::Fraction, Role::Result, Values::Real(scores)));
+        columns.push(column(
+            "test_accuracy",
+            ColumnUnit::Fraction,
+            Role::Result,
+            Values::Real(scores),
+        ));
         let joules = (0..rows)
             .map(|row| {
                 done(row).then(|| {
@@ -194,21 +199,21 @@ impl Sample {
                 })
             })
             .collect();
-        columns.push(column("joules", Unit::Joules, Role::Result, Values::Real(joules)));
+        columns.push(column("joules", ColumnUnit::Joules, Role::Result, Values::Real(joules)));
         for more in columns.len()..23 {
             let values = (0..rows).map(|row| done(row).then(|| 1e6 * dice.roll())).collect();
             columns.push(column(
                 &format!("count_{more}"),
-                Unit::Count,
+                ColumnUnit::Count,
                 Role::Result,
                 Values::Real(values),
             ));
         }
         let hashes = (0..rows).map(|row| done(row).then(|| format!("{row:064x}"))).collect();
-        columns.push(column("state_hash", Unit::Plain, Role::Name, Values::Text(hashes)));
+        columns.push(column("state_hash", ColumnUnit::Plain, Role::Name, Values::Text(hashes)));
         let runs =
             (0..rows).map(|row| done(row).then(|| format!("runs/{row:05}/report.html"))).collect();
-        columns.push(column("run", Unit::Plain, Role::Name, Values::Text(runs)));
+        columns.push(column("run", ColumnUnit::Plain, Role::Name, Values::Text(runs)));
         Self {
             name: "drawn-at-random",
             table: Table { columns },
@@ -245,8 +250,13 @@ impl Sample {
             name: "words",
             table: Table {
                 columns: vec![
-                    column("device", Unit::Plain, Role::Axis, Values::Text(values)),
-                    column("test_accuracy", Unit::Fraction, Role::Result, Values::Real(scores)),
+                    column("device", ColumnUnit::Plain, Role::Axis, Values::Text(values)),
+                    column(
+                        "test_accuracy",
+                        ColumnUnit::Fraction,
+                        Role::Result,
+                        Values::Real(scores),
+                    ),
                 ],
             },
             axes: vec![axis("device", false, false, &devices)],

@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use dalean::chip::crossbar::kernel::Backend;
-use dalean::chip::engine::{Calibration, Engine, Operation, Phase, Side, Write, Written};
+use dalean::chip::engine::{Calibration, Engine, Operation, Phase, Side, Write, WritesDone};
 use dalean::chip::hardware::{Adc, AdcRange, WriteScheme};
 use dalean::chip::layer::{Layer, WordSource};
 use dalean::chip::ledger::Ledger;
@@ -377,9 +377,9 @@ pub(crate) fn execute(engine: &mut Engine, op: &Op) -> Found {
         Op::Words(errors) => return Found::Words(engine.output_words(errors)),
         Op::Calibrate(codes) => return Found::Ranges(engine.calibrate(codes)),
         Op::Charge(phase) => engine.set_phase(*phase),
-        Op::Written(None) => engine.written(Written::Batch),
+        Op::Written(None) => engine.written(WritesDone::Batch),
         Op::Written(Some(samples)) => {
-            (0..*samples).for_each(|_| engine.written(Written::Sample));
+            (0..*samples).for_each(|_| engine.written(WritesDone::Sample));
         }
         _ => engine.execute(&operation(op).expect("an operation of the chip")),
     }

@@ -5,7 +5,7 @@
 
 use dalean::chip::crossbar::kernel::Backend;
 use dalean::chip::engine::tick::Network;
-use dalean::chip::engine::{Engine, Operation, Phase, Written};
+use dalean::chip::engine::{Engine, Operation, Phase, WritesDone};
 
 use super::choose::{Choice, Net, Numbers};
 use super::play::{self, Op};
@@ -46,8 +46,8 @@ pub(crate) fn law(net: &Net, choices: &[Choice], seed: u64) -> Result<(), String
         if let Some(op @ Op::Written(samples)) = rest.first() {
             play::execute(&mut engine, op);
             match samples {
-                None => tick.written(Written::Batch),
-                Some(samples) => (0..*samples).for_each(|_| tick.written(Written::Sample)),
+                None => tick.written(WritesDone::Batch),
+                Some(samples) => (0..*samples).for_each(|_| tick.written(WritesDone::Sample)),
             }
             rest = &rest[1..];
             continue;

@@ -15,7 +15,7 @@ use std::ops::Range;
 
 use super::ops::{Ops, twins};
 use super::{
-    Cells, Conversion, Dither, Drives, Ends, Half, Rails, Sums, Write, WriteCounts, lanes, peak,
+    Cells, Conversion, Dither, Drives, Ends, Half, Rails, Sums, WriteCounts, WriteLaw, lanes, peak,
     scalar,
 };
 use crate::chip::crossbar::layout::{BLOCK_CELLS, BLOCK_ROWS, HALF_CELLS, HALF_COLUMNS, Layout};

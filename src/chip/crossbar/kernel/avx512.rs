@@ -16,7 +16,7 @@ use std::arch::x86_64::*;
 use std::ops::Range;
 
 use super::ops::{Ops, twins};
-use super::{Cells, Dither, Drives, Ends, Half, Sums, Write, WriteCounts, peak, scalar};
+use super::{Cells, Dither, Drives, Ends, Half, Sums, WriteCounts, WriteLaw, peak, scalar};
 use crate::chip::crossbar::layout::{BLOCK_CELLS, BLOCK_ROWS, HALF_CELLS, HALF_COLUMNS};
 
 mod columns;

@@ -191,7 +191,7 @@ pub enum Dither<'a> {
 
 /// How sums become pulses and pulses become levels; the same for every cell of an array in one write.
 #[derive(Debug, Clone, Copy)]
-pub struct Write {
+pub struct WriteLaw {
     /// `k`: one pulse stands for `2^k` units of sum x mantissa.
     pub shift: u32,
     /// Small factor of the rate, 1..=15.
@@ -231,7 +231,7 @@ impl Cells<'_> {
 
     /// The window, where there is nothing but levels of 8 bits.
     #[cfg(target_arch = "x86_64")]
-    pub(super) fn plain_window(&self, write: &Write) -> Option<(u8, u8)> {
+    pub(super) fn plain_window(&self, write: &WriteLaw) -> Option<(u8, u8)> {
         if self.high.is_some() || self.residual.is_some() || self.pruned.is_some() {
             return None;
         }
@@ -258,7 +258,7 @@ impl Ends {
     }
 }
 
-impl Write {
+impl WriteLaw {
     /// Where levels end.
     #[must_use]
     pub const fn ends(&self) -> Ends {
@@ -282,7 +282,7 @@ pub struct Single<'a> {
     /// Words of the array.
     pub draws: &'a Draws,
     /// Rounding, bound and window.
-    pub write: &'a Write,
+    pub write: &'a WriteLaw,
     /// Peaks of all rows over the columns of the strip, where they are asked for; 0 before.
     pub peaks: Option<&'a mut [[u8; 2]]>,
 }

@@ -14,7 +14,7 @@ use std::ops::Range;
 
 use super::{
     Banks, Cells, Conversion, Dither, Draws, Drives, Ends, Extremes, Half, Image, LookUp, Peaks,
-    Rails, Scratch, Single, Sums, Write, WriteCounts,
+    Rails, Scratch, Single, Sums, WriteCounts, WriteLaw,
 };
 use crate::chip::crossbar::layout::Layout;
 use crate::num::fixed::ErrorBits;
@@ -54,13 +54,13 @@ pub(super) struct Ops {
     >,
     pub(super) dither: unsafe fn(&Draws, usize, usize, &mut Half<u8>),
     pub(super) dither_words: unsafe fn(&Draws, usize, usize, &mut Half<u16>),
-    pub(super) loud: unsafe fn(Sums<'_>, &Write, u32) -> u16,
+    pub(super) loud: unsafe fn(Sums<'_>, &WriteLaw, u32) -> u16,
     pub(super) pulses:
-        unsafe fn(Sums<'_>, &Write, Dither<'_>, &mut Cells<'_>, &mut Half<i8>) -> WriteCounts,
+        unsafe fn(Sums<'_>, &WriteLaw, Dither<'_>, &mut Cells<'_>, &mut Half<i8>) -> WriteCounts,
     pub(super) levels: unsafe fn(&mut Cells<'_>, &Half<i8>, Ends, u16) -> u64,
     /// Both at once, for writes as they usually are.
     pub(super) fused:
-        unsafe fn(&mut Cells<'_>, &Half<i32>, &Write, Dither<'_>) -> Option<WriteCounts>,
+        unsafe fn(&mut Cells<'_>, &Half<i32>, &WriteLaw, Dither<'_>) -> Option<WriteCounts>,
     pub(super) single: unsafe fn(Single<'_>) -> Option<WriteCounts>,
     pub(super) peaks: unsafe fn(&Extremes) -> Peaks,
     pub(super) peak: unsafe fn(usize) -> u64,
@@ -72,14 +72,14 @@ pub(super) struct Ops {
 macro_rules! twins {
     ($features:literal) => {
         #[target_feature(enable = $features)]
-        fn loud(sums: Sums<'_>, write: &Write, bits: u32) -> u16 {
+        fn loud(sums: Sums<'_>, write: &WriteLaw, bits: u32) -> u16 {
             crate::chip::crossbar::kernel::pulses::loud_twin(sums, write, bits)
         }
 
         #[target_feature(enable = $features)]
         fn pulses(
             sums: Sums<'_>,
-            write: &Write,
+            write: &WriteLaw,
             dither: Dither<'_>,
             cells: &mut Cells<'_>,
             out: &mut Half<i8>,

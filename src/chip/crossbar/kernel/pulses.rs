@@ -27,7 +27,7 @@
 use std::ops::BitOr;
 
 use super::requests::{self, Plain, Request};
-use super::{Cells, Dither, Half, Sums, Write, WriteCounts};
+use super::{Cells, Dither, Half, Sums, WriteCounts, WriteLaw};
 use crate::chip::crossbar::layout::{BLOCK_ROWS, HALF_CELLS, HALF_COLUMNS, in_half};
 use crate::num::fixed::rsh;
 
@@ -52,7 +52,7 @@ struct Given {
 }
 
 /// The law: a cell with a remainder asks for something, and is given it with a word of some bits.
-fn given(residual: i64, request: Request, (word, bits): (i64, u32), write: &Write) -> Given {
+fn given(residual: i64, request: Request, (word, bits): (i64, u32), write: &WriteLaw) -> Given {
     let (bound, fraction) = (i64::from(write.increment_max), write.residual_bits);
     let rounded = quotient(request, bits).saturating_add(word) >> bits;
     let total = rounded.saturating_add(residual);
@@ -65,7 +65,7 @@ fn given(residual: i64, request: Request, (word, bits): (i64, u32), write: &Writ
 /// The law for a half block. Where groups are passed over, `out` is left as it is.
 pub(super) fn law(
     sums: Sums<'_>,
-    write: &Write,
+    write: &WriteLaw,
     dither: Dither<'_>,
     cells: &mut Cells<'_>,
     out: &mut Half<i8>,
@@ -98,7 +98,7 @@ pub(super) fn law(
 }
 
 /// The law of loud groups, a bit each.
-pub(super) fn loud(sums: Sums<'_>, write: &Write, bits: u32) -> u16 {
+pub(super) fn loud(sums: Sums<'_>, write: &WriteLaw, bits: u32) -> u16 {
     let loud = |row: usize| {
         let mut requests = (0..HALF_COLUMNS).map(|c| requests::plain(sums.at(row, c), write));
         requests.any(|request| quotient(request, bits) != 0)
@@ -127,7 +127,7 @@ pub(super) struct Scale {
 impl Scale {
     /// Of words of 8 bits, or 16; half-up (`nearest`) is the word [`HALVES`].
     #[inline(always)]
-    fn new(write: &Write, bits: u32, nearest: bool) -> Self {
+    fn new(write: &WriteLaw, bits: u32, nearest: bool) -> Self {
         let up = write.residual_bits.saturating_sub(write.shift);
         let shift = write.shift.saturating_sub(write.residual_bits);
         let right = shift.saturating_sub(bits);
@@ -214,7 +214,7 @@ impl Lane for i64 {
 #[inline(always)]
 pub(super) fn twin(
     sums: Sums<'_>,
-    write: &Write,
+    write: &WriteLaw,
     dither: Dither<'_>,
     cells: &mut Cells<'_>,
     out: &mut Half<i8>,
@@ -227,7 +227,7 @@ pub(super) fn twin(
 
 /// [`loud`], as compilers make vectors of it.
 #[inline(always)]
-pub(super) fn loud_twin(sums: Sums<'_>, write: &Write, bits: u32) -> u16 {
+pub(super) fn loud_twin(sums: Sums<'_>, write: &WriteLaw, bits: u32) -> u16 {
     match sums {
         Sums::Narrow(sums) => loud_lanes(sums, write, bits),
         Sums::Wide(sums) => loud_lanes(sums, write, bits),
@@ -235,7 +235,7 @@ pub(super) fn loud_twin(sums: Sums<'_>, write: &Write, bits: u32) -> u16 {
 }
 
 #[inline(always)]
-fn loud_lanes<L: Lane>(sums: &Half<L>, write: &Write, bits: u32) -> u16 {
+fn loud_lanes<L: Lane>(sums: &Half<L>, write: &WriteLaw, bits: u32) -> u16 {
     let by = write.shift.saturating_sub(write.residual_bits).saturating_sub(bits);
     let plain = Plain::new(write);
     let mut loud = 0;
@@ -249,7 +249,7 @@ fn loud_lanes<L: Lane>(sums: &Half<L>, write: &Write, bits: u32) -> u16 {
 #[inline(always)]
 fn of_lanes<L: Lane>(
     sums: &Half<L>,
-    write: &Write,
+    write: &WriteLaw,
     dither: Dither<'_>,
     cells: &mut Cells<'_>,
     out: &mut Half<i8>,

@@ -8,7 +8,7 @@
 //! twin for a lane, and this is where it stands; what follows does not know which one asked. See docs/MODEL.md, 3.3.
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
-use super::Write;
+use super::WriteLaw;
 
 /// What is asked of one cell: `amount / 2^shift` steps of the remainder.
 #[derive(Debug, Clone, Copy)]
@@ -18,7 +18,7 @@ pub(super) struct Request {
 }
 
 /// The law: a request for each sum.
-pub(super) fn plain(sum: i64, write: &Write) -> Request {
+pub(super) fn plain(sum: i64, write: &WriteLaw) -> Request {
     let amount = sum * i64::from(write.mantissa);
     Request {
         amount: if write.negate { -amount } else { amount },
@@ -34,7 +34,7 @@ pub(super) struct Plain {
 }
 
 impl Plain {
-    pub(super) const fn new(write: &Write) -> Self {
+    pub(super) const fn new(write: &WriteLaw) -> Self {
         Self { factor: if write.negate { -write.mantissa } else { write.mantissa } }
     }
 

@@ -203,7 +203,7 @@ fn programmed<'a>(
     kernel: &Kernel,
     mut state: State,
     sums: impl Into<Sums<'a>>,
-    write: &Write,
+    write: &WriteLaw,
     dither: Dither<'_>,
     [wide, absorbs]: [bool; 2],
 ) -> State {
@@ -218,7 +218,7 @@ fn programmed<'a>(
     state
 }
 
-fn check_program(levels: &Half<u8>, sums: &Half<i32>, write: &Write, seed: u64) {
+fn check_program(levels: &Half<u8>, sums: &Half<i32>, write: &WriteLaw, seed: u64) {
     let words = bytes(seed, 2 * HALF_CELLS);
     let byte_words = half(&words[..HALF_CELLS]);
     let words: Vec<_> = words.as_chunks().0.iter().map(|word| u16::from_le_bytes(*word)).collect();
@@ -236,7 +236,7 @@ fn check_program(levels: &Half<u8>, sums: &Half<i32>, write: &Write, seed: u64) 
             if modes[0] && write.ceiling == 0 {
                 continue;
             }
-            let write = if modes[0] { &Write { ceiling: 4095, ..*write } } else { write };
+            let write = if modes[0] { &WriteLaw { ceiling: 4095, ..*write } } else { write };
             let want = programmed(&law(), fresh.clone(), sums, write, dither, modes);
             for (name, kernel) in others() {
                 let got = programmed(&kernel, fresh.clone(), sums, write, dither, modes);
@@ -254,7 +254,7 @@ fn check_program(levels: &Half<u8>, sums: &Half<i32>, write: &Write, seed: u64) 
             assert_eq!(kernel.loud(sums, write, bits), groups, "{name} {write:?}");
             if (write.floor, write.ceiling) == (0, 255) {
                 // what is not loud may be passed over
-                let some = Write { groups, ..*write };
+                let some = WriteLaw { groups, ..*write };
                 for modes in [[false, false], [false, true]] {
                     let want = programmed(&law(), fresh.clone(), sums, write, dither, modes);
                     let got = programmed(&kernel, fresh.clone(), sums, &some, dither, modes);
@@ -268,7 +268,7 @@ fn check_program(levels: &Half<u8>, sums: &Half<i32>, write: &Write, seed: u64) 
 /// The greatest sum of an update.
 const GREATEST: i64 = 4096 * 255 * 127;
 
-const PLAIN: Write = Write {
+const PLAIN: WriteLaw = WriteLaw {
     shift: 12,
     mantissa: 1,
     negate: false,
@@ -389,7 +389,7 @@ fn a_zero_sum_moves_nothing_whatever_the_word() {
     for (name, kernel) in all() {
         for shift in 0..=31 {
             for negate in [false, true] {
-                let write = Write { shift, negate, ..PLAIN };
+                let write = WriteLaw { shift, negate, ..PLAIN };
                 for dither in [Dither::Nearest, Dither::Byte(&greatest), Dither::Word(&words)] {
                     let still = State {
                         low: levels,
@@ -416,7 +416,7 @@ fn sums_at_the_edge_of_rounding_to_nothing_are_loud_on_one_side() {
         let half = 1i64 << shift.saturating_sub(bits) >> 1;
         let edges = [-half - 1, -half, half - 1, half].map(|edge| edge as i32);
         let sums = std::array::from_fn(|i| if i % 64 == 17 { edges[i / 64 % 4] } else { 0 });
-        let write = Write { shift, ..PLAIN };
+        let write = WriteLaw { shift, ..PLAIN };
         let want = law().loud(&sums, &write, bits);
         for (name, kernel) in others() {
             assert_eq!(kernel.loud(&sums, &write, bits), want, "{name} {shift}");
@@ -437,9 +437,9 @@ fn the_edges_of_the_bounds_round_and_count_the_same() {
         });
         for increment_max in [1, 2, 64, 125, 126, 127] {
             for negate in [false, true] {
-                let write = Write { shift, increment_max, negate, ..PLAIN };
+                let write = WriteLaw { shift, increment_max, negate, ..PLAIN };
                 check_program(&half(&bytes(3, HALF_CELLS)), &sums, &write, 3);
-                let write = Write { residual_bits: 1 + shift % 15, ..write };
+                let write = WriteLaw { residual_bits: 1 + shift % 15, ..write };
                 check_program(&half(&bytes(1, HALF_CELLS)), &sums, &write, 4);
                 check_program(&half(&bytes(2, HALF_CELLS)), &sums, &write, 5);
             }
@@ -459,7 +459,7 @@ fn the_largest_sums_saturate_alike() {
                     [(1, 0), (126, 0), (127, 0), (127, 15), (2, 6)]
                 {
                     let write =
-                        Write { shift, mantissa, negate, increment_max, residual_bits, ..PLAIN };
+                        WriteLaw { shift, mantissa, negate, increment_max, residual_bits, ..PLAIN };
                     check_program(&[128; HALF_CELLS], &sums, &write, 1 + u64::from(shift));
                 }
             }
@@ -485,10 +485,10 @@ fn a_name_says_whether_it_is_unknown_or_absent() {
     );
 }
 
-fn write() -> impl Strategy<Value = Write> {
+fn write() -> impl Strategy<Value = WriteLaw> {
     let window = (0u16..=255, 0u16..=255);
     (0u32..=31, 1i32..=15, any::<bool>(), 1i32..=127, window, 0..4, 0u32..=15).prop_map(
-        |(shift, mantissa, negate, increment_max, (a, b), kind, residual_bits)| Write {
+        |(shift, mantissa, negate, increment_max, (a, b), kind, residual_bits)| WriteLaw {
             shift,
             mantissa: if kind < 2 { 1 } else { mantissa },
             negate,

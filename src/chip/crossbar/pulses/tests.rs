@@ -4,7 +4,7 @@
 use proptest::prelude::*;
 
 use super::*;
-use crate::chip::crossbar::kernel::{Backend, Write};
+use crate::chip::crossbar::kernel::{Backend, WriteLaw};
 use crate::chip::crossbar::layout::PANEL_COLUMNS;
 use crate::chip::crossbar::{Crossbar, WriteRequest, Written};
 use crate::chip::hardware::{DitherBits, DitherPattern, FloorKind, Hardware, Window};
@@ -90,7 +90,7 @@ fn written(backend: Backend, case: &Case, collect: Collect) -> (Crossbar, Vec<Wr
     let request = WriteRequest {
         turned: &turned,
         stride,
-        write: Write {
+        write: WriteLaw {
             shift: case.shift,
             mantissa: case.mantissa,
             negate: case.negate,

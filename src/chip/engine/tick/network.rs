@@ -8,7 +8,7 @@
 
 use std::ops::Range;
 
-use super::super::{Operation, Phase, Recorded, Side, Write, Written};
+use super::super::{Operation, Phase, Recorded, Side, Write, WritesDone};
 use super::tile::{BankEvents, Command, Tile, TileEvents};
 use crate::chip::hardware::{Adc, AdcRange, Hardware, Timing};
 use crate::chip::layer::Layer;
@@ -101,10 +101,10 @@ impl Network {
     }
 
     /// Writes are done: where converters track, ranges are looked at after those of a batch, or of 64 samples.
-    pub fn written(&mut self, written: Written) {
+    pub fn written(&mut self, written: WritesDone) {
         let Some(unlooked) = &mut self.unlooked else { return };
-        *unlooked += u64::from(written == Written::Sample);
-        if written == Written::Batch || *unlooked == 64 {
+        *unlooked += u64::from(written == WritesDone::Sample);
+        if written == WritesDone::Batch || *unlooked == 64 {
             *unlooked = 0;
             self.layers.iter_mut().for_each(TickLayer::look);
         }

@@ -9,7 +9,7 @@ use crate::lab::report::chart::{Chart, wide};
 use crate::lab::report::colour::hue;
 use crate::lab::report::number::size;
 use crate::lab::report::scale::Axis;
-use crate::lab::table::Unit;
+use crate::lab::table::ColumnUnit;
 
 /// Lines and panels drawn at most.
 const LINES_MAX: usize = 8;
@@ -55,7 +55,7 @@ pub(super) fn draw(settings: &Settings<'_>) -> Option<String> {
     if all.is_empty() {
         return None;
     }
-    let fraction = measure.column.unit == Unit::Fraction;
+    let fraction = measure.column.unit == ColumnUnit::Fraction;
     let framed = |at: Option<usize>| {
         range(all.iter().filter(|line| at.is_none_or(|at| line.panel == at)), pooled, fraction)
     };

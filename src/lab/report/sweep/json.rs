@@ -10,7 +10,7 @@ use super::paper::short;
 use super::settings::{Levels, Settings, front_of};
 use super::statistics::Summary;
 use crate::lab::report::colour;
-use crate::lab::table::{Column, Role, Unit, Values};
+use crate::lab::table::{Column, ColumnUnit, Role, Values};
 
 /// Values of an axis that are marked one by one.
 const MARKS_MAX: usize = 12;
@@ -81,12 +81,12 @@ fn fronts(settings: &Settings<'_>) -> Value {
 
 fn column(settings: &Settings<'_>, column: &Column) -> Value {
     let unit = match column.unit {
-        Unit::Plain => "plain",
-        Unit::Fraction => "fraction",
-        Unit::Count => "count",
-        Unit::Cycles => "cycles",
-        Unit::Seconds => "seconds",
-        Unit::Joules => "joules",
+        ColumnUnit::Plain => "plain",
+        ColumnUnit::Fraction => "fraction",
+        ColumnUnit::Count => "count",
+        ColumnUnit::Cycles => "cycles",
+        ColumnUnit::Seconds => "seconds",
+        ColumnUnit::Joules => "joules",
     };
     let role = match column.role {
         Role::Axis => "axis",

@@ -2,7 +2,7 @@
 
 use crate::lab::report::number::count;
 use crate::lab::report::scale;
-use crate::lab::table::{Column, Unit};
+use crate::lab::table::{Column, ColumnUnit};
 
 /// Numbers that span more than this go on a log axis where they are a cost.
 const LOG_FROM: f64 = 20.0;
@@ -41,20 +41,20 @@ impl<'a> Measure<'a> {
             }
         }
         let lossy = ["loss", "error"].iter().any(|word| column.name.contains(word));
-        let less = lossy || !matches!(column.unit, Unit::Plain | Unit::Fraction);
+        let less = lossy || !matches!(column.unit, ColumnUnit::Plain | ColumnUnit::Fraction);
         let (least, most) = paid.unwrap_or((1.0, 1.0));
         // such that few digits stand before and after the point
         let middle = if most / least > 1e4 { (least * most).sqrt() } else { most };
         let thousands = (middle.log10() / 3.0 + 1e-12).floor();
         let (by, prefix) = match column.unit {
-            Unit::Plain => (1.0, ""),
-            Unit::Fraction => (100.0, ""),
-            Unit::Seconds | Unit::Joules => {
+            ColumnUnit::Plain => (1.0, ""),
+            ColumnUnit::Fraction => (100.0, ""),
+            ColumnUnit::Seconds | ColumnUnit::Joules => {
                 let thousands = thousands.clamp(-6.0, 5.0);
                 (1000f64.powf(-thousands), PREFIXES[(thousands + 6.0) as usize])
             }
-            Unit::Count | Unit::Cycles if middle < 1e5 => (1.0, ""),
-            Unit::Count | Unit::Cycles => {
+            ColumnUnit::Count | ColumnUnit::Cycles if middle < 1e5 => (1.0, ""),
+            ColumnUnit::Count | ColumnUnit::Cycles => {
                 let thousands = thousands.clamp(1.0, 3.0);
                 (1000f64.powf(-thousands), COUNTS[thousands as usize])
             }
@@ -65,7 +65,7 @@ impl<'a> Measure<'a> {
     /// The unit of what is drawn.
     pub(super) fn sign(&self) -> String {
         match self.column.unit {
-            Unit::Count | Unit::Cycles if !self.prefix.is_empty() => self.prefix.into(),
+            ColumnUnit::Count | ColumnUnit::Cycles if !self.prefix.is_empty() => self.prefix.into(),
             unit => format!("{}{}", self.prefix, unit.sign()),
         }
     }
@@ -99,14 +99,14 @@ mod tests {
     #[test]
     fn numbers_are_drawn_with_few_digits() {
         let cases = [
-            (Unit::Joules, vec![2e-6, 5.9e-5], "x (µJ)", 1e6),
-            (Unit::Joules, vec![1e-9, 1e-3], "x (µJ)", 1e6),
-            (Unit::Seconds, vec![0.0], "x (s)", 1.0),
-            (Unit::Fraction, vec![0.5], "x (%)", 100.0),
-            (Unit::Cycles, vec![1.0, 99_999.0], "x (cycles)", 1.0),
-            (Unit::Count, vec![2e6, 3e7], "x (millions)", 1e-6),
-            (Unit::Plain, vec![7e9], "x", 1.0),
-            (Unit::Joules, vec![], "x (J)", 1.0),
+            (ColumnUnit::Joules, vec![2e-6, 5.9e-5], "x (µJ)", 1e6),
+            (ColumnUnit::Joules, vec![1e-9, 1e-3], "x (µJ)", 1e6),
+            (ColumnUnit::Seconds, vec![0.0], "x (s)", 1.0),
+            (ColumnUnit::Fraction, vec![0.5], "x (%)", 100.0),
+            (ColumnUnit::Cycles, vec![1.0, 99_999.0], "x (cycles)", 1.0),
+            (ColumnUnit::Count, vec![2e6, 3e7], "x (millions)", 1e-6),
+            (ColumnUnit::Plain, vec![7e9], "x", 1.0),
+            (ColumnUnit::Joules, vec![], "x (J)", 1.0),
         ];
         for (unit, numbers, title, by) in cases {
             let values = Values::Real(numbers.into_iter().map(Some).collect());

@@ -6,7 +6,7 @@ use super::statistics::Summary;
 use super::{SweepView, json, library, paper};
 use crate::lab::price::prefixed;
 use crate::lab::report::number::{count, escape, percent, significant};
-use crate::lab::table::Unit;
+use crate::lab::table::ColumnUnit;
 
 const STYLE: &str = include_str!("../page.css");
 const SWEEP_STYLE: &str = include_str!("page.css");
@@ -183,11 +183,13 @@ fn tally(number: usize) -> String {
 }
 
 /// A result in its unit.
-fn print(value: f64, unit: Unit) -> String {
+fn print(value: f64, unit: ColumnUnit) -> String {
     match unit {
-        Unit::Fraction => percent(value, 2),
-        Unit::Cycles | Unit::Seconds | Unit::Joules => prefixed(value, unit.sign()),
-        Unit::Plain | Unit::Count => significant(value),
+        ColumnUnit::Fraction => percent(value, 2),
+        ColumnUnit::Cycles | ColumnUnit::Seconds | ColumnUnit::Joules => {
+            prefixed(value, unit.sign())
+        }
+        ColumnUnit::Plain | ColumnUnit::Count => significant(value),
     }
 }
 
@@ -196,11 +198,11 @@ fn headline(settings: &Settings<'_>) -> String {
     let Some(measure) = settings.measure(&settings.view.figures.y) else { return none.into() };
     let Some((rows, best)) = settings.best(measure) else { return none.into() };
     let number = match measure.column.unit {
-        Unit::Fraction => format!("{:.2}<small>\u{202f}%</small>", 100.0 * best.mean),
+        ColumnUnit::Fraction => format!("{:.2}<small>\u{202f}%</small>", 100.0 * best.mean),
         unit => escape(&print(best.mean, unit)),
     };
     // 100.00 % is too wide for the largest letters
-    let short = measure.column.unit == Unit::Fraction && (0.0..0.999_95).contains(&best.mean);
+    let short = measure.column.unit == ColumnUnit::Fraction && (0.0..0.999_95).contains(&best.mean);
     let small = if short { "" } else { " long" };
     let way = if measure.less { "lowest" } else { "highest" };
     let where_: Vec<String> = settings
@@ -225,7 +227,7 @@ fn chosen(settings: &Settings<'_>, measure: Measure<'_>, best: Summary) -> Strin
     let runs = match (best.n, best.half) {
         (n, Some(half)) => {
             let half = match measure.column.unit {
-                Unit::Fraction => percent(half, 2),
+                ColumnUnit::Fraction => percent(half, 2),
                 unit => print(half, unit),
             };
             format!("Mean of n = {n} runs ± {half} (95\u{202f}% confidence)")

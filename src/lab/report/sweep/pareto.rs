@@ -6,7 +6,7 @@ use super::settings::{Settings, front_of};
 use crate::lab::report::chart::{Chart, wide};
 use crate::lab::report::colour::hue;
 use crate::lab::report::scale::Axis;
-use crate::lab::table::Unit;
+use crate::lab::table::ColumnUnit;
 
 /// Pale points drawn at most, and kinds of points told apart.
 const POINTS_MAX: usize = 1500;
@@ -59,7 +59,7 @@ pub(super) fn draw(settings: &Settings<'_>) -> Option<String> {
     let (y_low, y_top) = (drawn().reduce(f64::min)?, drawn().reduce(f64::max)?);
     let room = 0.05 * (y_top - y_low);
     let (mut from, mut to) = (y_low - room, y_top + room);
-    if value.column.unit == Unit::Fraction {
+    if value.column.unit == ColumnUnit::Fraction {
         (from, to) = (from.max(0.0), to.min(1.0));
     }
     let y_axis = Axis::round(from * value.by, to * value.by, &value.title());

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use super::measure::Measure;
 use super::statistics::{Summary, front, summary};
-use super::{Axis, SweepView};
+use super::{ShownAxis, SweepView};
 use crate::lab::report::number::{significant, size};
 use crate::lab::table::{Column, Role};
 
@@ -16,7 +16,7 @@ const RANGES: usize = 16;
 /// One axis: its distinct values in order, and which of them each row has.
 #[derive(Debug, Clone)]
 pub(super) struct Levels<'a> {
-    pub axis: &'a Axis,
+    pub axis: &'a ShownAxis,
     /// Each value as text.
     pub texts: Vec<String>,
     /// Each value as a number, where all are.
@@ -26,7 +26,7 @@ pub(super) struct Levels<'a> {
 }
 
 impl<'a> Levels<'a> {
-    fn new(axis: &'a Axis, column: &Column) -> Self {
+    fn new(axis: &'a ShownAxis, column: &Column) -> Self {
         let rows = column.values.len();
         let mut found: BTreeMap<String, Option<f64>> = BTreeMap::new();
         let cells: Vec<_> = (0..rows).map(|row| column.values.text(row)).collect();

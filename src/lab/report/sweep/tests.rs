@@ -1,12 +1,12 @@
 //! Laws of the page and of figures for papers: complete, escaped, no word that is no number, the same every time.
 
 use super::settings::Settings;
-use super::{Axis, Figures, Refused, SweepView, figures, html, json, png, text};
-use crate::lab::table::{Column, Role, Table, Unit, Values};
+use super::{Figures, Refused, ShownAxis, SweepView, figures, html, json, png, text};
+use crate::lab::table::{Column, ColumnUnit, Role, Table, Values};
 
 struct Sample {
     table: Table,
-    axes: Vec<Axis>,
+    axes: Vec<ShownAxis>,
     figures: Figures,
     refused: Vec<Refused>,
     notes: Vec<String>,
@@ -14,13 +14,13 @@ struct Sample {
 
 const NASTY: &str = "</script><b>\"'&\u{2028}";
 
-fn column(name: &str, unit: Unit, role: Role, values: Values) -> Column {
+fn column(name: &str, unit: ColumnUnit, role: Role, values: Values) -> Column {
     Column { name: name.into(), label: name.into(), unit, role, values }
 }
 
-fn axis(name: &str, number: bool, order: &[&str]) -> Axis {
+fn axis(name: &str, number: bool, order: &[&str]) -> ShownAxis {
     let order = order.iter().map(|&text| text.to_owned()).collect();
-    Axis { name: name.into(), label: name.into(), number, log: false, order }
+    ShownAxis { name: name.into(), label: name.into(), number, log: false, order }
 }
 
 impl Sample {
@@ -47,13 +47,13 @@ impl Sample {
         Self {
             table: Table {
                 columns: vec![
-                    column("bits", Unit::Plain, Role::Axis, Values::Whole(bits)),
-                    column("word", Unit::Plain, Role::Axis, Values::Text(words)),
-                    column("seed", Unit::Plain, Role::Seed, Values::Whole(seeds)),
-                    real("score", Unit::Fraction, scores),
-                    real("joules", Unit::Joules, joules),
-                    real("joules_low", Unit::Joules, lows),
-                    real("joules_high", Unit::Joules, highs),
+                    column("bits", ColumnUnit::Plain, Role::Axis, Values::Whole(bits)),
+                    column("word", ColumnUnit::Plain, Role::Axis, Values::Text(words)),
+                    column("seed", ColumnUnit::Plain, Role::Seed, Values::Whole(seeds)),
+                    real("score", ColumnUnit::Fraction, scores),
+                    real("joules", ColumnUnit::Joules, joules),
+                    real("joules_low", ColumnUnit::Joules, lows),
+                    real("joules_high", ColumnUnit::Joules, highs),
                 ],
             },
             axes: vec![axis("bits", true, &["1", "2", "4"]), axis("word", false, &["z", NASTY])],
@@ -168,13 +168,13 @@ fn values_too_many_to_tell_apart_go_into_ranges() {
     sample.table.columns = vec![
         column(
             "rate",
-            Unit::Plain,
+            ColumnUnit::Plain,
             Role::Axis,
             Values::Real(rates.into_iter().map(Some).collect()),
         ),
-        column("score", Unit::Fraction, Role::Result, Values::Real(vec![Some(0.5); 100])),
+        column("score", ColumnUnit::Fraction, Role::Result, Values::Real(vec![Some(0.5); 100])),
     ];
-    sample.axes = vec![Axis { log: true, ..axis("rate", true, &[]) }];
+    sample.axes = vec![ShownAxis { log: true, ..axis("rate", true, &[]) }];
     let view = sample.view();
     let settings = Settings::new(&view);
     let (ranges, places) = settings.axes[0].ranges();

@@ -15,7 +15,7 @@ use std::arch::x86_64::*;
 
 use super::{load, load_sums, store, total};
 use crate::chip::crossbar::kernel::pulses::HALVES;
-use crate::chip::crossbar::kernel::{Cells, Dither, Half, Sums, Write, WriteCounts};
+use crate::chip::crossbar::kernel::{Cells, Dither, Half, Sums, WriteCounts, WriteLaw};
 
 /// The shifts and the factor of a write, in 32-bit lanes.
 #[derive(Clone, Copy)]
@@ -30,7 +30,7 @@ struct Scale {
 impl Scale {
     /// Of words of so many bits; half-up (`nearest`) cuts off what lies below them.
     #[target_feature(enable = "avx2,popcnt")]
-    fn new(write: &Write, bits: u32, nearest: bool) -> Self {
+    fn new(write: &WriteLaw, bits: u32, nearest: bool) -> Self {
         let (shift, right) = (write.shift, write.shift.saturating_sub(bits));
         let half = if nearest { 0 } else { 1 << right >> 1 };
         Self {
@@ -102,7 +102,7 @@ fn zeros(v: __m256i) -> u32 {
 
 /// Loud groups of sums. Compilers make a loop of the twin that is slower, and it is asked of most half blocks.
 #[target_feature(enable = "avx2,popcnt")]
-pub(super) fn loud(sums: Sums<'_>, write: &Write, bits: u32) -> u16 {
+pub(super) fn loud(sums: Sums<'_>, write: &WriteLaw, bits: u32) -> u16 {
     let Sums::Narrow(sums) = sums else { return super::loud(sums, write, bits) };
     let by = write.shift.saturating_sub(write.residual_bits).saturating_sub(bits);
     // half of 2^31 beside the greatest sum wraps, and has the top bit as one that is too small
@@ -126,7 +126,7 @@ pub(super) fn loud(sums: Sums<'_>, write: &Write, bits: u32) -> u16 {
 pub(super) fn fused(
     cells: &mut Cells<'_>,
     sums: &Half<i32>,
-    write: &Write,
+    write: &WriteLaw,
     dither: Dither<'_>,
 ) -> Option<WriteCounts> {
     let window = cells.plain_window(write)?;
@@ -160,7 +160,7 @@ pub(super) fn fused(
 fn programmed<const WORDS: bool>(
     cells: &mut Cells<'_>,
     sums: &Half<i32>,
-    (write, scale): (&Write, Scale),
+    (write, scale): (&WriteLaw, Scale),
     (floor, ceiling): (u8, u8),
     (bytes, words): (&Half<u8>, &Half<u16>),
 ) -> WriteCounts {

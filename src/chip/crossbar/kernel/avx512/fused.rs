@@ -18,7 +18,7 @@ use std::arch::x86_64::*;
 use super::peaks::take;
 use super::{load, load_sums, store};
 use crate::chip::crossbar::kernel::pulses::HALVES;
-use crate::chip::crossbar::kernel::{Cells, Dither, Half, Sums, Write, WriteCounts};
+use crate::chip::crossbar::kernel::{Cells, Dither, Half, Sums, WriteCounts, WriteLaw};
 
 /// `sum`.
 const PLUS: u8 = 0;
@@ -39,7 +39,7 @@ const WORDS: u8 = 3;
 
 /// Loud groups of sums. Compilers make a loop of the twin that takes twice as long, and it is asked of most half blocks.
 #[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi,popcnt")]
-pub(super) fn loud(sums: Sums<'_>, write: &Write, bits: u32) -> u16 {
+pub(super) fn loud(sums: Sums<'_>, write: &WriteLaw, bits: u32) -> u16 {
     match (sums, write.mantissa, write.negate) {
         (Sums::Wide(_), ..) => super::loud(sums, write, bits),
         (Sums::Narrow(sums), 1, false) => loud_groups::<PLUS>(sums, write, bits),
@@ -49,7 +49,7 @@ pub(super) fn loud(sums: Sums<'_>, write: &Write, bits: u32) -> u16 {
 }
 
 #[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi,popcnt")]
-fn loud_groups<const SCALE: u8>(sums: &Half<i32>, write: &Write, bits: u32) -> u16 {
+fn loud_groups<const SCALE: u8>(sums: &Half<i32>, write: &WriteLaw, bits: u32) -> u16 {
     let by = write.shift.saturating_sub(write.residual_bits).saturating_sub(bits);
     // half of 2^31 beside the greatest sum wraps, and has the top bit as one that is too small
     let half = (1u32 << by >> 1).cast_signed();
@@ -71,7 +71,7 @@ fn loud_groups<const SCALE: u8>(sums: &Half<i32>, write: &Write, bits: u32) -> u
 pub(super) fn fused(
     cells: &mut Cells<'_>,
     sums: &Half<i32>,
-    write: &Write,
+    write: &WriteLaw,
     dither: Dither<'_>,
 ) -> Option<WriteCounts> {
     let window = cells.plain_window(write)?;
@@ -112,7 +112,7 @@ const MERGED: [u8; 16] = [0, 8, 1, 9, 2, 10, 3, 11, 4, 12, 5, 13, 6, 14, 7, 15];
 fn programmed<const SCALE: u8, const KIND: u8>(
     cells: &mut Cells<'_>,
     sums: &Half<i32>,
-    (write, scale): (&Write, Scale),
+    (write, scale): (&WriteLaw, Scale),
     (floor, ceiling): (u8, u8),
     (bytes, words): (&Half<u8>, &Half<u16>),
 ) -> WriteCounts {
@@ -259,7 +259,7 @@ struct Scale {
 
 impl Scale {
     #[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi,popcnt")]
-    fn new(write: &Write, half: i32, right: u32) -> Self {
+    fn new(write: &WriteLaw, half: i32, right: u32) -> Self {
         Self {
             mantissa: _mm512_set1_epi32(if write.negate {
                 -write.mantissa

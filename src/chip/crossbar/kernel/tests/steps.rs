@@ -7,7 +7,7 @@ use super::*;
 const GREATEST_WIDE: i64 = 1 << 58;
 
 /// A state from a seed, in the window of the write.
-fn fresh(write: &Write, seed: u64) -> State {
+fn fresh(write: &WriteLaw, seed: u64) -> State {
     let words = bytes(seed | 1, 2 * HALF_CELLS);
     let words =
         half(&words.as_chunks().0.iter().map(|w| u16::from_le_bytes(*w)).collect::<Vec<_>>());
@@ -23,7 +23,7 @@ fn fresh(write: &Write, seed: u64) -> State {
 }
 
 /// Programs wide sums by the law and by all others, and gives what the law made of it.
-fn check_wide(sums: &Half<i64>, write: &Write, modes: [bool; 2], seed: u64) -> Vec<State> {
+fn check_wide(sums: &Half<i64>, write: &WriteLaw, modes: [bool; 2], seed: u64) -> Vec<State> {
     let fresh = fresh(write, seed);
     let words = bytes((seed / 3) | 1, 2 * HALF_CELLS);
     let byte_words = half(&words[..HALF_CELLS]);
@@ -36,7 +36,7 @@ fn check_wide(sums: &Half<i64>, write: &Write, modes: [bool; 2], seed: u64) -> V
         for (name, kernel) in others() {
             assert_eq!(kernel.loud(sums, write, bits), groups, "{name} {write:?}");
             for groups in [u16::MAX, groups] {
-                let some = Write { groups, ..*write };
+                let some = WriteLaw { groups, ..*write };
                 let got = programmed(&kernel, fresh.clone(), sums, &some, dither, modes);
                 assert_eq!(got.counts, want.counts, "{name} {write:?} {modes:?}");
                 assert!(got == want, "{name} {write:?} {modes:?}");
@@ -48,8 +48,8 @@ fn check_wide(sums: &Half<i64>, write: &Write, modes: [bool; 2], seed: u64) -> V
 }
 
 /// A window that levels of the modes fit.
-fn within(write: Write, wide: bool) -> Write {
-    Write { ceiling: if wide { 4095 } else { write.ceiling.min(255) }, ..write }
+fn within(write: WriteLaw, wide: bool) -> WriteLaw {
+    WriteLaw { ceiling: if wide { 4095 } else { write.ceiling.min(255) }, ..write }
 }
 
 #[test]
@@ -60,7 +60,7 @@ fn the_largest_wide_sums_saturate_alike() {
     for shift in 0..=31 {
         for (mantissa, residual_bits) in [(1, 0), (15, 0), (15, 15), (2, 6)] {
             for negate in [false, true] {
-                let write = Write { shift, mantissa, negate, residual_bits, ..PLAIN };
+                let write = WriteLaw { shift, mantissa, negate, residual_bits, ..PLAIN };
                 check_wide(&sums, &write, [false, false], u64::from(shift));
             }
         }
