@@ -242,6 +242,60 @@ fn lints_are_expected_not_allowed() {
     assert_none(&problems, "use #[expect(lint, reason = \"...\")]");
 }
 
+/// Where a list of tokens occurs in the program.
+fn places(wanted: &[&str]) -> Vec<String> {
+    let mut found = Vec::new();
+    for path in sources("src") {
+        let tokens = tokens(&read(&path));
+        let hits = tokens.windows(wanted.len()).filter(|window| {
+            window.iter().zip(wanted).all(|((token, _), wanted)| token == wanted || *wanted == "*")
+        });
+        found.extend(hits.map(|window| format!("{path}:{}", window[0].1)));
+    }
+    found
+}
+
+#[test]
+fn no_layer_is_special() {
+    let mut problems = places(&["is_state"]);
+    for name in ["layer", "index", "l"] {
+        for zero in [["0", "=", "=", name], [name, "=", "=", "0"]] {
+            problems.extend(places(&zero));
+        }
+    }
+    assert_none(&problems, "what the first layer does otherwise is said by its specification");
+    assert!(!places(&["layer", "=", "=", "*"]).is_empty(), "comparisons are found");
+}
+
+#[test]
+fn what_files_and_hashes_hold_is_listed_once() {
+    let mut problems = places(&["ALL", ":", "[", "Self", ";"]);
+    problems.retain(|place| !place.starts_with("src/chip/ledger.rs:"));
+    assert_none(
+        &problems,
+        "enums that files and hashes use are made by `coded!` (src/chip/ledger.rs)",
+    );
+}
+
+#[test]
+fn a_public_type_has_a_name_of_its_own() {
+    let mut names: Vec<(String, String)> = Vec::new();
+    for path in sources("src") {
+        for three in tokens(&read(&path)).windows(3) {
+            let kind = ["struct", "enum", "trait", "union"].contains(&three[1].0.as_str());
+            if three[0].0 == "pub" && kind {
+                names.push((three[2].0.clone(), format!("{path}:{}", three[2].1)));
+            }
+        }
+    }
+    names.sort();
+    let twice = names.windows(2).filter(|two| two[0].0 == two[1].0);
+    let twice: Vec<_> =
+        twice.map(|two| format!("{}: {} and {}", two[0].0, two[0].1, two[1].1)).collect();
+    assert!(names.len() > 100, "types are found");
+    assert_none(&twice, "a public type has a name that no other has");
+}
+
 // --- documents ---
 
 /// Paths a document names: in backquotes below a folder of ours, and targets of links, from the root.

@@ -22,7 +22,7 @@ use super::crossbar::kernel::{Backend, LookUp, Team};
 use super::crossbar::layout::BLOCK_ROWS;
 use super::hardware::Hardware;
 use super::layer::{DrivenBy, Layer};
-use super::ledger::{Cycles, During, Event, Ledger};
+use super::ledger::{Cycles, During, Event, Ledger, coded};
 use super::population::{Stream, Wiring};
 
 mod calibrate;
@@ -143,29 +143,15 @@ impl Operation<'_> {
     }
 }
 
-/// Which ledger is charged.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Phase {
-    /// Learning, initial loads included.
-    Training,
-    /// Finding converter ranges.
-    Calibration,
-    /// Reading validation or test samples.
-    Evaluation,
-}
-
-impl Phase {
-    /// All phases, in the order of the state hash.
-    pub const ALL: [Self; 3] = [Self::Training, Self::Calibration, Self::Evaluation];
-
-    /// Name in files.
-    #[must_use]
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Training => "training",
-            Self::Calibration => "calibration",
-            Self::Evaluation => "evaluation",
-        }
+coded! {
+    /// Which ledger is charged.
+    Phase {
+        /// Learning, initial loads included.
+        Training = 0, "training";
+        /// Finding converter ranges.
+        Calibration = 1, "calibration";
+        /// Reading validation or test samples.
+        Evaluation = 2, "evaluation";
     }
 }
 

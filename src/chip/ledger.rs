@@ -52,6 +52,8 @@ macro_rules! coded {
     };
 }
 
+pub(crate) use coded;
+
 coded! {
     /// What can happen.
     Event {

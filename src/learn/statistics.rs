@@ -11,25 +11,33 @@
 //! See docs/GLOSSARY.md and docs/MODEL.md, 4.
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
+use std::collections::BTreeMap;
+
 use crate::chip::crossbar::Crossbar;
-use crate::chip::engine::Engine;
+use crate::chip::engine::{Engine, Phase};
 use crate::chip::hardware::Hardware;
+use crate::chip::ledger::Event;
 use crate::chip::population::Polarity;
 
 /// Bins of a level histogram; levels above 6 bits share bins evenly.
 pub const BINS: usize = 64;
 
-/// What the cells of one pathway look like.
+/// Cells of one pathway of one layer (definitions: docs/GLOSSARY.md).
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct PathwayStatistics {
-    /// Layer with cells.
+#[cfg_attr(
+    feature = "lab",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(deny_unknown_fields)
+)]
+pub struct PathwayRecord {
+    /// Layer, from 0 at the input.
     pub layer: usize,
-    /// Pathway code.
-    pub code: u8,
-    /// Pathway name.
-    pub name: &'static str,
+    /// Name: `pp`, `np`, `nn`, `pn`, or `e`, `i` of a differential pair.
+    pub pathway: String,
     /// Whether its current adds.
     pub excites: bool,
+    /// Rows and columns.
+    pub shape: [usize; 2],
     /// Cells.
     pub cells: u64,
     /// Cells on the floor.
@@ -44,10 +52,12 @@ pub struct PathwayStatistics {
     pub deaths: u64,
     /// Sum of levels.
     pub levels: u64,
-    /// Rows, columns and tiles whose cells all lie on the floor; then how many there are.
+    /// `[idle, all]` rows, columns, tiles: idle ones have all their cells on the floor.
     pub idle: [[u64; 2]; 3],
-    /// Cells by level, [`BINS`] bins or fewer.
+    /// Cells by level, in equal bins ([`BINS`] or fewer).
     pub histogram: Vec<u64>,
+    /// Events of the training ledger so far, by name (requested, bounded, pulses_attempted, ...).
+    pub training: BTreeMap<String, u64>,
 }
 
 /// Which cells lay on the floor when learning began, by layer and array, row-major.
@@ -63,24 +73,30 @@ pub fn floor_map(engine: &Engine) -> FloorMap {
 
 /// Statistics of every pathway, layer by layer, in code order.
 #[must_use]
-pub fn pathways(engine: &Engine, start: &FloorMap) -> Vec<PathwayStatistics> {
-    let hardware = engine.hardware();
+pub fn pathways(engine: &Engine, start: &FloorMap) -> Vec<PathwayRecord> {
+    let ledger = engine.ledger(Phase::Training);
     let mut all = Vec::new();
-    for (layer, start) in engine.layers().iter().zip(start) {
+    for (at, (layer, start)) in engine.layers().iter().zip(start).enumerate() {
         let pathways = layer.spec.wiring.pathways();
         for ((array, pathway), start) in layer.arrays.iter().zip(pathways).zip(start) {
-            let mut one = of(array, hardware, start);
-            one.layer = usize::from(layer.index);
-            one.code = pathway.code;
-            one.name = pathway.name;
-            one.excites = pathway.polarity == Polarity::Excites;
-            all.push(one);
+            let events = Event::ALL.into_iter().filter_map(|event| {
+                let count = ledger.of_pathway(at, pathway.code, event);
+                (count > 0).then(|| (event.name().to_owned(), count))
+            });
+            all.push(PathwayRecord {
+                layer: usize::from(layer.index),
+                pathway: pathway.name.into(),
+                excites: pathway.polarity == Polarity::Excites,
+                training: events.collect(),
+                ..of(array, engine.hardware(), start)
+            });
         }
     }
     all
 }
 
-fn of(array: &Crossbar, hardware: &Hardware, start: &[bool]) -> PathwayStatistics {
+/// Of an array alone, whatever pathway it is.
+fn of(array: &Crossbar, hardware: &Hardware, start: &[bool]) -> PathwayRecord {
     let layout = array.layout();
     let bits = hardware.cell.level_bits.get();
     let bin_shift = bits.saturating_sub(BINS.ilog2());
@@ -90,11 +106,11 @@ fn of(array: &Crossbar, hardware: &Hardware, start: &[bool]) -> PathwayStatistic
     let mut rows = vec![true; layout.rows];
     let mut columns = vec![true; layout.columns];
     let mut tiles = vec![true; layout.rows.div_ceil(tile_rows) * across];
-    let mut one = PathwayStatistics {
+    let mut one = PathwayRecord {
         layer: 0,
-        code: 0,
-        name: "",
+        pathway: String::new(),
         excites: false,
+        shape: [layout.rows, layout.columns],
         cells: layout.cells() as u64,
         floor: 0,
         zero: 0,
@@ -104,6 +120,7 @@ fn of(array: &Crossbar, hardware: &Hardware, start: &[bool]) -> PathwayStatistic
         levels: 0,
         idle: [[0; 2]; 3],
         histogram: vec![0; bins],
+        training: BTreeMap::new(),
     };
     let floor = hardware.cell.window.floor();
     let levels: Vec<u16> = array.levels().collect();
@@ -136,9 +153,9 @@ fn of(array: &Crossbar, hardware: &Hardware, start: &[bool]) -> PathwayStatistic
 
 /// Sum of excitatory and of inhibitory levels of one layer.
 #[must_use]
-pub fn balance(statistics: &[PathwayStatistics], layer: usize) -> [u64; 2] {
+pub fn balance(pathways: &[PathwayRecord], layer: usize) -> [u64; 2] {
     let sum = |excites: bool| {
-        let of_layer = statistics.iter().filter(|s| s.layer == layer && s.excites == excites);
+        let of_layer = pathways.iter().filter(|s| s.layer == layer && s.excites == excites);
         of_layer.map(|s| s.levels).sum()
     };
     [sum(true), sum(false)]
@@ -243,16 +260,16 @@ mod tests {
         }
         assert_eq!(floor_map(&engine)[1][0], [false, false, true, true]);
         let all = pathways(&engine, &start);
-        let names: Vec<_> = all.iter().map(|s| (s.layer, s.code, s.name, s.excites)).collect();
+        let names: Vec<_> = all.iter().map(|s| (s.layer, s.pathway.as_str(), s.excites)).collect();
         assert_eq!(
             names,
             [
-                (0, 0, "pp", true),
-                (0, 1, "np", false),
-                (0, 2, "nn", true),
-                (0, 3, "pn", false),
-                (1, 0, "pp", true),
-                (1, 1, "np", false)
+                (0, "pp", true),
+                (0, "np", false),
+                (0, "nn", true),
+                (0, "pn", false),
+                (1, "pp", true),
+                (1, "np", false)
             ]
         );
         assert_eq!((all[0].births, all[4].births), (1, 2));

@@ -260,20 +260,6 @@ impl Rate {
     }
 }
 
-/// `rate * width / alpha^2`, above which wide nets diverge (about 320 to 570), rounded down.
-#[must_use]
-pub fn divergence_index(rate: Positive, width: usize, alpha: Positive) -> u64 {
-    #[expect(
-        clippy::cast_precision_loss,
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "a width is small, the quotient positive and below 2^63"
-    )]
-    {
-        libm::floor(rate.0 * width as f64 / (alpha.0 * alpha.0)) as u64
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -327,14 +313,6 @@ mod tests {
         assert_eq!(three.shifts(Decay::Constant, 1).unwrap(), [(0, 15)]);
         let large = Rate { batch: Batch::new(128).unwrap(), ..rate(20.0, 6.0) };
         assert_eq!(large.shifts(Decay::Constant, 1).unwrap(), [(0, 15)]);
-    }
-
-    #[test]
-    fn a_divergence_index_is_rate_times_width_over_alpha_squared() {
-        let number = |value| Positive::new(value).unwrap();
-        assert_eq!(divergence_index(number(20.0), 100, number(4.0)), 125);
-        assert_eq!(divergence_index(number(2.5), 7, number(0.5)), 70);
-        assert_eq!(divergence_index(number(1.0), 1, number(2.0)), 0);
     }
 
     #[test]

@@ -6,112 +6,56 @@
 //! part's utilisation. See docs/MODEL.md, 4.5.
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
-use super::During;
+use super::{During, coded};
 
-/// What the chip as a whole is doing.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-#[repr(usize)]
-pub enum Interval {
-    /// `LOADW`: levels of a fresh network, row by row.
-    Load,
-    /// `FWD(rows)`, layers in a pipeline.
-    Forward,
-    /// The error unit takes the mean over the batch.
-    Centre,
-    /// `ERR`: words on the bus, gates.
-    Error,
-    /// `FWD(columns)`.
-    Columns,
-    /// `UPD(add)`.
-    Accumulate,
-    /// `UPD(now)` and `UPD(write)`.
-    Program,
-}
-
-impl Interval {
-    /// All intervals, in order.
-    pub const ALL: [Self; 7] = [
-        Self::Load,
-        Self::Forward,
-        Self::Centre,
-        Self::Error,
-        Self::Columns,
-        Self::Accumulate,
-        Self::Program,
-    ];
-
-    /// Name in files.
-    #[must_use]
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Load => "load",
-            Self::Forward => "forward",
-            Self::Centre => "centre",
-            Self::Error => "error",
-            Self::Columns => "columns",
-            Self::Accumulate => "accumulate",
-            Self::Program => "program",
-        }
+coded! {
+    /// What the chip as a whole is doing.
+    Interval {
+        /// `LOADW`: levels of a fresh network, row by row.
+        Load = 0, "load";
+        /// `FWD(rows)`, layers in a pipeline.
+        Forward = 1, "forward";
+        /// The error unit takes the mean over the batch.
+        Centre = 2, "centre";
+        /// `ERR`: words on the bus, gates.
+        Error = 3, "error";
+        /// `FWD(columns)`.
+        Columns = 4, "columns";
+        /// `UPD(add)`.
+        Accumulate = 5, "accumulate";
+        /// `UPD(now)` and `UPD(write)`.
+        Program = 6, "program";
     }
 }
 
-/// A part of a layer's tiles that can be what everything waits for.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[repr(usize)]
-pub enum Part {
-    /// Arrays settle.
-    Arrays,
-    /// Converters convert.
-    Converters,
-    /// The adder tree adds tiles.
-    Tree,
-    /// Look-up lanes, and the subtraction of a transposed read.
-    Lanes,
-    /// The error bus brings words.
-    Bus,
-    /// Lanes multiply words with slopes.
-    Multipliers,
-    /// Lanes add products to the sums of cells.
-    Accumulators,
-    /// Rows are computed, pulsed, verified and turned around.
-    Writers,
-}
-
-impl Part {
-    /// All parts, in order.
-    pub const ALL: [Self; 8] = [
-        Self::Arrays,
-        Self::Converters,
-        Self::Tree,
-        Self::Lanes,
-        Self::Bus,
-        Self::Multipliers,
-        Self::Accumulators,
-        Self::Writers,
-    ];
-
-    /// Name in files.
-    #[must_use]
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Arrays => "arrays",
-            Self::Converters => "converters",
-            Self::Tree => "tree",
-            Self::Lanes => "lanes",
-            Self::Bus => "bus",
-            Self::Multipliers => "multipliers",
-            Self::Accumulators => "accumulators",
-            Self::Writers => "writers",
-        }
+coded! {
+    /// A part of a layer's tiles that can be what everything waits for.
+    Part {
+        /// Arrays settle.
+        Arrays = 0, "arrays";
+        /// Converters convert.
+        Converters = 1, "converters";
+        /// The adder tree adds tiles.
+        Tree = 2, "tree";
+        /// Look-up lanes, and the subtraction of a transposed read.
+        Lanes = 3, "lanes";
+        /// The error bus brings words.
+        Bus = 4, "bus";
+        /// Lanes multiply words with slopes.
+        Multipliers = 5, "multipliers";
+        /// Lanes add products to the sums of cells.
+        Accumulators = 6, "accumulators";
+        /// Rows are computed, pulsed, verified and turned around.
+        Writers = 7, "writers";
     }
 }
 
 /// Cycles of a network.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Cycles {
-    elapsed: [u64; Interval::ALL.len()],
-    busy: Vec<[u64; During::ALL.len()]>,
-    used: Vec<[u64; Part::ALL.len()]>,
+    elapsed: [u64; Interval::COUNT],
+    busy: Vec<[u64; During::COUNT]>,
+    used: Vec<[u64; Part::COUNT]>,
 }
 
 impl Cycles {
@@ -119,9 +63,9 @@ impl Cycles {
     #[must_use]
     pub fn new(layers: usize) -> Self {
         Self {
-            elapsed: [0; Interval::ALL.len()],
-            busy: vec![[0; During::ALL.len()]; layers],
-            used: vec![[0; Part::ALL.len()]; layers],
+            elapsed: [0; Interval::COUNT],
+            busy: vec![[0; During::COUNT]; layers],
+            used: vec![[0; Part::COUNT]; layers],
         }
     }
 

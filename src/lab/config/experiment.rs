@@ -1,12 +1,13 @@
 //! What a configuration makes of data: the network with its sizes, and the experiment around it.
 
+use std::iter;
+
 use super::check::wrong;
 use super::{Config, ConfigError};
 use crate::chip::layer::{DrivenBy, LayerSpec};
 use crate::chip::population::Wiring;
 use crate::learn::network::NetworkSpec;
 use crate::learn::rule::Rule;
-use crate::num::tables::{Activation, divergence_index};
 use crate::task::classify::{Augment, Experiment};
 
 impl Config {
@@ -53,7 +54,8 @@ impl Config {
         let mut sizes = vec![inputs];
         sizes.extend(&self.hidden);
         sizes.push(outputs);
-        let layers = (0..self.hidden.len() + 1).map(|layer| {
+        let driven = iter::once(DrivenBy::Shared).chain(iter::repeat(DrivenBy::Streams));
+        let layers = (0..self.hidden.len() + 1).zip(driven).map(|(layer, driven_by)| {
             let last = layer == self.hidden.len();
             let wiring = match (self.rule.is_dalean(), last) {
                 (true, false) => Wiring::Dual,
@@ -64,7 +66,7 @@ impl Config {
                 inputs: sizes[layer],
                 units: sizes[layer + 1],
                 wiring,
-                driven_by: if layer == 0 { DrivenBy::Shared } else { DrivenBy::Streams },
+                driven_by,
                 activation: self.activations[layer],
                 weight_max_log2: self.weight_max_log2[layer],
                 gain_64ths: self.gain_64ths[usize::from(last)],
@@ -94,17 +96,6 @@ impl Config {
     #[must_use]
     pub fn warnings(&self) -> Vec<String> {
         let mut warnings = Vec::new();
-        for (layer, (rate, activation)) in self.rates.iter().zip(&self.activations).enumerate() {
-            let Activation::Sigmoid(alpha) = *activation else { continue };
-            let width = self.hidden.get(layer).copied().unwrap_or(0);
-            let index = divergence_index(*rate, width, alpha);
-            if index >= 320 {
-                warnings.push(format!(
-                    "layer {layer}: rate x width / alpha^2 is {index}; nets above about 320 to 570 diverge. Lower \
-                     learning.rate or raise network.alpha"
-                ));
-            }
-        }
         warnings.extend(self.constants.complaints());
         for (what, how) in &self.not_simulated {
             warnings.push(format!("not simulated: {what} ({how})"));

@@ -3,7 +3,7 @@
 use crate::chip::hardware::{Adc, Hardware, Subtract};
 use crate::chip::layer::Layer;
 use crate::lab::config::Per;
-use crate::lab::store::record::PathwayRecord;
+use crate::learn::statistics::PathwayRecord;
 
 /// Arrays of one layer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -19,7 +19,8 @@ mod writes;
 
 use super::number::float;
 use super::{RunView, colour};
-use crate::lab::store::record::{EpochRecord, PathwayRecord};
+use crate::lab::store::record::EpochRecord;
+use crate::learn::statistics::PathwayRecord;
 
 /// One figure: markup without its frame.
 #[derive(Debug)]

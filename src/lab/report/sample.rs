@@ -6,9 +6,10 @@ use super::{Heat, Picture, RunView};
 use crate::lab::price::Cost;
 use crate::lab::store::ledger::LedgerRecord;
 use crate::lab::store::record::{
-    ClassifyOutcome, DataRecord, EpochRecord, LayerRecord, Outcome, PathwayRecord, Receipt, Score,
-    TestOutcome, TestRecord, TimingRecord,
+    ClassifyOutcome, DataRecord, EpochRecord, LayerRecord, Outcome, Receipt, Score, TestOutcome,
+    TestRecord, TimingRecord,
 };
+use crate::learn::statistics::PathwayRecord;
 
 /// An invented run: layers as rows, columns and names of pathways.
 pub(super) struct Sample {

@@ -5,7 +5,8 @@ use std::fmt::Write as _;
 use super::RunView;
 use super::number::{quotient, short_with};
 use crate::lab::price::{Cost, bounds, prefixed};
-use crate::lab::store::record::{EpochRecord, PathwayRecord, Score};
+use crate::lab::store::record::{EpochRecord, Score};
+use crate::learn::statistics::PathwayRecord;
 
 /// Heads of the columns and how wide the columns are.
 const COLUMNS: [(&str, usize); 11] = [

@@ -16,7 +16,7 @@ use crate::lab::store::record::{
     ClassifyOutcome, DataRecord, Note, Outcome, Score, TestOutcome, TestRecord,
 };
 use crate::learn::driver::Driver;
-use crate::learn::statistics::PathwayStatistics;
+use crate::learn::statistics::PathwayRecord;
 use crate::task::classify::{self, Evaluation, Examples, Split, Trainer};
 
 /// Wrong answers kept for the report.
@@ -166,8 +166,8 @@ impl Task for Classify {
         vec![self.trainer.driver_mut()]
     }
 
-    fn statistics(&self) -> Vec<PathwayStatistics> {
-        self.trainer.statistics()
+    fn pathways(&self) -> Vec<PathwayRecord> {
+        self.trainer.pathways()
     }
 
     fn notes(&self) -> Vec<Note> {

@@ -1,6 +1,7 @@
 //! A training in memory: a task, and the records of its chip.
 
 use std::collections::BTreeMap;
+use std::mem;
 
 use super::task::{self, GoOn, Task, Told};
 use super::{Machine, RunError};
@@ -9,9 +10,7 @@ use crate::chip::ledger::Event;
 use crate::lab::config::{Config, Select};
 use crate::lab::data::Data;
 use crate::lab::store::checkpoint::{self, CheckpointError, Identity};
-use crate::lab::store::record::{
-    DataRecord, EpochRecord, LayerRecord, Note, PathwayRecord, TestOutcome,
-};
+use crate::lab::store::record::{DataRecord, EpochRecord, LayerRecord, Note, Score, TestOutcome};
 use crate::lab::store::{address, hash};
 use crate::learn::driver::Driver;
 use crate::task::classify::Examples;
@@ -27,6 +26,8 @@ pub struct Session {
     warnings: Vec<String>,
     /// What the run showed.
     notes: Vec<Note>,
+    /// Right answers of the best epoch told so far.
+    best_answers: u64,
 }
 
 impl Session {
@@ -43,7 +44,7 @@ impl Session {
         let task = task::build(config, data, machine)?;
         let run = address::key(given, &record.hash);
         let notes = task.notes();
-        Ok(Self { task, run, data: record, warnings: config.warnings(), notes })
+        Ok(Self { task, run, data: record, warnings: config.warnings(), notes, best_answers: 0 })
     }
 
     /// Learns this many updates of the first epoch and stops inside it.
@@ -99,18 +100,44 @@ impl Session {
         &self.notes
     }
 
-    /// Notes, once, when many conversions of the epochs up to that of a record saturated.
-    pub fn note(&mut self, record: &EpochRecord) -> Option<&Note> {
-        let training = record.events.get(Phase::Training.name())?;
-        let total = |event: Event| training.get(event.name()).copied().unwrap_or(0);
+    /// What a record shows for the first time: conversions, tables or gates that saturate, or an epoch that lost half of
+    /// what was learnt. Records are told in the order of their epochs.
+    pub fn note(&mut self, record: &EpochRecord) -> &[Note] {
+        let told = self.notes.len();
+        let epoch = record.epoch;
+        let training = record.events.get(Phase::Training.name());
+        let total = |event: Event| training.and_then(|t| t.get(event.name()).copied()).unwrap_or(0);
+        let mut add = |note: Note| {
+            let alike = |known: &Note| match (known, &note) {
+                (Note::Ends { of: one, .. }, Note::Ends { of: other, .. }) => one == other,
+                _ => mem::discriminant(known) == mem::discriminant(&note),
+            };
+            if !self.notes.iter().any(alike) {
+                self.notes.push(note);
+            }
+        };
         let (saturated, conversions) =
             (total(Event::SaturatedConversions), total(Event::Conversions));
-        let known = self.notes.iter().any(|note| matches!(note, Note::Saturated { .. }));
-        if known || saturated.saturating_mul(20) <= conversions {
-            return None;
+        if saturated.saturating_mul(20) > conversions {
+            add(Note::Saturated { epoch, saturated, conversions });
         }
-        self.notes.push(Note::Saturated { epoch: record.epoch, saturated, conversions });
-        self.notes.last()
+        let ends = [
+            ("tables", Event::SaturatedLookUps, Event::LookUps),
+            ("gates", Event::SaturatedGates, Event::Multiplies),
+        ];
+        for (of, saturated, all) in ends {
+            let (saturated, all) = (total(saturated), total(all));
+            if saturated.saturating_mul(2) > all {
+                add(Note::Ends { epoch, of: of.into(), saturated, all });
+            }
+        }
+        if let Some(Score { correct, .. }) = record.outcome.answers() {
+            if correct.saturating_mul(2) < self.best_answers {
+                add(Note::Forgot { epoch, correct, best: self.best_answers });
+            }
+            self.best_answers = self.best_answers.max(correct);
+        }
+        &self.notes[told..]
     }
 
     /// Networks, whose layers are numbered through.
@@ -186,7 +213,7 @@ impl Session {
     fn record(&mut self, told: Told) -> (EpochRecord, f64) {
         let Told { outcome, currents, seconds } = told;
         let state_hash = self.state_hash();
-        let statistics = self.task.statistics();
+        let pathways = self.task.pathways();
         let networks = self.task.networks();
         let layers = networks.iter().flat_map(|driver| {
             driver.engine().layers().iter().enumerate().map(move |(at, layer)| (driver, at, layer))
@@ -195,51 +222,13 @@ impl Session {
             let layer = usize::from(this.index);
             LayerRecord {
                 layer,
-                levels: crate::learn::statistics::balance(&statistics, layer),
+                levels: crate::learn::statistics::balance(&pathways, layer),
                 currents,
                 adc_shifts: this.adc_shifts.clone(),
                 rate_shift: driver.shift(at),
             }
         });
         let layers = layers.collect();
-        let engine_of = |layer: usize| {
-            let of = |engine: &&Engine| {
-                engine.layers().iter().any(|this| usize::from(this.index) == layer)
-            };
-            let engine = networks.iter().map(|driver| driver.engine()).find(of);
-            engine.expect("statistics are those of a layer of a network")
-        };
-        let pathways = statistics.iter().map(|s| {
-            let engine = engine_of(s.layer);
-            let (at, layer) = engine
-                .layers()
-                .iter()
-                .enumerate()
-                .find(|(_, this)| usize::from(this.index) == s.layer)
-                .expect("just found");
-            let ledger = engine.ledger(Phase::Training);
-            let events = Event::ALL.into_iter().filter_map(|event| {
-                let count = ledger.of_pathway(at, s.code, event);
-                (count > 0).then(|| (event.name().to_owned(), count))
-            });
-            PathwayRecord {
-                layer: s.layer,
-                pathway: s.name.into(),
-                excites: s.excites,
-                shape: [layer.layout.rows, layer.layout.columns],
-                cells: s.cells,
-                floor: s.floor,
-                zero: s.zero,
-                pruned: s.pruned,
-                births: s.births,
-                deaths: s.deaths,
-                levels: s.levels,
-                idle: s.idle,
-                histogram: s.histogram.clone(),
-                training: events.collect(),
-            }
-        });
-        let pathways = pathways.collect();
         let totals = |phase: Phase| -> BTreeMap<String, u64> {
             let of = |event: Event| {
                 networks.iter().map(|driver| driver.engine().ledger(phase).total(event)).sum()

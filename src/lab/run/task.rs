@@ -14,7 +14,7 @@ use crate::lab::config::Config;
 use crate::lab::data::Data;
 use crate::lab::store::record::{DataRecord, Note, Outcome, Score, TestOutcome};
 use crate::learn::driver::Driver;
-use crate::learn::statistics::PathwayStatistics;
+use crate::learn::statistics::PathwayRecord;
 use crate::task::classify::Examples;
 
 /// How far an epoch is.
@@ -69,7 +69,7 @@ pub(super) trait Task: fmt::Debug {
     fn networks_mut(&mut self) -> Vec<&mut Driver>;
 
     /// Statistics of every pathway of every network.
-    fn statistics(&self) -> Vec<PathwayStatistics>;
+    fn pathways(&self) -> Vec<PathwayRecord>;
 
     /// What building the task showed.
     fn notes(&self) -> Vec<Note>;

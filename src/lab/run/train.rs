@@ -337,10 +337,11 @@ impl<'a> Run<'a> {
             let Some((record, seconds)) = learnt else {
                 return Err(RunError::Stopped { epoch, path: path.display().to_string() });
             };
-            let note = self.session.note(&record).map(ToString::to_string);
+            let notes: Vec<_> =
+                self.session.note(&record).iter().map(ToString::to_string).collect();
             self.keep(record, seconds)?;
             on_event(RunEvent::Epoch(self.records.last().expect("just kept"), seconds));
-            if let Some(note) = note {
+            for note in notes {
                 on_event(RunEvent::Warning(&note));
             }
         }

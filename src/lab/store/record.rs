@@ -10,6 +10,7 @@ use std::fmt;
 use serde::{Deserialize, Serialize};
 
 use crate::lab::data::Data;
+use crate::learn::statistics::PathwayRecord;
 use crate::task::classify::Split;
 
 /// Right answers out of how many.
@@ -28,40 +29,6 @@ impl Score {
     pub fn fraction(self) -> f64 {
         if self.total == 0 { 0.0 } else { self.correct as f64 / self.total as f64 }
     }
-}
-
-/// Cells of one pathway of one layer at the end of an epoch (definitions: docs/GLOSSARY.md).
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct PathwayRecord {
-    /// Layer, from 0 at the input.
-    pub layer: usize,
-    /// Name: `pp`, `np`, `nn`, `pn`, or `e`, `i` of a differential pair.
-    pub pathway: String,
-    /// Whether its current adds.
-    pub excites: bool,
-    /// Rows and columns.
-    pub shape: [usize; 2],
-    /// Cells.
-    pub cells: u64,
-    /// Cells on the floor.
-    pub floor: u64,
-    /// Cells at level 0.
-    pub zero: u64,
-    /// Cells gone for good.
-    pub pruned: u64,
-    /// Cells that left the floor since the start.
-    pub births: u64,
-    /// Cells that reached the floor since the start.
-    pub deaths: u64,
-    /// Sum of levels.
-    pub levels: u64,
-    /// `[idle, all]` rows, columns, tiles.
-    pub idle: [[u64; 2]; 3],
-    /// Cells by level, in equal bins (64 or fewer).
-    pub histogram: Vec<u64>,
-    /// Events of the training ledger so far, by name (requested, bounded, pulses_attempted, ...).
-    pub training: BTreeMap<String, u64>,
 }
 
 /// One layer at the end of an epoch.
@@ -115,6 +82,14 @@ impl Outcome {
     pub fn merit(&self) -> u64 {
         match self {
             Self::Classify(outcome) => outcome.validation.map_or(0, |score| score.correct),
+        }
+    }
+
+    /// Right answers of the validation set, else of the epoch itself; nothing of a task without answers.
+    #[must_use]
+    pub fn answers(&self) -> Option<Score> {
+        match self {
+            Self::Classify(outcome) => outcome.validation.or(outcome.train),
         }
     }
 }
@@ -294,6 +269,30 @@ pub enum Note {
         /// Of so many.
         conversions: u64,
     },
+    /// An epoch knows less than half of what an earlier one knew.
+    Forgot {
+        /// Which epoch.
+        epoch: u32,
+        /// Right answers after it.
+        correct: u64,
+        /// Right answers after the best before it.
+        best: u64,
+    },
+    /// Most indices of tables, or most gates, lie at their ends.
+    Ends {
+        /// Epochs by then.
+        epoch: u32,
+        /// `tables` or `gates`.
+        of: String,
+        /// Those at an end.
+        saturated: u64,
+        /// Of so many.
+        all: u64,
+    },
+}
+
+fn percent(some: u64, all: u64) -> u128 {
+    u128::from(some) * 100 / u128::from(all).max(1)
 }
 
 impl fmt::Display for Note {
@@ -309,7 +308,18 @@ impl fmt::Display for Note {
                 "{} % of the conversions up to epoch {epoch} saturated: the range of the converters is too small for \
                  the currents of a net that learns. hw.adc.range = \"tracking\" widens it meanwhile; of a \
                  \"calibrated\" one, raise hw.adc.headroom",
-                u128::from(*saturated) * 100 / u128::from(*conversions).max(1)
+                percent(*saturated, *conversions)
+            ),
+            Self::Forgot { epoch, correct, best } => write!(
+                f,
+                "epoch {epoch} knows {correct} right answers, an earlier one knew {best}: the network diverges; lower \
+                 learning.rate or raise network.alpha"
+            ),
+            Self::Ends { epoch, of, saturated, all } => write!(
+                f,
+                "{} % of the {of} up to epoch {epoch} lie at an end of their range, where nothing is learnt; lower \
+                 learning.rate, or raise network.alpha or network.weight_max",
+                percent(*saturated, *all)
             ),
         }
     }

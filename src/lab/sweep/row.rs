@@ -55,7 +55,7 @@ impl Facts<'_> {
         self.last.events.get("training").and_then(|events| events.get(name)).copied().unwrap_or(0)
     }
 
-    fn pathways(&self, of: fn(&crate::lab::store::record::PathwayRecord) -> u64) -> u64 {
+    fn pathways(&self, of: fn(&crate::learn::statistics::PathwayRecord) -> u64) -> u64 {
         self.last.pathways.iter().map(of).sum()
     }
 

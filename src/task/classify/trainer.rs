@@ -8,7 +8,7 @@ use crate::chip::state::{Piece, Section, State, StateError, Visitor};
 use crate::learn::driver::Driver;
 use crate::learn::error;
 use crate::learn::network::NetworkError;
-use crate::learn::statistics::{self, FloorMap, PathwayStatistics};
+use crate::learn::statistics::{self, FloorMap, PathwayRecord};
 use crate::num::draw::{self, Place, Site, below};
 use crate::num::fixed::narrow;
 
@@ -110,7 +110,7 @@ impl Trainer {
 
     /// Statistics of every pathway now.
     #[must_use]
-    pub fn statistics(&self) -> Vec<PathwayStatistics> {
+    pub fn pathways(&self) -> Vec<PathwayRecord> {
         statistics::pathways(self.driver.engine(), &self.start)
     }
 

@@ -11,7 +11,9 @@ const FIELDS_MAX: usize = 40;
 const SIDE_MAX: usize = 96;
 
 pub(super) fn draw(view: &RunView<'_>) -> Option<Figure> {
-    let find = |name: &str| view.heats.iter().find(|heat| heat.layer == 0 && heat.pathway == name);
+    let first = view.heats.iter().map(|heat| heat.layer).min()?;
+    let find =
+        |name: &str| view.heats.iter().find(|heat| heat.layer == first && heat.pathway == name);
     let (plus, minus, formula) = match (find("pp"), find("np")) {
         (Some(plus), Some(minus)) => (plus, minus, "pp − np"),
         _ => (find("e")?, find("i")?, "e − i"),

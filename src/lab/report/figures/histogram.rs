@@ -6,7 +6,8 @@ use crate::lab::report::image::indexed;
 use crate::lab::report::number::{escape, percent_of, quotient, ratio, size};
 use crate::lab::report::scale::{Axis, Curve, Scale};
 use crate::lab::report::{RunView, colour};
-use crate::lab::store::record::{EpochRecord, PathwayRecord};
+use crate::lab::store::record::EpochRecord;
+use crate::learn::statistics::PathwayRecord;
 
 /// Epochs drawn at most; of more, every second, third, ...
 const EPOCHS_MAX: usize = 200;

@@ -3,7 +3,7 @@
 use super::{Figure, swatch};
 use crate::lab::report::RunView;
 use crate::lab::report::number::{count, percent_of, quotient, ratio, short};
-use crate::lab::store::record::PathwayRecord;
+use crate::learn::statistics::PathwayRecord;
 
 pub(super) fn draw(view: &RunView<'_>) -> Option<Figure> {
     let last = view.last()?;

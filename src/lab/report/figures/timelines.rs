@@ -48,7 +48,7 @@ fn connection(view: &RunView<'_>) -> String {
     if view.epochs.iter().flat_map(|record| &record.pathways).all(|one| one.zero == one.floor) {
         return "Connection sparsity, the share of cells at level 0, is the same here.".into();
     }
-    let sum = |pick: fn(&crate::lab::store::record::PathwayRecord) -> u64| {
+    let sum = |pick: fn(&crate::learn::statistics::PathwayRecord) -> u64| {
         last.pathways.iter().map(pick).sum::<u64>()
     };
     let (zero, cells) = (sum(|one| one.zero), sum(|one| one.cells));
