@@ -62,8 +62,8 @@ pub use self::{
     chacha::Draws,
     conv::{ConvPlan, ConvScratch, ConvShape, ConvTurned, Image, Pixels},
     data::{
-        Banks, Cells, Conversion, Dither, Drives, Ends, Extremes, Greatest, Half, LookUp, Peaks,
-        Pulsed, Rails, Scratch, Single, TOGETHER, WriteCounts, WriteLaw, is_driven,
+        Banks, Cells, Conversion, Dither, Drives, Ends, Extremes, Greatest, Half, LookUp,
+        OneSample, Peaks, Pulsed, Rails, Scratch, TOGETHER, WriteCounts, WriteLaw, is_driven,
     },
     sums::Sums,
     team::Team,
@@ -305,7 +305,7 @@ impl Kernel {
     }
 
     /// [`Kernel::accumulate`] and [`Kernel::dither`] of the half block at `(column, block)`, at once where that
-    /// is faster than one after the other. `soon` is what will be wanted next: it may be fetched meanwhile.
+    /// is faster than one after the other. `prefetch` is what will be wanted next: it may be fetched meanwhile.
     ///
     /// # Panics
     /// When the sizes do not match.
@@ -316,14 +316,15 @@ impl Kernel {
         sums: &mut Half<i32>,
         from: (&Draws, (usize, usize)),
         words: &mut Half<u8>,
-        soon: &Half<u8>,
+        prefetch: &Half<u8>,
     ) {
         assert!(stride > 0 && stride.is_multiple_of(4), "samples are padded to words of four");
         assert_eq!(turned.len(), BLOCK_ROWS * stride, "64 rows");
         assert_eq!(gates.len(), HALF_COLUMNS * stride, "16 columns");
         let both = self.ops.accumulate_drawn;
-        let done = both
-            .is_some_and(|both| call!(both, ((turned, stride), gates, sums, from, words, soon)));
+        let done = both.is_some_and(|both| {
+            call!(both, ((turned, stride), gates, sums, from, words, prefetch))
+        });
         if !done {
             let (draws, (column, block)) = from;
             call!(self, accumulate(turned, stride, gates, sums));
@@ -334,8 +335,8 @@ impl Kernel {
     /// Groups of four rows, a bit each, with a sum that does not round to 0 whatever its dither word of `bits` bits. In
     /// all others nothing is drawn, nothing moves and nothing is counted.
     #[must_use]
-    pub fn loud<'a>(&self, sums: impl Into<Sums<'a>>, write: &WriteLaw, bits: u32) -> u16 {
-        call!(self, loud(sums.into(), write, bits))
+    pub fn may_move<'a>(&self, sums: impl Into<Sums<'a>>, write: &WriteLaw, bits: u32) -> u16 {
+        call!(self, may_move(sums.into(), write, bits))
     }
 
     /// The 8-bit dither words of a half block: columns `column .. column + 16`, rows `64 * block ..`, in the order of
@@ -402,7 +403,7 @@ impl Kernel {
     ///
     /// # Panics
     /// When the sizes do not match.
-    pub fn single(&self, strip: Single<'_>) -> Option<WriteCounts> {
+    pub fn one_sample(&self, strip: OneSample<'_>) -> Option<WriteCounts> {
         let halves = strip.gates.len() / (4 * HALF_COLUMNS);
         assert_eq!(strip.gates.len(), halves * 4 * HALF_COLUMNS, "four gates a column");
         assert_eq!(strip.low.len(), halves / 2 * strip.blocks * BLOCK_CELLS, "whole panels");
@@ -412,7 +413,7 @@ impl Kernel {
         assert!(strip.write.floor <= strip.write.ceiling, "the window is not empty");
         let rows = strip.peaks.as_ref().map_or(0, |rows| rows.len().div_ceil(BLOCK_ROWS));
         assert!(rows == 0 || rows == strip.blocks, "peaks of all rows");
-        call!(self, single(strip))
+        call!(self, one_sample(strip))
     }
 
     /// Sizes of the most positive and the most negative pulses of each row.

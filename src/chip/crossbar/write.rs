@@ -7,7 +7,9 @@
 use std::ops::Range;
 
 use super::StripMut;
-use super::kernel::{Cells, Dither, Draws, Half, Kernel, Single, WriteCounts, WriteLaw, is_driven};
+use super::kernel::{
+    Cells, Dither, Draws, Half, Kernel, OneSample, WriteCounts, WriteLaw, is_driven,
+};
 use super::layout::{BLOCK_CELLS, HALF_CELLS, HALF_COLUMNS, PANEL_COLUMNS};
 use super::pulses::{Collect, Collected, Collector, RowPeaks};
 use super::words::Words;
@@ -75,7 +77,7 @@ impl StripMut<'_> {
             .enumerate()
             .filter(|(_, gates)| is_driven(gates))
             .collect();
-        // words are drawn beside the sums while sums are loud: then they are rarely drawn for nothing
+        // words are drawn beside the sums while sums are may_move: then they are rarely drawn for nothing
         let bytes = (request.dither_bits, request.dither_pattern);
         let mut ahead = bytes == (DitherBits::Eight, DitherPattern::PerCell);
         let may_be_ahead = ahead;
@@ -92,8 +94,8 @@ impl StripMut<'_> {
                 if drawn {
                     let turned = (*turned, stride);
                     let Words { bytes, draws, .. } = &mut words;
-                    let (from, soon) = ((&*draws, (column, block)), &*cells.low);
-                    kernel.accumulate_drawn(turned, gates, &mut sums.0, from, bytes, soon);
+                    let (from, prefetch) = ((&*draws, (column, block)), &*cells.low);
+                    kernel.accumulate_drawn(turned, gates, &mut sums.0, from, bytes, prefetch);
                 } else {
                     kernel.accumulate(turned, stride, gates, &mut sums.0);
                 }
@@ -101,7 +103,7 @@ impl StripMut<'_> {
                     unasked -= 1;
                     u16::MAX
                 } else {
-                    kernel.loud(&sums.0, &write, request.dither_bits.get())
+                    kernel.may_move(&sums.0, &write, request.dither_bits.get())
                 };
                 if unasked == 0 && write.groups.count_ones() >= LOUD {
                     unasked = UNASKED;
@@ -152,7 +154,7 @@ impl StripMut<'_> {
             Collect::Peaks { tile_columns } => Some(self.one_tile(tile_columns)?),
             Collect::Pulses => return None,
         };
-        let counts = kernel.single(Single {
+        let counts = kernel.one_sample(OneSample {
             low: self.low,
             blocks: self.layout.blocks(),
             turned: request.turned,

@@ -357,7 +357,7 @@ unsafe fn accumulate_drawn(
     sums: &mut Half<i32>,
     (draws, (column, block)): (&Draws, (usize, usize)),
     words: &mut Half<u8>,
-    soon: &Half<u8>,
+    prefetch: &Half<u8>,
 ) -> bool {
     // SAFETY: the caller says that tiles have their shape. Only the last `Tiles` of the thread takes it from them, and none is
     // dropped before this returns.
@@ -367,7 +367,7 @@ unsafe fn accumulate_drawn(
     }
     let counter = draws.counter(64, column, block);
     let factors = Factors { turned, gates: avx512::as_bytes(gates) };
-    drawn::half_block_drawn(tiles, factors, sums, (draws, counter), words, soon);
+    drawn::half_block_drawn(tiles, factors, sums, (draws, counter), words, prefetch);
     true
 }
 

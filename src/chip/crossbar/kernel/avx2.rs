@@ -23,8 +23,8 @@ use crate::num::fixed::ErrorBits;
 
 mod dither;
 mod fused;
+mod one_sample;
 mod pairs;
-mod single;
 mod units;
 
 /// Proof that the processor has AVX2 and counts bits.
@@ -52,11 +52,11 @@ pub(super) const OPS: Ops = Ops {
     accumulate,
     dither: dither::dither,
     dither_words: dither::dither_words,
-    loud: fused::loud,
+    may_move: fused::may_move,
     pulses,
     levels,
     fused: fused::fused,
-    single: single::single,
+    one_sample: one_sample::one_sample,
     peaks: units::peaks,
     peak: peak::avx2,
     ..scalar::OPS

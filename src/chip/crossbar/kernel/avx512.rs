@@ -22,10 +22,10 @@ use crate::chip::crossbar::layout::{BLOCK_CELLS, BLOCK_ROWS, HALF_CELLS, HALF_CO
 mod columns;
 mod conv;
 mod dither;
-mod few;
+mod few_samples;
 mod fused;
+mod one_sample;
 mod peaks;
-mod single;
 mod turn;
 mod units;
 
@@ -64,11 +64,11 @@ pub(super) const OPS: Ops = Ops {
     accumulate,
     dither: dither::dither,
     dither_words: dither::dither_words,
-    loud: fused::loud,
+    may_move: fused::may_move,
     pulses,
     levels,
     fused: fused::fused,
-    single: single::single,
+    one_sample: one_sample::one_sample,
     peaks: peaks::peaks,
     peak: peak::avx512,
     ..scalar::OPS
@@ -257,7 +257,7 @@ fn drive_sum(drives: Drives<'_>, sample: usize) -> i32 {
 #[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi,popcnt")]
 pub(super) fn read(cells: &[u8], drives: Drives<'_>, samples: Range<usize>, out: &mut [i32]) {
     if samples.len() <= 4 {
-        return few::read(cells, drives, samples, out);
+        return few_samples::read(cells, drives, samples, out);
     }
     for (sample, out) in samples.clone().zip(out.as_chunks_mut::<32>().0) {
         out.fill(128 * drive_sum(drives, sample));

@@ -200,7 +200,7 @@ pub struct WriteLaw {
     pub negate: bool,
     /// Bound of pulses, 1..=127.
     pub increment_max: i32,
-    /// Groups of four rows that may have a loud sum; all others change nothing and may be passed over.
+    /// Groups of four rows with a sum that may move a cell; all others change nothing and may be passed over.
     pub groups: u16,
     /// Least level.
     pub floor: u16,
@@ -268,7 +268,7 @@ impl WriteLaw {
 
 /// A strip of panels that is written for one sample, with 8-bit words of every cell.
 #[derive(Debug)]
-pub struct Single<'a> {
+pub struct OneSample<'a> {
     /// Levels of whole panels.
     pub low: &'a mut [u8],
     /// Blocks of a panel.
@@ -300,7 +300,7 @@ pub(super) struct OneProduct {
 }
 
 #[cfg(target_arch = "x86_64")]
-impl Single<'_> {
+impl OneSample<'_> {
     /// Half blocks side by side of the widest strip taken.
     pub(super) const HALVES: usize = 8;
 

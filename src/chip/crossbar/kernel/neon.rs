@@ -77,7 +77,7 @@ const fn table<M: Multiply>() -> Ops {
         accumulate: accumulate::<M>,
         dither: dither::dither,
         dither_words: dither::dither_words,
-        loud: pulses::loud_twin,
+        may_move: pulses::may_move_twin,
         pulses: pulses::twin,
         levels: levels::twin,
         peaks,

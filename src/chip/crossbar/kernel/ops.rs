@@ -13,8 +13,8 @@
 use std::ops::Range;
 
 use super::{
-    Banks, Cells, Conversion, Dither, Draws, Drives, Ends, Extremes, Half, Image, LookUp, Peaks,
-    Rails, Scratch, Single, Sums, WriteCounts, WriteLaw,
+    Banks, Cells, Conversion, Dither, Draws, Drives, Ends, Extremes, Half, Image, LookUp,
+    OneSample, Peaks, Rails, Scratch, Sums, WriteCounts, WriteLaw,
 };
 use crate::chip::crossbar::layout::Layout;
 use crate::num::fixed::ErrorBits;
@@ -54,14 +54,14 @@ pub(super) struct Ops {
     >,
     pub(super) dither: unsafe fn(&Draws, usize, usize, &mut Half<u8>),
     pub(super) dither_words: unsafe fn(&Draws, usize, usize, &mut Half<u16>),
-    pub(super) loud: unsafe fn(Sums<'_>, &WriteLaw, u32) -> u16,
+    pub(super) may_move: unsafe fn(Sums<'_>, &WriteLaw, u32) -> u16,
     pub(super) pulses:
         unsafe fn(Sums<'_>, &WriteLaw, Dither<'_>, &mut Cells<'_>, &mut Half<i8>) -> WriteCounts,
     pub(super) levels: unsafe fn(&mut Cells<'_>, &Half<i8>, Ends, u16) -> u64,
     /// Both at once, for writes as they usually are.
     pub(super) fused:
         unsafe fn(&mut Cells<'_>, &Half<i32>, &WriteLaw, Dither<'_>) -> Option<WriteCounts>,
-    pub(super) single: unsafe fn(Single<'_>) -> Option<WriteCounts>,
+    pub(super) one_sample: unsafe fn(OneSample<'_>) -> Option<WriteCounts>,
     pub(super) peaks: unsafe fn(&Extremes) -> Peaks,
     pub(super) peak: unsafe fn(usize) -> u64,
 }
@@ -72,8 +72,8 @@ pub(super) struct Ops {
 macro_rules! twins {
     ($features:literal) => {
         #[target_feature(enable = $features)]
-        fn loud(sums: Sums<'_>, write: &WriteLaw, bits: u32) -> u16 {
-            crate::chip::crossbar::kernel::pulses::loud_twin(sums, write, bits)
+        fn may_move(sums: Sums<'_>, write: &WriteLaw, bits: u32) -> u16 {
+            crate::chip::crossbar::kernel::pulses::may_move_twin(sums, write, bits)
         }
 
         #[target_feature(enable = $features)]

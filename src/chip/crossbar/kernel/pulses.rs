@@ -5,7 +5,7 @@
 //! total     t = residual + SR(amount, shift);   wanted = t >> F
 //! pulses    clamp( wanted, -d_max, +d_max )
 //! residual  clamp( t - (pulses << F), 0, 2^F - 1 )
-//! loud      a group of four rows with a q that is not 0:  all others give no pulse, whatever their words
+//! may_move  a group of four rows with a q that is not 0:  all others give no pulse, whatever their words
 //! ```
 //!
 //! The law is for one cell. Its twin takes a column of four rows at a time, which is a word of four bytes in the order of
@@ -97,13 +97,13 @@ pub(super) fn law(
     counts
 }
 
-/// The law of loud groups, a bit each.
-pub(super) fn loud(sums: Sums<'_>, write: &WriteLaw, bits: u32) -> u16 {
-    let loud = |row: usize| {
+/// The law of groups that may move, a bit each.
+pub(super) fn may_move(sums: Sums<'_>, write: &WriteLaw, bits: u32) -> u16 {
+    let moves = |row: usize| {
         let mut requests = (0..HALF_COLUMNS).map(|c| requests::plain(sums.at(row, c), write));
         requests.any(|request| quotient(request, bits) != 0)
     };
-    (0..BLOCK_ROWS).fold(0, |mask, row| mask | u16::from(loud(row)) << (row / 4))
+    (0..BLOCK_ROWS).fold(0, |mask, row| mask | u16::from(moves(row)) << (row / 4))
 }
 
 /// Cells that are looked at together.
@@ -162,7 +162,7 @@ trait Lane: Copy + Default + PartialEq + BitOr<Output = Self> {
     /// Rounded with a word, in steps of the remainder.
     fn rounded<const RESIDUAL: u8>(self, word: u32, scale: &Scale) -> i32;
 
-    /// Not 0 where a request that is rounded to units of `2^by` is loud.
+    /// Not 0 where a request that is rounded to units of `2^by` may move a cell.
     fn loudness(self, plain: Plain, by: u32) -> Self;
 }
 
@@ -225,25 +225,25 @@ pub(super) fn twin(
     }
 }
 
-/// [`loud`], as compilers make vectors of it.
+/// [`may_move`], as compilers make vectors of it.
 #[inline(always)]
-pub(super) fn loud_twin(sums: Sums<'_>, write: &WriteLaw, bits: u32) -> u16 {
+pub(super) fn may_move_twin(sums: Sums<'_>, write: &WriteLaw, bits: u32) -> u16 {
     match sums {
-        Sums::Narrow(sums) => loud_lanes(sums, write, bits),
-        Sums::Wide(sums) => loud_lanes(sums, write, bits),
+        Sums::Narrow(sums) => moving_lanes(sums, write, bits),
+        Sums::Wide(sums) => moving_lanes(sums, write, bits),
     }
 }
 
 #[inline(always)]
-fn loud_lanes<L: Lane>(sums: &Half<L>, write: &WriteLaw, bits: u32) -> u16 {
+fn moving_lanes<L: Lane>(sums: &Half<L>, write: &WriteLaw, bits: u32) -> u16 {
     let by = write.shift.saturating_sub(write.residual_bits).saturating_sub(bits);
     let plain = Plain::new(write);
-    let mut loud = 0;
+    let mut moving = 0;
     for (group, sums) in sums.as_chunks::<64>().0.iter().enumerate() {
         let any = sums.iter().fold(L::default(), |any, sum| any | sum.loudness(plain, by));
-        loud |= u16::from(any != L::default()) << group;
+        moving |= u16::from(any != L::default()) << group;
     }
-    loud
+    moving
 }
 
 #[inline(always)]

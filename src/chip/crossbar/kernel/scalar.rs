@@ -39,11 +39,11 @@ pub(super) const OPS: Ops = Ops {
     accumulate_drawn: None,
     dither,
     dither_words,
-    loud: pulses::loud,
+    may_move: pulses::may_move,
     pulses: pulses::law,
     levels: levels::law,
     fused: |_, _, _, _| None,
-    single: |_| None,
+    one_sample: |_| None,
     peaks,
     peak: |_| 0,
 };

@@ -180,8 +180,15 @@ fn check_accumulate(stride: usize, seed: u64) {
         let place = Place::global(seed, Site::WriteDither, 3);
         let (mut sums, mut words, mut bytes) = ([9; HALF_CELLS], [3; HALF_CELLS], [4; HALF_CELLS]);
         let draws = Draws::new(place, 70 + seed as usize % 200);
-        let (turned, soon) = ((&turned[..], stride), [0; HALF_CELLS]);
-        kernel.accumulate_drawn(turned, &gates, &mut sums, (&draws, (16, 1)), &mut words, &soon);
+        let (turned, prefetch) = ((&turned[..], stride), [0; HALF_CELLS]);
+        kernel.accumulate_drawn(
+            turned,
+            &gates,
+            &mut sums,
+            (&draws, (16, 1)),
+            &mut words,
+            &prefetch,
+        );
         law().dither(&draws, 16, 1, &mut bytes);
         assert!(sums == want && words == bytes, "{name} {stride} drawn");
     }
@@ -249,11 +256,11 @@ fn check_program(levels: &Half<u8>, sums: &Half<i32>, write: &WriteLaw, seed: u6
             Dither::Byte(_) => 8,
             Dither::Word(_) => 16,
         };
-        let groups = law().loud(sums, write, bits);
+        let groups = law().may_move(sums, write, bits);
         for (name, kernel) in all() {
-            assert_eq!(kernel.loud(sums, write, bits), groups, "{name} {write:?}");
+            assert_eq!(kernel.may_move(sums, write, bits), groups, "{name} {write:?}");
             if (write.floor, write.ceiling) == (0, 255) {
-                // what is not loud may be passed over
+                // what cannot move may be passed over
                 let some = WriteLaw { groups, ..*write };
                 for modes in [[false, false], [false, true]] {
                     let want = programmed(&law(), fresh.clone(), sums, write, dither, modes);
@@ -403,7 +410,7 @@ fn a_zero_sum_moves_nothing_whatever_the_word() {
                     let modes = [false, true];
                     let got = programmed(&kernel, still.clone(), &sums, &write, dither, modes);
                     assert!(got == still, "{name} {shift}");
-                    assert_eq!(kernel.loud(&sums, &write, 8), 0);
+                    assert_eq!(kernel.may_move(&sums, &write, 8), 0);
                 }
             }
         }
@@ -417,9 +424,9 @@ fn sums_at_the_edge_of_rounding_to_nothing_are_loud_on_one_side() {
         let edges = [-half - 1, -half, half - 1, half].map(|edge| edge as i32);
         let sums = std::array::from_fn(|i| if i % 64 == 17 { edges[i / 64 % 4] } else { 0 });
         let write = WriteLaw { shift, ..PLAIN };
-        let want = law().loud(&sums, &write, bits);
+        let want = law().may_move(&sums, &write, bits);
         for (name, kernel) in others() {
-            assert_eq!(kernel.loud(&sums, &write, bits), want, "{name} {shift}");
+            assert_eq!(kernel.may_move(&sums, &write, bits), want, "{name} {shift}");
         }
     }
 }

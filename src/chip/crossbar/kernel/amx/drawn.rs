@@ -66,22 +66,22 @@ pub(super) struct Factors<'a> {
 }
 
 /// Sums of a half block, as [`super::product::half_block`], and meanwhile its 8-bit words: ChaCha8 of 16 blocks that
-/// start from `draws`, with word 12 by lane. `soon` is fetched meanwhile.
+/// start from `draws`, with word 12 by lane. `prefetch` is fetched meanwhile.
 pub(super) fn half_block_drawn(
     tiles: &Tiles,
     factors: Factors<'_>,
     sums: &mut Half<i32>,
     (draws, counter): (&Draws, Counter),
     words: &mut Half<u8>,
-    soon: &Half<u8>,
+    prefetch: &Half<u8>,
 ) {
     let stride = factors.turned.len() / BLOCK_ROWS;
     assert!(stride > 0 && stride.is_multiple_of(64), "there is something to multiply");
     assert!(factors.turned.len() == BLOCK_ROWS * stride, "every row of A is there");
     assert!(factors.gates.len() == HALF_COLUMNS * stride, "every B is there");
     match stride / 64 {
-        1 => last_step(tiles, factors, 0, sums, (draws, counter), words, soon),
-        steps => last_two_steps(tiles, factors, steps - 2, sums, (draws, counter), words, soon),
+        1 => last_step(tiles, factors, 0, sums, (draws, counter), words, prefetch),
+        steps => last_two_steps(tiles, factors, steps - 2, sums, (draws, counter), words, prefetch),
     }
 }
 
@@ -96,7 +96,7 @@ macro_rules! drawn {
             sums: &mut Half<i32>,
             (draws, counter): (&Draws, Counter),
             words: &mut Half<u8>,
-            soon: &Half<u8>,
+            prefetch: &Half<u8>,
         ) {
             let stride = turned.len() / BLOCK_ROWS;
             assert!((before + $steps) * 64 == stride, "all steps are taken");
@@ -155,7 +155,7 @@ macro_rules! drawn {
                     lane = in(reg) counter.step,
                     lanes = sym LANES,
                     words = in(reg) words.as_mut_ptr(),
-                    soon = in(reg) soon.as_ptr(),
+                    prefetch = in(reg) prefetch.as_ptr(),
                     out("zmm0") _, out("zmm1") _, out("zmm2") _, out("zmm3") _, out("zmm4") _,
                     out("zmm5") _, out("zmm6") _, out("zmm7") _, out("zmm8") _, out("zmm9") _,
                     out("zmm10") _, out("zmm11") _, out("zmm12") _, out("zmm13") _, out("zmm14") _,
@@ -184,28 +184,28 @@ drawn!(
         "prefetcht0 [{b} + 1472]"
     ]
     [
-        "tileloadd tmm4, [{a2} + {stride}]\nprefetcht0 [{soon} + 0]\nprefetcht0 [{b} + 1536]"
-        "prefetcht0 [{soon} + 64]\nprefetcht0 [{b} + 1600]"
-        "tdpbusd tmm2, tmm4, tmm7\nprefetcht0 [{soon} + 128]\nprefetcht0 [{b} + 1664]"
-        "prefetcht0 [{soon} + 192]\nprefetcht0 [{b} + 1728]"
+        "tileloadd tmm4, [{a2} + {stride}]\nprefetcht0 [{prefetch} + 0]\nprefetcht0 [{b} + 1536]"
+        "prefetcht0 [{prefetch} + 64]\nprefetcht0 [{b} + 1600]"
+        "tdpbusd tmm2, tmm4, tmm7\nprefetcht0 [{prefetch} + 128]\nprefetcht0 [{b} + 1664]"
+        "prefetcht0 [{prefetch} + 192]\nprefetcht0 [{b} + 1728]"
     ]
     [
-        "prefetcht0 [{soon} + 256]\nprefetcht0 [{b} + 1792]"
-        "tileloadd tmm5, [{a3} + {stride}]\nprefetcht0 [{soon} + 320]\nprefetcht0 [{b} + 1856]"
-        "prefetcht0 [{soon} + 384]\nprefetcht0 [{b} + 1920]"
-        "tdpbusd tmm3, tmm5, tmm7\nprefetcht0 [{soon} + 448]\nprefetcht0 [{b} + 1984]"
+        "prefetcht0 [{prefetch} + 256]\nprefetcht0 [{b} + 1792]"
+        "tileloadd tmm5, [{a3} + {stride}]\nprefetcht0 [{prefetch} + 320]\nprefetcht0 [{b} + 1856]"
+        "prefetcht0 [{prefetch} + 384]\nprefetcht0 [{b} + 1920]"
+        "tdpbusd tmm3, tmm5, tmm7\nprefetcht0 [{prefetch} + 448]\nprefetcht0 [{b} + 1984]"
     ]
     [
-        "prefetcht0 [{soon} + 512]"
-        "prefetcht0 [{soon} + 576]"
-        "prefetcht0 [{soon} + 640]"
-        "prefetcht0 [{soon} + 704]"
+        "prefetcht0 [{prefetch} + 512]"
+        "prefetcht0 [{prefetch} + 576]"
+        "prefetcht0 [{prefetch} + 640]"
+        "prefetcht0 [{prefetch} + 704]"
     ]
     [
-        "prefetcht0 [{soon} + 768]"
-        "prefetcht0 [{soon} + 832]"
-        "prefetcht0 [{soon} + 896]"
-        "prefetcht0 [{soon} + 960]"
+        "prefetcht0 [{prefetch} + 768]"
+        "prefetcht0 [{prefetch} + 832]"
+        "prefetcht0 [{prefetch} + 896]"
+        "prefetcht0 [{prefetch} + 960]"
     ]
     [
         ""
@@ -230,28 +230,28 @@ drawn!(
         "tileloadd tmm5, [{a3} + {stride}]\nprefetcht0 [{b} + 2624]"
     ]
     [
-        "prefetcht0 [{soon} + 0]\nprefetcht0 [{b} + 2688]"
-        "tdpbusd tmm3, tmm5, tmm7\nprefetcht0 [{soon} + 64]\nprefetcht0 [{b} + 2752]"
-        "tileloadd tmm6, [{b} + {row} + 1024]\ntileloadd tmm4, [{a0} + {stride} + 64]\nprefetcht0 [{soon} + 128]\nprefetcht0 [{b} + 2816]"
-        "prefetcht0 [{soon} + 192]\nprefetcht0 [{b} + 2880]"
+        "prefetcht0 [{prefetch} + 0]\nprefetcht0 [{b} + 2688]"
+        "tdpbusd tmm3, tmm5, tmm7\nprefetcht0 [{prefetch} + 64]\nprefetcht0 [{b} + 2752]"
+        "tileloadd tmm6, [{b} + {row} + 1024]\ntileloadd tmm4, [{a0} + {stride} + 64]\nprefetcht0 [{prefetch} + 128]\nprefetcht0 [{b} + 2816]"
+        "prefetcht0 [{prefetch} + 192]\nprefetcht0 [{b} + 2880]"
     ]
     [
-        "tdpbusd tmm0, tmm4, tmm6\nprefetcht0 [{soon} + 256]\nprefetcht0 [{b} + 2944]"
-        "tileloadd tmm5, [{a1} + {stride} + 64]\nprefetcht0 [{soon} + 320]\nprefetcht0 [{b} + 3008]\nprefetcht0 [{b} + 3072]"
-        "prefetcht0 [{soon} + 384]\nprefetcht0 [{b} + 3136]"
-        "tdpbusd tmm1, tmm5, tmm6\nprefetcht0 [{soon} + 448]\nprefetcht0 [{b} + 3200]"
+        "tdpbusd tmm0, tmm4, tmm6\nprefetcht0 [{prefetch} + 256]\nprefetcht0 [{b} + 2944]"
+        "tileloadd tmm5, [{a1} + {stride} + 64]\nprefetcht0 [{prefetch} + 320]\nprefetcht0 [{b} + 3008]\nprefetcht0 [{b} + 3072]"
+        "prefetcht0 [{prefetch} + 384]\nprefetcht0 [{b} + 3136]"
+        "tdpbusd tmm1, tmm5, tmm6\nprefetcht0 [{prefetch} + 448]\nprefetcht0 [{b} + 3200]"
     ]
     [
-        "tileloadd tmm4, [{a2} + {stride} + 64]\nprefetcht0 [{soon} + 512]\nprefetcht0 [{b} + 3264]"
-        "prefetcht0 [{soon} + 576]\nprefetcht0 [{b} + 3328]"
-        "tdpbusd tmm2, tmm4, tmm6\nprefetcht0 [{soon} + 640]\nprefetcht0 [{b} + 3392]"
-        "tileloadd tmm5, [{a3} + {stride} + 64]\nprefetcht0 [{soon} + 704]\nprefetcht0 [{b} + 3456]"
+        "tileloadd tmm4, [{a2} + {stride} + 64]\nprefetcht0 [{prefetch} + 512]\nprefetcht0 [{b} + 3264]"
+        "prefetcht0 [{prefetch} + 576]\nprefetcht0 [{b} + 3328]"
+        "tdpbusd tmm2, tmm4, tmm6\nprefetcht0 [{prefetch} + 640]\nprefetcht0 [{b} + 3392]"
+        "tileloadd tmm5, [{a3} + {stride} + 64]\nprefetcht0 [{prefetch} + 704]\nprefetcht0 [{b} + 3456]"
     ]
     [
-        "prefetcht0 [{soon} + 768]\nprefetcht0 [{b} + 3520]\nprefetcht0 [{b} + 3584]"
-        "tdpbusd tmm3, tmm5, tmm6\nprefetcht0 [{soon} + 832]\nprefetcht0 [{b} + 3648]"
-        "prefetcht0 [{soon} + 896]\nprefetcht0 [{b} + 3712]"
-        "prefetcht0 [{soon} + 960]\nprefetcht0 [{b} + 3776]"
+        "prefetcht0 [{prefetch} + 768]\nprefetcht0 [{b} + 3520]\nprefetcht0 [{b} + 3584]"
+        "tdpbusd tmm3, tmm5, tmm6\nprefetcht0 [{prefetch} + 832]\nprefetcht0 [{b} + 3648]"
+        "prefetcht0 [{prefetch} + 896]\nprefetcht0 [{b} + 3712]"
+        "prefetcht0 [{prefetch} + 960]\nprefetcht0 [{b} + 3776]"
     ]
     [
         "prefetcht0 [{b} + 3840]"

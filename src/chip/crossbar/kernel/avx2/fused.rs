@@ -102,24 +102,24 @@ fn zeros(v: __m256i) -> u32 {
 
 /// Loud groups of sums. Compilers make a loop of the twin that is slower, and it is asked of most half blocks.
 #[target_feature(enable = "avx2,popcnt")]
-pub(super) fn loud(sums: Sums<'_>, write: &WriteLaw, bits: u32) -> u16 {
-    let Sums::Narrow(sums) = sums else { return super::loud(sums, write, bits) };
+pub(super) fn may_move(sums: Sums<'_>, write: &WriteLaw, bits: u32) -> u16 {
+    let Sums::Narrow(sums) = sums else { return super::may_move(sums, write, bits) };
     let by = write.shift.saturating_sub(write.residual_bits).saturating_sub(bits);
     // half of 2^31 beside the greatest sum wraps, and has the top bit as one that is too small
     let half = _mm256_set1_epi32((1u32 << by >> 1).cast_signed());
-    // all bits of a loud sum that a quiet one does not have
+    // the bits that a sum has which may move a cell, and no other
     let beyond = _mm256_set1_epi32((u32::MAX << by).cast_signed());
     let mantissa = _mm256_set1_epi32(if write.negate { -write.mantissa } else { write.mantissa });
-    let mut loud = 0;
+    let mut moving = 0;
     for (group, sums) in sums.as_chunks::<64>().0.iter().enumerate() {
         let mut any = _mm256_setzero_si256();
         for sums in sums.as_chunks::<8>().0 {
             let v = _mm256_mullo_epi32(load_sums(sums), mantissa);
             any = _mm256_or_si256(any, _mm256_add_epi32(v, half));
         }
-        loud |= u16::from(_mm256_testz_si256(any, beyond) == 0) << group;
+        moving |= u16::from(_mm256_testz_si256(any, beyond) == 0) << group;
     }
-    loud
+    moving
 }
 
 #[target_feature(enable = "avx2,popcnt")]

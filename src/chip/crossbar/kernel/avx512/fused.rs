@@ -39,32 +39,32 @@ const WORDS: u8 = 3;
 
 /// Loud groups of sums. Compilers make a loop of the twin that takes twice as long, and it is asked of most half blocks.
 #[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi,popcnt")]
-pub(super) fn loud(sums: Sums<'_>, write: &WriteLaw, bits: u32) -> u16 {
+pub(super) fn may_move(sums: Sums<'_>, write: &WriteLaw, bits: u32) -> u16 {
     match (sums, write.mantissa, write.negate) {
-        (Sums::Wide(_), ..) => super::loud(sums, write, bits),
-        (Sums::Narrow(sums), 1, false) => loud_groups::<PLUS>(sums, write, bits),
-        (Sums::Narrow(sums), 1, true) => loud_groups::<MINUS>(sums, write, bits),
-        (Sums::Narrow(sums), ..) => loud_groups::<TIMES>(sums, write, bits),
+        (Sums::Wide(_), ..) => super::may_move(sums, write, bits),
+        (Sums::Narrow(sums), 1, false) => moving_groups::<PLUS>(sums, write, bits),
+        (Sums::Narrow(sums), 1, true) => moving_groups::<MINUS>(sums, write, bits),
+        (Sums::Narrow(sums), ..) => moving_groups::<TIMES>(sums, write, bits),
     }
 }
 
 #[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi,popcnt")]
-fn loud_groups<const SCALE: u8>(sums: &Half<i32>, write: &WriteLaw, bits: u32) -> u16 {
+fn moving_groups<const SCALE: u8>(sums: &Half<i32>, write: &WriteLaw, bits: u32) -> u16 {
     let by = write.shift.saturating_sub(write.residual_bits).saturating_sub(bits);
     // half of 2^31 beside the greatest sum wraps, and has the top bit as one that is too small
     let half = (1u32 << by >> 1).cast_signed();
-    // all bits of a loud sum that a quiet one does not have
+    // the bits that a sum has which may move a cell, and no other
     let beyond = _mm512_set1_epi32((u32::MAX << by).cast_signed());
     let scale = Scale::new(write, half, 0);
-    let mut loud = 0;
+    let mut moving = 0;
     for (group, sums) in sums.as_chunks::<64>().0.iter().enumerate() {
         let mut any = _mm512_setzero_si512();
         for sums in sums.as_chunks::<16>().0 {
             any = _mm512_or_si512(any, amount::<SCALE>(load_sums(sums), scale));
         }
-        loud |= u16::from(_mm512_test_epi32_mask(any, beyond) != 0) << group;
+        moving |= u16::from(_mm512_test_epi32_mask(any, beyond) != 0) << group;
     }
-    loud
+    moving
 }
 
 #[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi,popcnt")]

@@ -32,9 +32,9 @@ fn check_wide(sums: &Half<i64>, write: &WriteLaw, modes: [bool; 2], seed: u64) -
     let kinds = [(Dither::Nearest, 0), (Dither::Byte(&byte_words), 8), (Dither::Word(&words), 16)];
     let all = kinds.map(|(dither, bits)| {
         let want = programmed(&law(), fresh.clone(), sums, write, dither, modes);
-        let groups = law().loud(sums, write, bits);
+        let groups = law().may_move(sums, write, bits);
         for (name, kernel) in others() {
-            assert_eq!(kernel.loud(sums, write, bits), groups, "{name} {write:?}");
+            assert_eq!(kernel.may_move(sums, write, bits), groups, "{name} {write:?}");
             for groups in [u16::MAX, groups] {
                 let some = WriteLaw { groups, ..*write };
                 let got = programmed(&kernel, fresh.clone(), sums, &some, dither, modes);

@@ -12,16 +12,16 @@ use crate::chip::crossbar::layout::{BLOCK_CELLS, HALF_CELLS};
 #[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi,popcnt")]
 pub(super) fn read(cells: &[u8], drives: Drives<'_>, samples: Range<usize>, out: &mut [i32]) {
     match samples.len() {
-        1 => few::<1>(cells, drives, samples.start, out),
-        2 => few::<2>(cells, drives, samples.start, out),
-        3 => few::<3>(cells, drives, samples.start, out),
-        4 => few::<4>(cells, drives, samples.start, out),
+        1 => few_samples::<1>(cells, drives, samples.start, out),
+        2 => few_samples::<2>(cells, drives, samples.start, out),
+        3 => few_samples::<3>(cells, drives, samples.start, out),
+        4 => few_samples::<4>(cells, drives, samples.start, out),
         _ => unreachable!("a few samples are 1 to 4"),
     }
 }
 
 #[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi,popcnt")]
-fn few<const N: usize>(cells: &[u8], drives: Drives<'_>, first: usize, out: &mut [i32]) {
+fn few_samples<const N: usize>(cells: &[u8], drives: Drives<'_>, first: usize, out: &mut [i32]) {
     let flip = _mm512_set1_epi8(i8::MIN);
     // two sums a lane: a product waits for the one before it in the same sum
     let mut sums = [[[_mm512_setzero_si512(); 2]; N]; 2];

@@ -21,11 +21,11 @@ use super::dither::drawn;
 use super::peaks::{peaks as fold_rows, take};
 use super::units::store_bytes;
 use super::{as_bytes, load, load_sums, store, store_sums};
-use crate::chip::crossbar::kernel::{Extremes, OneProduct, Pulsed, Single, WriteCounts};
+use crate::chip::crossbar::kernel::{Extremes, OneProduct, OneSample, Pulsed, WriteCounts};
 use crate::chip::crossbar::layout::{BLOCK_CELLS, BLOCK_ROWS, HALF_CELLS, HALF_COLUMNS};
 
 /// Half blocks side by side of the widest strip taken.
-const HALVES: usize = Single::HALVES;
+const HALVES: usize = OneSample::HALVES;
 /// Columns of the widest strip, and a vector more.
 const ROOM: usize = HALVES * HALF_COLUMNS + 16;
 
@@ -55,7 +55,7 @@ struct Rounding {
 
 /// See [`super::super::Kernel::single`].
 #[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi,popcnt")]
-pub(super) fn single(strip: Single<'_>) -> Option<WriteCounts> {
+pub(super) fn one_sample(strip: OneSample<'_>) -> Option<WriteCounts> {
     let rounding = strip.one_product()?;
     Some(if rounding.usual {
         strip_of::<true>(strip, rounding)
@@ -66,10 +66,10 @@ pub(super) fn single(strip: Single<'_>) -> Option<WriteCounts> {
 
 #[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi,popcnt")]
 fn strip_of<const USUAL: bool>(
-    strip: Single<'_>,
+    strip: OneSample<'_>,
     OneProduct { right, window: (floor, ceiling), .. }: OneProduct,
 ) -> WriteCounts {
-    let Single { low, blocks, turned, gates, column, draws, write, mut peaks } = strip;
+    let OneSample { low, blocks, turned, gates, column, draws, write, mut peaks } = strip;
     let halves = gates.len() / 64;
     let zero = _mm512_setzero_si512();
     let least_loud = 1u32 << (right - 1);

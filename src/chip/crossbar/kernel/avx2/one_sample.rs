@@ -14,13 +14,13 @@ use std::arch::x86_64::*;
 use super::dither::drawn;
 use super::units::peaks as fold_rows;
 use super::{load, load_sums, store, total};
-use crate::chip::crossbar::kernel::{Extremes, OneProduct, Single, WriteCounts};
+use crate::chip::crossbar::kernel::{Extremes, OneProduct, OneSample, WriteCounts};
 use crate::chip::crossbar::layout::{BLOCK_CELLS, BLOCK_ROWS, HALF_CELLS, HALF_COLUMNS};
 
 /// Columns of a vector.
 const LANES: usize = 8;
 /// Columns of the widest strip.
-const COLUMNS: usize = Single::HALVES * HALF_COLUMNS;
+const COLUMNS: usize = OneSample::HALVES * HALF_COLUMNS;
 /// And a vector more.
 const ROOM: usize = COLUMNS + LANES;
 
@@ -68,7 +68,7 @@ struct Rounding {
 
 /// See [`super::super::Kernel::single`].
 #[target_feature(enable = "avx2,popcnt")]
-pub(super) fn single(strip: Single<'_>) -> Option<WriteCounts> {
+pub(super) fn one_sample(strip: OneSample<'_>) -> Option<WriteCounts> {
     let rounding = strip.one_product()?;
     Some(if rounding.usual {
         strip_of::<true>(strip, rounding)
@@ -79,10 +79,10 @@ pub(super) fn single(strip: Single<'_>) -> Option<WriteCounts> {
 
 #[target_feature(enable = "avx2,popcnt")]
 fn strip_of<const USUAL: bool>(
-    strip: Single<'_>,
+    strip: OneSample<'_>,
     OneProduct { right, window: (floor, ceiling), .. }: OneProduct,
 ) -> WriteCounts {
-    let Single { low, blocks, turned, gates, column, draws, write, mut peaks } = strip;
+    let OneSample { low, blocks, turned, gates, column, draws, write, mut peaks } = strip;
     let vectors = gates.len() / (4 * LANES);
     let zero = _mm256_setzero_si256();
     let least_loud = 1u32 << (right - 1);
