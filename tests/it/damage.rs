@@ -110,6 +110,15 @@ fn changed(text: &str) -> Vec<(String, String)> {
     all
 }
 
+/// Whether a change took a count of 0 out of a table of counts: what is absent there is 0, so a text that a forger's receipt
+/// vouches for says what it said before. (The true receipt holds the hash of its bytes, and finds that too.)
+fn says_the_same(text: &str, what: &str) -> bool {
+    let Some(place) = what.strip_suffix(" removed") else { return false };
+    let value: Value = serde_json::from_str(text).unwrap();
+    let counts = ["events", "cycles", "training", "stages", "busy", "used"];
+    place.split('/').any(|part| counts.contains(&part)) && value.pointer(place) == Some(&0.into())
+}
+
 /// The files with another text under `name`.
 fn with(files: &Files, name: &str, bytes: impl Into<Vec<u8>>) -> Files {
     let mut files = files.clone();
@@ -233,18 +242,24 @@ fn every_field_of_a_finished_run_is_verified() {
     let lines: Vec<&str> = metrics.lines().collect();
     for (at, line) in lines.iter().enumerate() {
         for (what, other) in changed(line) {
+            let same = says_the_same(line, &what);
             let mut lines = lines.clone();
             lines[at] = &other;
             let metrics = lines.join("\n") + "\n";
             let what = format!("record {at} {what}");
             look(&what, &with(&whole, "metrics.jsonl", metrics.clone()));
-            look(&format!("{what}, forged"), &forged(&whole, "metrics.jsonl", "/metrics", metrics));
+            if !same {
+                let forged = forged(&whole, "metrics.jsonl", "/metrics", metrics);
+                look(&format!("{what}, forged"), &forged);
+            }
         }
     }
     for (what, ledger) in changed(&text("ledger.json")) {
         look(&format!("ledger {what}"), &with(&whole, "ledger.json", ledger.clone()));
-        let forged = forged(&whole, "ledger.json", "/ledger", ledger);
-        look(&format!("ledger {what}, forged"), &forged);
+        if !says_the_same(&text("ledger.json"), &what) {
+            let forged = forged(&whole, "ledger.json", "/ledger", ledger);
+            look(&format!("ledger {what}, forged"), &forged);
+        }
     }
     let best = best_name(&whole);
     for (name, field) in [("checkpoint.safetensors", "/checkpoint"), (&*best, "/best/checkpoint")] {
