@@ -96,7 +96,7 @@ pub mod network {
 #[cfg(feature = "lab")]
 pub use crate::lab::{
     config::{Config, ConfigError, Sources},
-    data::{DataError, DataRoot, Loaded as Data},
+    data::{DataError, DataRoot, ImageShape, Loaded as Data},
     run::{
         Event as RunEvent, Keeping, Machine, Outcome as Trained, Progress, RunError, Session,
         Verdict, evaluate, resume, train, verify,

@@ -13,8 +13,11 @@ use crate::lab::data::Loaded;
 use crate::task::classify::Split;
 
 /// Right answers out of how many.
+///
+/// See [`train`](crate::train()).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
+#[non_exhaustive]
 pub struct Score {
     /// Right answers.
     pub correct: u64,
@@ -142,8 +145,11 @@ impl EpochRecord {
 }
 
 /// Everything about one epoch: what the chip did and holds, and what the task says of it. Epoch 0 is the state before the first update.
+///
+/// See [`train`](crate::train()).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
+#[non_exhaustive]
 pub struct EpochRecord {
     /// Epochs finished.
     pub epoch: u32,
@@ -169,6 +175,8 @@ pub struct EpochRecord {
 }
 
 /// What a task says of the final test.
+///
+/// See [`train`](crate::train()).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "task", rename_all = "snake_case")]
 #[non_exhaustive]
@@ -327,8 +335,11 @@ pub struct BestRecord {
 
 /// Proof of a run: what went in, what came out, enough to do it again. Nothing in it depends on machine or time; a run
 /// that is done again gives the same bytes.
+///
+/// See [`train`](crate::train()).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
+#[non_exhaustive]
 pub struct Receipt {
     /// Version of the arithmetic; `verify` refuses another.
     pub arithmetic: u32,
