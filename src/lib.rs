@@ -96,7 +96,7 @@ pub mod network {
 #[cfg(feature = "lab")]
 pub use crate::lab::{
     config::{Config, ConfigError, Sources},
-    data::{Data, DataError, DataRoot},
+    data::{Data, DataError, DataRoot, ImageShape},
     run::{
         Keeping, Machine, Progress, RunError, RunEvent, Session, Trained, Verdict, evaluate,
         resume, train, verify,

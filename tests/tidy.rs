@@ -11,6 +11,8 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
+#[path = "tidy/api.rs"]
+mod api;
 #[path = "tidy/source.rs"]
 mod source;
 

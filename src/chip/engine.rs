@@ -264,7 +264,7 @@ impl Engine {
         let collect = passes::collect(&hardware);
         Self {
             backend,
-            team: Team::new(backend, 1),
+            team: Team::of_one(backend),
             seed,
             potentiation_only: false,
             collect,
@@ -292,12 +292,13 @@ impl Engine {
 
     /// Shares large operations among so many threads from now on; no bit depends on it. An engine starts with one.
     ///
-    /// # Panics
-    /// When the system gives no threads.
-    pub fn set_threads(&mut self, threads: usize) {
+    /// # Errors
+    /// When the system gives no threads; the engine then keeps those it has.
+    pub fn set_threads(&mut self, threads: usize) -> std::io::Result<()> {
         if threads != self.team.threads() {
-            self.team = Team::new(self.backend, threads);
+            self.team = Team::new(self.backend, threads)?;
         }
+        Ok(())
     }
 
     /// Restricts writes to potentiation (Kaneko's rule).

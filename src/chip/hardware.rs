@@ -10,6 +10,16 @@ pub mod timing;
 pub use timing::{PulseCode, Timing};
 
 /// The programming window of a cell: `floor < ceiling <= level_max`.
+///
+/// ```
+/// use dalean::hardware::{LevelBits, Window};
+///
+/// let bits = LevelBits::new(4)?;
+/// let window = Window::new(2, 15, bits)?;
+/// assert_eq!((window.floor(), window.ceiling()), (2, 15));
+/// assert_eq!(Window::new(2, 16, bits).unwrap_err().to_string(), "`ceiling` is 16, but must lie in 1..=15");
+/// # Ok::<(), dalean::hardware::OutOfRange>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Window {
     floor: u16,
@@ -59,6 +69,7 @@ pub enum FloorKind {
 
 /// Where a column's current becomes a number.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Adc {
     /// Lossless.
     Ideal,
@@ -84,6 +95,7 @@ pub enum Subtract {
 
 /// Where the shift of a converter's step comes from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum AdcRange {
     /// Given.
     Shift(u32),
@@ -143,6 +155,7 @@ pub enum DitherPattern {
 
 /// How a write turns sums into pulses.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum WriteScheme {
     /// Sums are rounded with a draw and bounded.
     Rounded,
@@ -221,6 +234,18 @@ pub struct WriteSpec {
 }
 
 /// The parts of a chip. Lengths are in cells, widths in bits. [`Hardware::new`] checks how they fit together.
+///
+/// ```
+/// use dalean::hardware::{FloorKind, WriteScheme};
+/// use dalean::{Hardware, HardwareSpec};
+///
+/// let mut parts: HardwareSpec = Hardware::reference().into_spec();
+/// parts.cell.floor_kind = FloorKind::Absorbing;
+/// parts.write.scheme = WriteScheme::Trains { slots_log2: 2 };
+/// let chip = Hardware::new(parts)?;
+/// assert_eq!((chip.cell.floor_kind, chip.slices()), (FloorKind::Absorbing, 1));
+/// # Ok::<(), dalean::HardwareError>(())
+/// ```
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct HardwareSpec {
     /// Cells.
@@ -240,8 +265,17 @@ pub struct HardwareSpec {
 }
 
 /// Parts that make no chip.
+///
+/// ```
+/// use dalean::Hardware;
+///
+/// let error = Hardware::reference().with(|parts| parts.drive.dac_bits = 9).unwrap_err();
+/// assert_eq!(error.key, "drive.dac_bits");
+/// assert_eq!(error.to_string(), "`drive.dac_bits` is 9; it must lie in 1..=8");
+/// ```
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("`{key}` {found}; {allowed}")]
+#[non_exhaustive]
 pub struct HardwareError {
     /// The key of a hardware model.
     pub key: &'static str,
@@ -252,6 +286,15 @@ pub struct HardwareError {
 }
 
 /// A chip whose parts were checked. Its [`HardwareSpec`] can be read, but not changed.
+///
+/// ```
+/// use dalean::Hardware;
+///
+/// let chip = Hardware::reference();
+/// let tall = chip.with(|parts| parts.tile.rows = 1024)?;
+/// assert_eq!((chip.tile.rows, tall.tile.rows), (256, 1024));
+/// # Ok::<(), dalean::HardwareError>(())
+/// ```
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Hardware(HardwareSpec);
 
@@ -318,7 +361,8 @@ impl Hardware {
     /// write, no remainders and no time.
     ///
     /// ```
-    /// use dalean::chip::hardware::{Hardware, HardwareSpec, TileSpec};
+    /// use dalean::hardware::TileSpec;
+    /// use dalean::{Hardware, HardwareSpec};
     ///
     /// let HardwareSpec { tile, .. } = Hardware::reference().into_spec();
     /// let spec = HardwareSpec {
@@ -384,7 +428,7 @@ impl Hardware {
 
     /// The shift at which no current of a tile can saturate a converter of `bits`.
     #[must_use]
-    pub fn full_shift(&self, bits: AdcBits, subtract: Subtract, rows: usize) -> u32 {
+    pub(crate) fn full_shift(&self, bits: AdcBits, subtract: Subtract, rows: usize) -> u32 {
         let slice_max = (1i64 << self.drive.dac_bits.min(self.drive.bits.get())) - 1;
         let worst = rows as i64 * i64::from(self.cell.window.ceiling()) * slice_max;
         let rail = match subtract {

@@ -23,6 +23,7 @@ pub use delivery::{Delivery, Taps, WordSource};
 
 /// Whose codes are on the rows of an array.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum DrivenBy {
     /// One set of drives, for both streams: data.
     Shared,
@@ -81,6 +82,7 @@ impl LayerSpec {
 
 /// A plan that cannot be built on this chip.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum PlanError {
     /// Too many physical tiles.
     #[error(

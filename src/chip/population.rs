@@ -76,6 +76,7 @@ const MINUS: Pathway = pathway(4, "i", P, P, Inhibits);
 
 /// How a layer's arrays are wired.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Wiring {
     /// Two populations, four arrays.
     Dual,

@@ -22,7 +22,17 @@ pub use layers::{Overlay, Sources, load, overlay, setting, setting_table};
 pub use quantity::{Constant, Constants, CostTable, Kind, Per, QUANTITIES, Quantity};
 
 /// Why a configuration cannot be used. Each message says where, what was found, what is allowed.
+///
+/// ```
+/// use dalean::{Config, Sources};
+///
+/// let text = "[learning]\nbatchh = 16";
+/// let sources = Sources { experiment: Some(("mine.toml", text)), ..Sources::default() };
+/// let error = Config::load(&sources).unwrap_err().to_string();
+/// assert!(error.contains("mine.toml") && error.contains("unknown field `batchh`"));
+/// ```
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum ConfigError {
     /// The text is not TOML, or has keys or values of the wrong kind.
     #[error("{place}:\n{error}")]

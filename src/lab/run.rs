@@ -73,6 +73,8 @@ impl Machine {
 }
 
 /// Why a run could not be carried out.
+///
+/// See [`train`](crate::train()).
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum RunError {
@@ -83,6 +85,14 @@ pub enum RunError {
         found: usize,
         /// Most.
         max: usize,
+    },
+    /// Threads that the system does not give.
+    #[error("the system gives no {threads} threads ({error}); use fewer")]
+    NoThreads {
+        /// Asked for.
+        threads: usize,
+        /// What the system says.
+        error: std::io::Error,
     },
     /// The configuration.
     #[error(transparent)]
@@ -141,7 +151,7 @@ pub enum RunError {
         path: String,
     },
     /// The caller asked to stop.
-    #[error("stopped in epoch {}; continue with --resume {path}", .epoch + 1)]
+    #[error("stopped in epoch {}; continue with --resume {path}", .epoch.saturating_add(1))]
     Stopped {
         /// Epochs finished.
         epoch: u32,

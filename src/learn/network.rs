@@ -28,6 +28,8 @@ use crate::num::fixed::{Batch, RateMantissa};
 use crate::num::tables::{Decay, Positive, Rate};
 
 /// A network and how it learns.
+///
+/// An example is that of [`Classifier`](crate::Classifier); of what is wrong, that of [`NetworkError`].
 #[derive(Debug, Clone, PartialEq)]
 pub struct NetworkSpec {
     /// The layers, input to output.
@@ -62,7 +64,29 @@ pub struct NetworkPlace {
 }
 
 /// A network that does not fit together, or not on the chip.
+///
+/// ```
+/// use dalean::network::{Batch, Centre, Decay, RateMantissa, Rule, UpdateMode};
+/// use dalean::{Hardware, NetworkSpec};
+///
+/// let nothing = NetworkSpec {
+///     layers: vec![],
+///     rule: Rule::Bp,
+///     mode: UpdateMode::Accumulate,
+///     centre: Centre::None,
+///     route: None,
+///     batch: Batch::new(1)?,
+///     mantissa: RateMantissa::new(1)?,
+///     rates: vec![],
+///     decay: Decay::Constant,
+/// };
+/// let error = nothing.check(&Hardware::reference()).unwrap_err();
+/// assert_eq!(error.key(), "network.hidden");
+/// assert_eq!(error.to_string(), "the network has 0 layers; 1 to 64 are supported");
+/// # Ok::<(), dalean::hardware::OutOfRange>(())
+/// ```
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum NetworkError {
     /// The plan of arrays and tiles.
     #[error(transparent)]

@@ -19,6 +19,7 @@ use crate::num::fixed::log2_ceil;
 
 /// How errors reach hidden units.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Route {
     /// Deterministic taps.
     Modulo {

@@ -35,6 +35,7 @@ pub enum Step {
 
 /// When a batch is written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum UpdateMode {
     /// Sums over the batch in digital accumulators, written once.
     Accumulate,
@@ -46,6 +47,7 @@ pub enum UpdateMode {
 
 /// A learning rule.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Rule {
     /// Error diffusion: every layer hears the output error over its route.
     Ed,
@@ -66,7 +68,7 @@ impl Rule {
 
     /// The steps of one update of `layers` layers over a batch whose forward pass is done.
     #[must_use]
-    pub fn steps(self, mode: UpdateMode, layers: usize, samples: usize) -> Vec<Step> {
+    pub(crate) fn steps(self, mode: UpdateMode, layers: usize, samples: usize) -> Vec<Step> {
         match self {
             Self::Ed | Self::Kaneko | Self::Dfa => ed::steps(mode, layers, samples),
             Self::Bp => bp::steps(mode, layers, samples),

@@ -60,7 +60,16 @@ pub const fn log2_ceil(n: u64) -> u32 {
 }
 
 /// A number outside the range its name allows.
+///
+/// ```
+/// use dalean::hardware::AdcBits;
+///
+/// assert_eq!(AdcBits::new(6)?.get(), 6);
+/// assert_eq!(AdcBits::new(17).unwrap_err().to_string(), "`adc_bits` is 17, but must lie in 2..=16");
+/// # Ok::<(), dalean::hardware::OutOfRange>(())
+/// ```
 #[derive(Debug, Clone, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct OutOfRange {
     /// What the number is called in a configuration.
     pub name: &'static str,

@@ -20,6 +20,14 @@ use super::fixed::{
 };
 
 /// A finite number above 0, given by the user: a width, a rate, a factor.
+///
+/// ```
+/// use dalean::network::Positive;
+///
+/// let rate = Positive::new(20.0).expect("in range");
+/// assert_eq!(rate.times(rate).map(Positive::get), Some(400.0));
+/// assert_eq!([0.0, -1.0, f64::NAN].map(Positive::new), [None; 3]);
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, PartialOrd)]
 pub struct Positive(f64);
 
@@ -48,6 +56,7 @@ impl Positive {
 
 /// The function a unit applies to its pre-activation.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub enum Activation {
     /// `1 / (1 + exp(-2 z / alpha))`, of width alpha (paper, section 3.3).
     Sigmoid(Positive),
@@ -159,6 +168,7 @@ fn code(x: f64) -> u8 {
 
 /// How the rate falls over a training.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Decay {
     /// Not at all.
     Constant,

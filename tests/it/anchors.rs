@@ -11,7 +11,7 @@ fn chip(model: &str, settings: &[String]) -> Config {
 }
 
 fn peak_of(config: &Config) -> Peak {
-    let hardware = &config.hardware;
+    let hardware = config.hardware();
     let tiles = hardware.tile.count_max.unwrap() as u64;
     peak(hardware, tiles, u64::from(hardware.slices()), 2).unwrap()
 }
@@ -38,7 +38,7 @@ fn neurram_reads_as_fast_as_published() {
             format!("hw.timing.convert_cycles={}", 30 * output_bits),
         ];
         let config = chip("neurram", &settings);
-        let timing = config.hardware.timing.unwrap();
+        let timing = config.hardware().timing.unwrap();
         assert_eq!(timing.clock_khz, 100_000, "0.01 us a cycle");
         let tops = peak_of(&config).alone.1 / 1e12;
         let name = format!("NeuRRAM ({input_bits}, {output_bits}) TOPS");
@@ -46,7 +46,7 @@ fn neurram_reads_as_fast_as_published() {
     }
     // the model file is the last of these modes
     let settings = ["hw.drive.bits=7".to_owned(), "hw.timing.convert_cycles=300".to_owned()];
-    assert_eq!(chip("neurram", &settings).hardware, chip("neurram", &[]).hardware);
+    assert_eq!(chip("neurram", &settings).hardware(), chip("neurram", &[]).hardware());
 }
 
 /// HERMES (Le Gallo et al., Nature Electronics 2023), one phase.
@@ -72,7 +72,8 @@ fn hermes_takes_the_power_it_was_fitted_to() {
         (Event::LookUps, columns),
         (Event::SramBits, 2.0 * rows * 7.0 + columns * 32.0),
     ];
-    let joules = counts.map(|(event, count)| count * config.constants.of(event).unwrap().value[1]);
+    let joules =
+        counts.map(|(event, count)| count * config.constants().of(event).unwrap().value[1]);
     let operations = 2.0 * rows * columns;
     let tops_per_watt = operations / joules.iter().sum::<f64>() / 1e12;
     within("HERMES one-phase TOPS/W", tops_per_watt, 9.76, 0.01);
@@ -83,6 +84,6 @@ fn hermes_takes_the_power_it_was_fitted_to() {
 #[test]
 fn isaac_reads_as_fast_as_designed() {
     let config = chip("isaac", &[]);
-    let peak = peak(&config.hardware, 16_128 / 2, 16, 8).unwrap();
+    let peak = peak(config.hardware(), 16_128 / 2, 16, 8).unwrap();
     within("ISAAC-CE TOPS (assumed)", peak.back_to_back.1 / 1e12, 40.9, 0.02);
 }

@@ -56,7 +56,7 @@ fn every_experiment_learns_two_batches() {
         let text = std::fs::read_to_string(&path).unwrap();
         let sources = Sources { experiment: Some((&name, &text)), ..Sources::default() };
         let config = load(&sources).unwrap_or_else(|error| panic!("{error}"));
-        let batch = config.batch.get() as usize;
+        let batch = config.batch().get() as usize;
         let loaded = match config.source().unwrap() {
             Source::Named(set @ (NamedSet::Mnist | NamedSet::FashionMnist | NamedSet::Cifar10)) => {
                 generated(set, 2 * batch)

@@ -18,6 +18,7 @@ use crate::num::fixed::{ErrorBits, rsh, sat};
 
 /// What is subtracted from the error of a class.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Centre {
     /// Nothing.
     None,

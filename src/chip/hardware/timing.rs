@@ -26,6 +26,29 @@ pub enum PulseCode {
 }
 
 /// Cycles of a tile. All are at least 1 where the formula divides or counts by them.
+///
+/// ```
+/// use dalean::Hardware;
+/// use dalean::hardware::{PulseCode, Timing};
+///
+/// let timing = Timing {
+///     clock_khz: 1_000_000,
+///     beat: 1,
+///     settle: 10,
+///     convert: 2,
+///     share: 8,
+///     overlapped: true,
+///     lanes: 4,
+///     hops: 3,
+///     pulse: 5,
+///     pulse_code: PulseCode::Unary,
+///     verify: false,
+///     active_max: None,
+/// };
+/// assert!(Hardware::reference().with(|parts| parts.timing = Some(timing)).is_ok());
+/// let stuck = Timing { lanes: 0, ..timing };
+/// assert!(Hardware::reference().with(|parts| parts.timing = Some(stuck)).is_err());
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Timing {
     /// Kilohertz of the clock that counts cycles. Turns cycles into seconds; no schedule reads it.
@@ -89,13 +112,13 @@ impl Timing {
 
     /// `conv`: cycles until all columns of a bank are converted.
     #[must_use]
-    pub const fn conversion(&self) -> u64 {
+    pub(crate) const fn conversion(&self) -> u64 {
         self.share * self.convert
     }
 
     /// Cycles from one slice to the next.
     #[must_use]
-    pub const fn period(&self) -> u64 {
+    pub(crate) const fn period(&self) -> u64 {
         if !self.overlapped {
             self.settle + self.conversion()
         } else if self.settle > self.conversion() {
@@ -107,69 +130,69 @@ impl Timing {
 
     /// `NG`: turns in which the lanes see all of so many columns.
     #[must_use]
-    pub const fn groups(&self, columns: u64) -> u64 {
+    pub(crate) const fn groups(&self, columns: u64) -> u64 {
         columns.div_ceil(self.lanes)
     }
 
     /// Busy cycles of a read in so many slices, of this many columns, whose tiles are added in `levels` steps.
     #[must_use]
-    pub const fn read(&self, slices: u64, columns: u64, levels: u64) -> u64 {
+    pub(crate) const fn read(&self, slices: u64, columns: u64, levels: u64) -> u64 {
         let tail = self.conversion() + self.beat * (levels + self.groups(columns));
         self.settle + (slices - 1) * self.period() + tail
     }
 
     /// Busy cycles until the front end takes the next read.
     #[must_use]
-    pub const fn read_again(&self, slices: u64, columns: u64) -> u64 {
+    pub(crate) const fn read_again(&self, slices: u64, columns: u64) -> u64 {
         let (front, lanes) = (slices * self.period(), self.beat * self.groups(columns));
         if front > lanes { front } else { lanes }
     }
 
     /// Busy cycles of `ERR` with so many words.
     #[must_use]
-    pub const fn error(&self, words: u64, columns: u64) -> u64 {
+    pub(crate) const fn error(&self, words: u64, columns: u64) -> u64 {
         self.beat * (words + self.hops + self.groups(columns))
     }
 
     /// Busy cycles of `UPD(add)`.
     #[must_use]
-    pub const fn accumulate(&self, rows: u64, columns: u64) -> u64 {
+    pub(crate) const fn accumulate(&self, rows: u64, columns: u64) -> u64 {
         self.beat * rows * self.groups(columns)
     }
 
     /// Cycles of the error unit that takes the mean over a batch off every word: `B CE + CE`.
     #[must_use]
-    pub const fn centre(&self, samples: u64, words: u64) -> u64 {
+    pub(crate) const fn centre(&self, samples: u64, words: u64) -> u64 {
         self.beat * (samples * words + words)
     }
 
     /// Cycles of the error unit that adds so many terms to form the words of a layer.
     #[must_use]
-    pub const fn form(&self, terms: u64) -> u64 {
+    pub(crate) const fn form(&self, terms: u64) -> u64 {
         self.beat * terms.div_ceil(self.lanes)
     }
 
     /// Cycles of one pass of a pulse.
     #[must_use]
-    pub const fn pass(&self) -> u64 {
+    pub(crate) const fn pass(&self) -> u64 {
         self.pulse + if self.verify { self.settle + self.conversion() } else { 0 }
     }
 
     /// Cycles of rows that take so many passes together: compute, pulses, turn around.
     #[must_use]
-    pub const fn rows(&self, rows: u64, passes: u64) -> u64 {
+    pub(crate) const fn rows(&self, rows: u64, passes: u64) -> u64 {
         2 * self.beat * rows + passes * self.pass()
     }
 
     /// Cycles of a rank-1 write: levels that rise, then levels that fall.
     #[must_use]
-    pub const fn trains(&self, slots: u64) -> u64 {
+    pub(crate) const fn trains(&self, slots: u64) -> u64 {
         2 * slots * self.pulse
     }
 
     /// Cycles an accepted command adds.
     #[must_use]
-    pub const fn accept(&self) -> u64 {
+    pub(crate) const fn accept(&self) -> u64 {
         self.beat
     }
 }

@@ -42,8 +42,8 @@ impl<'a> Net<'a> {
     }
 
     /// Updates share their work among so many threads from now on.
-    pub(super) fn set_threads(&mut self, threads: usize) {
-        self.trainer.driver_mut().engine_mut().set_threads(threads);
+    pub(super) fn set_threads(&mut self, threads: usize) -> std::io::Result<()> {
+        self.trainer.driver_mut().engine_mut().set_threads(threads)
     }
 
     /// Images of an update.

@@ -42,57 +42,68 @@ pub enum TrainOn {
 /// `[data]`, as it was written.
 pub type DataConfig = DataFile;
 
-/// A checked configuration.
+/// A checked configuration. Nothing of it can be changed, so that what was checked and written down is what runs.
+///
+/// ```
+/// use dalean::{Config, Sources};
+///
+/// let text = "seed = 7\n[network]\nhidden = [32]\n[hw.cell]\nlevel_bits = 5";
+/// let config = Config::load(&Sources { experiment: Some(("mine", text)), ..Sources::default() })?;
+/// assert_eq!((config.seed(), config.hardware().cell.level_bits.get()), (7, 5));
+/// // every default is written out, and read back as the same
+/// assert!(config.to_toml().contains("epochs = 20"));
+/// # Ok::<(), dalean::ConfigError>(())
+/// ```
 #[derive(Debug, Clone)]
 pub struct Config {
     /// Seed of all draws.
-    pub seed: u64,
+    pub(crate) seed: u64,
     /// What is learnt.
-    pub data: DataConfig,
+    pub(crate) data: DataConfig,
     /// Units of each hidden layer.
-    pub hidden: Vec<usize>,
+    pub(crate) hidden: Vec<usize>,
     /// Output units, if not one a class.
-    pub outputs: Option<usize>,
+    pub(crate) outputs: Option<usize>,
     /// Activation of each layer.
-    pub activations: Vec<Activation>,
+    pub(crate) activations: Vec<Activation>,
     /// `log2(weight_max)` of each layer.
-    pub weight_max_log2: Vec<i32>,
+    pub(crate) weight_max_log2: Vec<i32>,
     /// Whether a constant row is driven.
-    pub bias_rows: bool,
+    pub(crate) bias_rows: bool,
     /// Initial gains, 64ths, of hidden and of output layers.
-    pub gain_64ths: [[u32; 2]; 2],
+    pub(crate) gain_64ths: [[u32; 2]; 2],
     /// The rule.
-    pub rule: Rule,
+    pub(crate) rule: Rule,
     /// When a batch is written.
-    pub mode: UpdateMode,
+    pub(crate) mode: UpdateMode,
     /// What is subtracted from errors.
-    pub centre: Centre,
+    pub(crate) centre: Centre,
     /// How errors reach hidden layers; `None` with back-propagation.
-    pub route: Option<Route>,
+    pub(crate) route: Option<Route>,
     /// Samples of an update.
-    pub batch: Batch,
+    pub(crate) batch: Batch,
     /// Small factor of the rate.
-    pub mantissa: RateMantissa,
+    pub(crate) mantissa: RateMantissa,
     /// Rate of each layer.
-    pub rates: Vec<Positive>,
+    pub(crate) rates: Vec<Positive>,
     /// How the rate falls.
-    pub decay: Decay,
+    pub(crate) decay: Decay,
     /// Passes over the training set.
-    pub epochs: u32,
+    pub(crate) epochs: u32,
     /// Random shift of training images.
-    pub shift_pixels: u32,
+    pub(crate) shift_pixels: u32,
     /// What is learnt from.
-    pub train_on: TrainOn,
+    pub(crate) train_on: TrainOn,
     /// Which state reads the test set.
-    pub select: Select,
+    pub(crate) select: Select,
     /// The chip.
-    pub hardware: Hardware,
+    pub(crate) hardware: Hardware,
     /// What its events, its parts and its idling cost.
-    pub constants: Constants,
+    pub(crate) constants: Constants,
     /// What the chip does and is not simulated.
-    pub not_simulated: BTreeMap<String, String>,
+    pub(crate) not_simulated: BTreeMap<String, String>,
     /// Name of the hardware model.
-    pub hardware_name: String,
+    pub(crate) hardware_name: String,
     pub(super) resolved: ExperimentFile,
 }
 
@@ -225,6 +236,36 @@ impl Config {
     /// When a text cannot be read, has unknown keys, or the numbers are impossible.
     pub fn load(sources: &Sources<'_>) -> Result<Self, ConfigError> {
         super::load(sources)
+    }
+
+    /// Seed of all draws.
+    #[must_use]
+    pub const fn seed(&self) -> u64 {
+        self.seed
+    }
+
+    /// Passes over the training set.
+    #[must_use]
+    pub const fn epochs(&self) -> u32 {
+        self.epochs
+    }
+
+    /// Samples of an update.
+    #[must_use]
+    pub const fn batch(&self) -> Batch {
+        self.batch
+    }
+
+    /// The chip.
+    #[must_use]
+    pub const fn hardware(&self) -> &Hardware {
+        &self.hardware
+    }
+
+    /// What its events, its parts and its idling cost.
+    #[must_use]
+    pub const fn constants(&self) -> &Constants {
+        &self.constants
     }
 
     /// The configuration as one self-contained file, every default written out.

@@ -62,7 +62,7 @@ impl Data {
     ///
     /// let config = Config::load(&Sources::default())?;
     /// let digits = Data::load(&config, &DataRoot::new("data"))?;
-    /// assert_eq!(digits.split.train.len(), 3505);
+    /// assert_eq!(digits.split().train.len(), 3505);
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     ///

@@ -78,7 +78,7 @@ impl Config {
     ///
     /// # Errors
     /// When the configuration does not fit such data.
-    pub fn given(
+    pub(crate) fn given(
         &self,
         features: usize,
         classes: usize,

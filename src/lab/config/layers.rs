@@ -4,6 +4,22 @@ use super::file::{ExperimentFile, HardwareFile};
 use super::{Config, ConfigError, check, hardware};
 
 /// Where a configuration comes from, weakest first.
+///
+/// ```
+/// use dalean::{Config, Sources};
+///
+/// // what `dalean train mine.toml --hw reram --set learning.batch=8 --seed 3` reads
+/// let settings = ["learning.batch=8".to_owned()];
+/// let config = Config::load(&Sources {
+///     experiment: Some(("mine.toml", "learning.batch = 16")),
+///     hardware: Some("reram"),
+///     settings: &settings,
+///     seed: Some(3),
+///     ..Sources::default()
+/// })?;
+/// assert_eq!((config.batch().get(), config.seed()), (8, 3));
+/// # Ok::<(), dalean::ConfigError>(())
+/// ```
 #[derive(Debug, Clone, Default)]
 pub struct Sources<'a> {
     /// Name and text of the experiment file.

@@ -12,7 +12,10 @@ use super::{
 use crate::task::classify::ExamplesError;
 
 /// Why data could not be had.
+///
+/// See [`DataRoot`](super::DataRoot).
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum DataError {
     /// Parts that are not of one kind.
     #[error(

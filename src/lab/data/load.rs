@@ -29,18 +29,18 @@ use crate::task::classify::{Examples, Split};
 /// Greatest size of a file: 2^32 bytes.
 const FILE_BYTES_MAX: u64 = 1 << 32;
 
-/// A data set, ready for a run. Copies share their examples.
+/// A data set, ready for a run: parts of one kind, and their hash. Copies share their examples.
 #[derive(Debug, Clone)]
 #[non_exhaustive]
 pub struct Data {
     /// The examples.
-    pub split: Split,
+    pub(crate) split: Split,
     /// What they are, in one line.
-    pub description: String,
+    pub(crate) description: String,
     /// Names the content, in hexadecimal: two sets with one hash give the same run.
-    pub hash: String,
+    pub(crate) hash: String,
     /// How to show an example as a picture.
-    pub image: Option<ImageShape>,
+    pub(crate) image: Option<ImageShape>,
 }
 
 impl Data {
@@ -53,7 +53,7 @@ impl Data {
     /// let train = part(vec![0, 1, 2, 3]);
     /// let (validation, test) = (part(vec![0, 0, 3, 3]), part(vec![1, 1, 2, 2]));
     /// let data = Data::new("mine", Split { train, validation, test }, None)?;
-    /// assert_eq!(data.hash.len(), 64);
+    /// assert_eq!(data.hash().len(), 64);
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     ///
@@ -70,6 +70,30 @@ impl Data {
             return Err(DataError::Image { image, features });
         }
         Ok(finish(name, split, image, ""))
+    }
+
+    /// The examples.
+    #[must_use]
+    pub const fn split(&self) -> &Split {
+        &self.split
+    }
+
+    /// What they are, in one line.
+    #[must_use]
+    pub fn description(&self) -> &str {
+        &self.description
+    }
+
+    /// Names the content, in hexadecimal: two sets with one hash give the same run.
+    #[must_use]
+    pub fn hash(&self) -> &str {
+        &self.hash
+    }
+
+    /// How to show an example as a picture.
+    #[must_use]
+    pub const fn image(&self) -> Option<ImageShape> {
+        self.image
     }
 }
 

@@ -92,6 +92,16 @@ impl FromStr for NamedSet {
 }
 
 /// The folder that fetched sets lie in, each in a folder of its own name.
+///
+/// ```
+/// use dalean::{Config, Data, DataRoot, Sources};
+///
+/// let settings = ["data.set=mnist".to_owned()];
+/// let config = Config::load(&Sources { settings: &settings, ..Sources::default() })?;
+/// let error = Data::load(&config, &DataRoot::new("no such folder")).unwrap_err();
+/// assert!(error.to_string().contains("dalean data fetch mnist"));
+/// # Ok::<(), dalean::ConfigError>(())
+/// ```
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct DataRoot(PathBuf);
 
@@ -175,6 +185,13 @@ impl PartFile {
 }
 
 /// How the values of an example make a picture: channel after channel, each row after row.
+///
+/// ```
+/// use dalean::ImageShape;
+///
+/// assert_eq!(ImageShape { height: 28, width: 28, channels: 1 }.values(), Some(784));
+/// assert_eq!(ImageShape { height: usize::MAX, width: 2, channels: 1 }.values(), None);
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ImageShape {
     /// Rows of pixels.

@@ -58,7 +58,8 @@ impl Classify {
         }
         let seeded = experiment.build(machine.backend(), train.len())?;
         let mut trainer = Trainer::new(experiment, seeded);
-        trainer.driver_mut().engine_mut().set_threads(machine.threads());
+        let (threads, engine) = (machine.threads(), trainer.driver_mut().engine_mut());
+        engine.set_threads(threads).map_err(|error| RunError::NoThreads { threads, error })?;
         let codes = trainer.calibrate(&train).map(|calibration| calibration.code_max);
         let low = codes.into_iter().flatten().enumerate().filter(|&(_, code_max)| code_max <= 3);
         let notes = low.map(|(layer, code_max)| Note::LowCodes { layer, code_max }).collect();

@@ -16,6 +16,24 @@ use crate::learn::driver::Driver;
 use crate::task::classify::Examples;
 
 /// A training in memory.
+///
+/// ```
+/// use dalean::{Backend, Config, Data, DataRoot, Machine, Session, Sources};
+///
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// let text = "data.set = \"xor\"\nnetwork.hidden = [4]\nlearning.epochs = 2";
+/// let config = Config::load(&Sources { experiment: Some(("mine", text)), ..Sources::default() })?;
+/// let data = Data::load(&config, &DataRoot::new("data"))?;
+/// let mut session = Session::new(&config, data, Machine::new(Backend::best(), 1)?)?;
+/// session.start();
+/// session.advance(&mut |_progress| true);
+/// let (checkpoint, hash) = (session.checkpoint(), session.state_hash());
+/// session.advance(&mut |_progress| true);
+/// session.restore(&checkpoint)?;
+/// assert_eq!((session.epoch(), session.state_hash()), (1, hash));
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Debug)]
 pub struct Session {
     task: Box<dyn Task>,
@@ -34,10 +52,7 @@ impl Session {
     /// Builds what a configuration asks for: networks with their initial levels, and calibrated converters.
     ///
     /// # Errors
-    /// When the configuration does not fit the data or the chip.
-    ///
-    /// # Panics
-    /// When threads cannot be started.
+    /// When the configuration does not fit the data or the chip, or the system gives no threads.
     pub fn new(config: &Config, data: Data, machine: Machine) -> Result<Self, RunError> {
         let record = DataRecord::of(&data);
         let given = config.given(record.features, record.classes, record.image)?;
@@ -59,19 +74,19 @@ impl Session {
     }
 
     /// Reads one sample, as an inference does.
-    pub fn infer(&mut self) {
+    pub(crate) fn infer(&mut self) {
         self.task.infer();
     }
 
     /// Starts recording operations; what was read before the last samples were loaded is forgotten.
-    pub fn keep_tape(&mut self) {
+    pub(crate) fn keep_tape(&mut self) {
         for network in self.task.networks_mut() {
             let _ = network.engine_mut().record(true);
         }
     }
 
     /// What the first network executed since its last samples were loaded.
-    pub fn take_tape(&mut self) -> Vec<Recorded> {
+    pub(crate) fn take_tape(&mut self) -> Vec<Recorded> {
         let mut networks = self.task.networks_mut().into_iter();
         networks.next().map_or_else(Vec::new, |network| network.engine_mut().record(false))
     }
@@ -142,13 +157,13 @@ impl Session {
 
     /// Networks, whose layers are numbered through.
     #[must_use]
-    pub fn networks(&self) -> Vec<&Driver> {
+    pub(crate) fn networks(&self) -> Vec<&Driver> {
         self.task.networks()
     }
 
     /// The chips of the networks, or the parts of one chip that they are on.
     #[must_use]
-    pub fn engines(&self) -> Vec<&Engine> {
+    pub(crate) fn engines(&self) -> Vec<&Engine> {
         self.task.networks().into_iter().map(Driver::engine).collect()
     }
 

@@ -18,7 +18,10 @@ use crate::learn::statistics::PathwayRecord;
 use crate::task::classify::Examples;
 
 /// How far an epoch is.
+///
+/// See [`train`](crate::train()).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct Progress {
     /// Epoch in progress, from 0.
     pub epoch: u32,

@@ -20,7 +20,10 @@ use crate::lab::store::record::{
 use crate::lab::store::{address, hash};
 
 /// What happens while a run is carried out.
+///
+/// See [`train`](crate::train()).
 #[derive(Debug)]
+#[non_exhaustive]
 pub enum RunEvent<'a> {
     /// The run is about to start.
     Started {
@@ -44,7 +47,10 @@ pub enum RunEvent<'a> {
 }
 
 /// Which files a run leaves, and how much work it may lose when it is killed.
+///
+/// See [`train`](crate::train()).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct Keeping {
     /// Whether the states stay when the run is finished. Without them nobody can `eval` it, and its page has no levels.
     pub states: bool,
@@ -58,7 +64,10 @@ impl Keeping {
 }
 
 /// A finished run.
+///
+/// See [`train`](crate::train()).
 #[derive(Debug)]
+#[non_exhaustive]
 pub struct Trained {
     /// Its receipt.
     pub receipt: Receipt,
@@ -73,6 +82,40 @@ pub struct Trained {
 }
 
 /// Trains a configuration in a new folder below `root`.
+///
+/// ```
+/// use dalean::{Backend, Config, DataRoot, Machine, RunError, RunEvent, Sources, Verdict};
+///
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// let text = "data.set = \"xor\"\nnetwork.hidden = [4]\nlearning.epochs = 1";
+/// let config = Config::load(&Sources { experiment: Some(("mine", text)), ..Sources::default() })?;
+/// let folder = format!("dalean-example-{}", std::process::id());
+/// let (data, runs) = (DataRoot::new("data"), std::env::temp_dir().join(folder));
+/// let machine = Machine::new(Backend::best(), 1)?;
+///
+/// let (mut folder, mut epochs) = (None, 0);
+/// let trained = dalean::train(&config, &data, &runs, machine, &mut |event| {
+///     match event {
+///         RunEvent::Started { folder: path, .. } => folder = Some(path.to_owned()),
+///         RunEvent::Epoch(record, _seconds) => epochs = record.epoch,
+///         _ => {}
+///     }
+///     true
+/// })?;
+/// let folder = folder.ok_or("every run has started")?;
+/// assert_eq!((epochs, trained.records.len(), &*trained.receipt.status), (1, 2, "finished"));
+///
+/// // read the test set again, do the whole run again, and see that there is nothing to continue
+/// let (test, _state_hash) = dalean::evaluate(&folder, &data, machine)?;
+/// assert_eq!(trained.receipt.test, Some(test));
+/// let verdict = dalean::verify(&folder, &data, machine, None, &mut |_progress| true)?;
+/// assert!(matches!(verdict, Verdict::Same { epochs: 2, .. }));
+/// let again = dalean::resume(&folder, &data, machine, &mut |_event| true);
+/// assert!(matches!(again, Err(RunError::Finished { .. })));
+/// # std::fs::remove_dir_all(&runs)?;
+/// # Ok(())
+/// # }
+/// ```
 ///
 /// # Errors
 /// When something does not fit, the disk refuses, or the caller stops it.
@@ -94,6 +137,8 @@ pub fn train(
 }
 
 /// Continues a run from its last finished epoch.
+///
+/// See [`train`](crate::train()) for an example.
 ///
 /// # Errors
 /// When the run is finished or damaged, its data is not the same, or as [`train`].
@@ -169,6 +214,8 @@ fn restore(session: &mut Session, path: &Path, name: &str) -> Result<Vec<u8>, Ru
 }
 
 /// Reads the test set with the chosen state of a run.
+///
+/// See [`train`](crate::train()) for an example.
 ///
 /// # Errors
 /// When the run is damaged or its data is not the same.

@@ -18,7 +18,10 @@ use crate::lab::store::ledger::LedgerRecord;
 use crate::lab::store::record::{BestRecord, EpochRecord, Receipt, TestOutcome};
 
 /// What doing a run again showed.
+///
+/// See [`train`](crate::train()).
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub enum Verdict {
     /// Everything compared is equal.
     Same {
@@ -56,6 +59,8 @@ impl<E: Into<RunError>> From<E> for Halt {
 
 /// Re-executes a run, or its first `epochs` epochs, and compares every number of its records, its ledger, its receipt and
 /// its checkpoints with what comes out, and every file with the hash that the receipt has of it.
+///
+/// See [`train`](crate::train()) for an example.
 ///
 /// # Errors
 /// When the run is damaged, its data is not the same, or the caller stops it.

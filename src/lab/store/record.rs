@@ -14,8 +14,11 @@ use crate::learn::statistics::PathwayRecord;
 use crate::task::classify::Split;
 
 /// Right answers out of how many.
+///
+/// See [`train`](crate::train()).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
+#[non_exhaustive]
 pub struct Score {
     /// Right answers.
     pub correct: u64,
@@ -117,8 +120,11 @@ impl EpochRecord {
 }
 
 /// Everything about one epoch: what the chip did and holds, and what the task says of it. Epoch 0 is the state before the first update.
+///
+/// See [`train`](crate::train()).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
+#[non_exhaustive]
 pub struct EpochRecord {
     /// Epochs finished.
     pub epoch: u32,
@@ -144,6 +150,8 @@ pub struct EpochRecord {
 }
 
 /// What a task says of the final test.
+///
+/// See [`train`](crate::train()).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "task", rename_all = "snake_case")]
 #[non_exhaustive]
@@ -337,8 +345,11 @@ pub struct BestRecord {
 
 /// Proof of a run: what went in, what came out, enough to do it again. Nothing in it depends on machine or time; a run
 /// that is done again gives the same bytes.
+///
+/// See [`train`](crate::train()).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
+#[non_exhaustive]
 pub struct Receipt {
     /// Version of the arithmetic; `verify` refuses another.
     pub arithmetic: u32,

@@ -13,7 +13,10 @@ use std::sync::Arc;
 use crate::num::fixed::DriveBits;
 
 /// Why values and labels do not make a set of examples.
+///
+/// See [`Examples`].
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum ExamplesError {
     /// No such examples can be.
     #[error(
@@ -55,7 +58,7 @@ pub enum ExamplesError {
         full_scale: u8,
     },
     /// A label beyond the last class.
-    #[error("example {example} has the label {found}, but there are {classes} classes (0..={})", .classes - 1)]
+    #[error("example {example} has the label {found}, but there are {classes} classes (0..={})", .classes.saturating_sub(1))]
     Label {
         /// Which example, counted from 0.
         example: usize,
@@ -68,6 +71,17 @@ pub enum ExamplesError {
 
 /// Labelled examples. Every value is at most `full_scale`, every label below `classes`. Copies and parts share their
 /// storage.
+///
+/// ```
+/// use dalean::{Examples, ExamplesError};
+///
+/// // two examples of three values 0 to 16, in two classes
+/// let set = Examples::new(vec![0, 8, 16, 1, 2, 3], vec![0, 1], 3, 16, 2)?;
+/// assert_eq!((set.len(), set.features(), set.labels()), (2, 3, &[0, 1][..]));
+/// let wrong = Examples::new(vec![0, 8, 17], vec![0], 3, 16, 2).unwrap_err();
+/// assert_eq!(wrong.to_string(), "example 0 holds the value 17, above the full scale 16");
+/// # Ok::<(), ExamplesError>(())
+/// ```
 #[derive(Debug, Clone)]
 pub struct Examples {
     values: Arc<[u8]>,
@@ -139,7 +153,7 @@ impl Examples {
 
     /// Values of one example, row-major.
     #[must_use]
-    pub fn values(&self, example: usize) -> &[u8] {
+    pub(crate) fn values(&self, example: usize) -> &[u8] {
         &self.all_values()[example * self.features..][..self.features]
     }
 
@@ -178,7 +192,7 @@ impl Examples {
     /// # Panics
     /// When `at` is beyond the end.
     #[must_use]
-    pub fn split_at(self, at: usize) -> (Self, Self) {
+    pub(crate) fn split_at(self, at: usize) -> (Self, Self) {
         assert!(at <= self.len(), "a cut lies inside");
         let Range { start, end } = self.range;
         let rest = Self { range: start + at..end, ..self.clone() };
@@ -190,7 +204,7 @@ impl Examples {
     /// # Panics
     /// When the two differ in features, full scale or classes.
     #[must_use]
-    pub fn joined(self, other: &Self) -> Self {
+    pub(crate) fn joined(self, other: &Self) -> Self {
         let shape = |e: &Self| (e.features, e.full_scale, e.classes);
         assert_eq!(shape(&self), shape(other), "only sets of one kind are joined");
         let values = [self.all_values(), other.all_values()].concat().into();
@@ -210,6 +224,8 @@ impl Examples {
 }
 
 /// A data set: what is learnt from, what is chosen on, and what is read once at the end.
+///
+/// `Data::new` makes a data set of one.
 #[derive(Debug, Clone)]
 pub struct Split {
     /// Training half.

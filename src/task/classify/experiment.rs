@@ -20,6 +20,8 @@ pub struct Augment {
 }
 
 /// Everything that decides a result, the data aside.
+///
+/// See [`Classifier`](crate::Classifier).
 #[derive(Debug, Clone, PartialEq)]
 pub struct Experiment {
     /// Seed of all draws.

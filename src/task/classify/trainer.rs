@@ -17,6 +17,7 @@ const READ_BATCH: usize = 256;
 
 /// How far an epoch is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct EpochProgress {
     /// Epoch in progress, from 0.
     pub epoch: u32,
@@ -29,11 +30,17 @@ pub struct EpochProgress {
 }
 
 /// The caller asked to stop; the epoch in progress is not finished.
+///
+/// See [`Classifier`](crate::Classifier).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct Stop;
 
 /// Answers to a set of examples.
+///
+/// See [`Classifier`](crate::Classifier).
 #[derive(Debug, Clone, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct Evaluation {
     /// Predicted class of each example.
     pub predictions: Vec<u8>,

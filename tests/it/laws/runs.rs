@@ -171,7 +171,7 @@ fn go_on(run: &Run, trainer: &mut Trainer, until: u32) -> Vec<String> {
 
 fn whole(run: &Run, backend: Backend, threads: usize) -> Vec<String> {
     let mut trainer = fresh(run, backend);
-    trainer.driver_mut().engine_mut().set_threads(threads);
+    trainer.driver_mut().engine_mut().set_threads(threads).unwrap();
     go_on(run, &mut trainer, run.experiment.epochs)
 }
 

@@ -117,6 +117,7 @@ impl Shadow {
                     let slices = hw.drive.bits.get().div_ceil(hw.drive.dac_bits) as usize;
                     vec![vec![shift; slices]; spec.wiring.targets().len()]
                 }
+                other => panic!("the shadow knows no {other:?}"),
             };
             let tracks = matches!(hw.adc, Adc::Finite { range: AdcRange::Tracking, .. });
             let rails = shifts.iter().filter(|_| tracks).map(|s: &Vec<u32>| vec![[0; 2]; s.len()]);

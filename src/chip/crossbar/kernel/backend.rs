@@ -9,7 +9,17 @@ use super::scalar;
 use super::{amx, amx::Amx, avx2, avx2::Avx2, avx512, avx512::Avx512};
 
 /// Which loops run. All give the same bits.
+///
+/// ```
+/// use dalean::Backend;
+///
+/// assert_eq!(Backend::named("scalar")?, Backend::available()[0]);
+/// assert_eq!(Backend::named(Backend::best().name())?, Backend::best());
+/// assert!(Backend::named("abacus").unwrap_err().to_string().starts_with("there is no kernel `abacus`"));
+/// # Ok::<(), dalean::UnknownBackend>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Backend {
     /// Plain loops: the definition.
     Scalar,
@@ -28,7 +38,10 @@ pub enum Backend {
 }
 
 /// Why a back end cannot be had by its name.
+///
+/// See [`Backend`].
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum UnknownBackend {
     /// No back end has this name on any machine.
     #[error("there is no kernel `{name}`; say one of {}", NAMES.join(", "))]

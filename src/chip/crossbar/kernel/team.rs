@@ -16,11 +16,12 @@
 use std::any::Any;
 use std::cell::UnsafeCell;
 use std::hint::spin_loop;
+use std::io;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::atomic::Ordering::{Acquire, Relaxed, SeqCst};
 use std::sync::atomic::{AtomicBool, AtomicU64};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
-use std::thread::{self, JoinHandle, Thread};
+use std::thread::{self, Builder, JoinHandle, Thread};
 
 use super::{Backend, Kernel};
 
@@ -79,29 +80,31 @@ impl std::fmt::Debug for Team {
 }
 
 impl Team {
+    /// The caller alone.
+    #[must_use]
+    pub fn of_one(backend: Backend) -> Self {
+        Self { backend, shared: Arc::new(Shared::new(0)), helpers: vec![] }
+    }
+
     /// A team of so many threads, the caller among them, with a back end that is ready on each.
     ///
-    /// # Panics
-    /// When the system gives no threads.
-    #[must_use]
-    pub fn new(backend: Backend, threads: usize) -> Self {
+    /// # Errors
+    /// When the system gives no threads; those it gave have ended by then.
+    pub fn new(backend: Backend, threads: usize) -> io::Result<Self> {
+        Self::with(backend, threads, thread::Builder::new)
+    }
+
+    fn with(backend: Backend, threads: usize, builder: fn() -> Builder) -> io::Result<Self> {
         let helpers = threads.saturating_sub(1);
-        let shared = Arc::new(Shared {
-            gate: AtomicU64::new(0),
-            task: UnsafeCell::new(None),
-            asleep: (0..helpers).map(|_| AtomicBool::new(false)).collect(),
-            waiting: AtomicBool::new(false),
-            over: AtomicBool::new(false),
-            panic: Mutex::new(None),
-        });
-        let helper = |index| {
-            let shared = Arc::clone(&shared);
-            let named = thread::Builder::new().name(format!("helper {}", index + 1));
-            let started = named.spawn(move || help(&shared, backend, index));
-            started.expect("the system gives threads")
-        };
-        let helpers = (0..helpers).map(helper).collect();
-        Self { backend, shared, helpers }
+        let shared = Arc::new(Shared::new(helpers));
+        // a team that stays incomplete ends those who came
+        let mut team = Self { backend, shared, helpers: Vec::with_capacity(helpers) };
+        for index in 0..helpers {
+            let shared = Arc::clone(&team.shared);
+            let named = builder().name(format!("helper {}", index + 1));
+            team.helpers.push(named.spawn(move || help(&shared, backend, index))?);
+        }
+        Ok(team)
     }
 
     /// Threads, the caller among them.
@@ -199,6 +202,17 @@ impl Drop for Team {
 }
 
 impl Shared {
+    fn new(helpers: usize) -> Self {
+        Self {
+            gate: AtomicU64::new(0),
+            task: UnsafeCell::new(None),
+            asleep: (0..helpers).map(|_| AtomicBool::new(false)).collect(),
+            waiting: AtomicBool::new(false),
+            over: AtomicBool::new(false),
+            panic: Mutex::new(None),
+        }
+    }
+
     /// Waits for helpers that are inside; the gate is closed.
     fn wait_until_empty(&self) {
         let empty = || self.gate.load(SeqCst) & INSIDE == 0;
@@ -282,7 +296,7 @@ mod tests {
     use super::*;
 
     fn team(threads: usize) -> Team {
-        Team::new(Backend::best(), threads)
+        Team::new(Backend::best(), threads).unwrap()
     }
 
     #[test]
@@ -296,6 +310,13 @@ mod tests {
                 assert_eq!(squares, (0..parts as u64).map(|part| part * part).collect::<Vec<_>>());
             }
         }
+    }
+
+    #[test]
+    fn threads_that_the_system_refuses_are_an_error() {
+        let huge = || Builder::new().stack_size(1 << 60);
+        assert!(Team::with(Backend::best(), 3, huge).is_err());
+        assert_eq!(Team::with(Backend::best(), 1, huge).unwrap().threads(), 1);
     }
 
     #[test]

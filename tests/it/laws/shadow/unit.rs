@@ -33,6 +33,7 @@ impl Shadow {
                     self.means[output] += rsh(off, 8);
                     rsh(off, 17 - bits)
                 }
+                other => panic!("the shadow knows no {other:?}"),
             };
             let (word, changed) = sat(exact, bits);
             saturated += u64::from(changed);
