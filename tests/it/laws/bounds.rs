@@ -1,10 +1,11 @@
-//! The greatest sums a plan allows: reached exactly, by every back end.
+//! The greatest sums a plan allows: reached exactly, by every back end. And how many codes a converter that tracks lets
+//! lie on its rail, on both sides of that number.
 
 use std::ops::Range;
 
 use dalean::chip::crossbar::kernel::Backend;
-use dalean::chip::engine::{Engine, Operation, Side, Write};
-use dalean::chip::hardware::{DitherBits, Hardware, Window};
+use dalean::chip::engine::{Engine, Operation, Side, Write, Written};
+use dalean::chip::hardware::{Adc, AdcRange, DitherBits, Hardware, Subtract, Window};
 use dalean::chip::layer::{CHUNK_BLOCKS, DrivenBy, Layer, LayerSpec, SIDE_MAX, Taps};
 use dalean::chip::population::Wiring;
 use dalean::num::fixed::*;
@@ -125,4 +126,21 @@ fn a_write_reaches_its_bound_with_the_greatest_batch_and_mantissa() {
             assert_eq!((other.level(0, 0), left), (0, 0), "nothing waits below the floor");
         }
     }
+}
+
+#[test]
+fn one_code_in_64_may_lie_on_the_rail() {
+    let bits = AdcBits::new(8).unwrap();
+    let tracking = Adc::Finite { bits, subtract: Subtract::Digital, range: AdcRange::Tracking };
+    let chip = hardware(8, 0).with(|h| h.adc = tracking).unwrap();
+    let grown = |rails: [u64; 2], writes: u32| {
+        let mut engine = engine(chip.clone(), Backend::Scalar, 1, 1);
+        let before = engine.layers()[0].adc_shifts[0][0];
+        engine.layers_mut()[0].rails[0][0] = rails;
+        (0..writes).for_each(|_| engine.written(Written::Sample));
+        engine.layers()[0].adc_shifts[0][0] - before
+    };
+    let rails = [[1, 65], [1, 64], [1, 63], [2, 128], [2, 127], [0, 0]];
+    assert_eq!(rails.map(|rails| grown(rails, 64)), [0, 0, 1, 0, 1, 0]);
+    assert_eq!([63, 64, 65].map(|writes| grown([1, 1], writes)), [0, 1, 1]);
 }

@@ -189,7 +189,8 @@ fn interrupted(run: &Run) -> String {
 }
 
 proptest! {
-    #![proptest_config(config(32))]
+    // one run in 30 counts samples since ranges were looked at when it stops: few cases would seldom see them restored
+    #![proptest_config(config(128))]
 
     #[test]
     fn law_3_a_run_has_one_state(run in run(), tiles in (1usize..=200, 1usize..=200)) {
