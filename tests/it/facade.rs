@@ -13,7 +13,7 @@ proptest! {
 
     #[test]
     fn no_argument_of_the_face_makes_a_call_panic(
-        bytes in prop::collection::vec(any::<u8>(), 0..600),
+        bytes in prop::collection::vec(any::<u8>(), 0..1200),
     ) {
         play::play(&bytes);
     }
