@@ -13,6 +13,8 @@ use std::process::Command;
 
 #[path = "tidy/api.rs"]
 mod api;
+#[path = "tidy/items.rs"]
+mod items;
 #[path = "tidy/source.rs"]
 mod source;
 

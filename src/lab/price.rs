@@ -14,9 +14,9 @@
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! let sources = config::Sources { hardware: Some("hermes"), ..Default::default() };
-//! let chip = config::load(&sources)?.hardware;
+//! let chip = config::load(&sources)?;
 //! // 64 tiles, one phase, two cells a weight
-//! let peak = price::peak(&chip, 64, 1, 2).expect("the model has a timing");
+//! let peak = price::peak(chip.hardware(), 64, 1, 2).expect("the model has a timing");
 //! assert_eq!(peak.alone.0.cycles, 133);
 //! assert_eq!(price::prefixed(peak.alone.1, "op/s"), "63.1 Top/s");
 //! # Ok(())

@@ -117,13 +117,36 @@ impl Lut {
         }
     }
 
-    fn sigmoid(alpha: Positive, bits: LutBits, unit: Unit) -> Self {
+    /// `lsh` of the table of `2^bits` entries.
+    #[must_use]
+    pub fn step_shift(activation: Activation, bits: LutBits, unit: Unit) -> u32 {
+        match activation {
+            Activation::Sigmoid(alpha) => Self::sigmoid_shift(alpha, bits, unit),
+            Activation::Relu | Activation::Identity => Self::linear_shift(bits, unit),
+        }
+    }
+
+    fn sigmoid_shift(alpha: Positive, bits: LutBits, unit: Unit) -> u32 {
         let half = 1i32 << (bits.get() - 1);
         let span = f64::from(half) * unit.of_z();
         let mut shift = 0;
         while span * libm::exp2(f64::from(shift)) < 4.0 * alpha.0 {
             shift += 1;
         }
+        shift
+    }
+
+    fn linear_shift(bits: LutBits, unit: Unit) -> u32 {
+        let codes = u64::from(unit.drive_bits.code_max());
+        let log2 = i64::from(unit.weight_max_log2) - i64::from(unit.level_bits.get());
+        // 2^(bits - 1 + lsh + log2) >= 4 (2^drive_bits - 1)
+        let least = i64::from(log2_ceil(4 * codes));
+        narrow((least - i64::from(bits.get() - 1) - log2).max(0), "at most a few dozen")
+    }
+
+    fn sigmoid(alpha: Positive, bits: LutBits, unit: Unit) -> Self {
+        let half = 1i32 << (bits.get() - 1);
+        let shift = Self::sigmoid_shift(alpha, bits, unit);
         let step = unit.of_z() * libm::exp2(f64::from(shift));
         let (activity, derivative) = (-half..half)
             .map(|i| {
@@ -140,11 +163,9 @@ impl Lut {
         let half = 1i64 << (bits.get() - 1);
         let codes = i64::from(unit.drive_bits.code_max());
         let log2 = i64::from(unit.weight_max_log2) - i64::from(unit.level_bits.get());
-        // 2^(bits - 1 + lsh + log2) >= 4 (2^drive_bits - 1)
-        let least = i64::from(log2_ceil(4 * codes.unsigned_abs()));
-        let shift = (least - i64::from(bits.get() - 1) - log2).max(0);
+        let shift = Self::linear_shift(bits, unit);
         // z = i 2^p / codes, so 255 z + 1/2 = (2 255 i 2^p + codes) / (2 codes)
-        let p = shift + log2;
+        let p = i64::from(shift) + log2;
         let (factor, divisor) =
             if p >= 0 { (255i64 << p, codes) } else { (255, codes << p.unsigned_abs()) };
         let activity = (-half..half).map(|i| {
@@ -152,7 +173,6 @@ impl Lut {
             narrow::<u8>(rounded.clamp(0, 255), "clamped to a byte")
         });
         let derivative = (-half..half).map(|i| if slope(i) { 255 } else { 0 });
-        let shift = narrow(shift, "at most a few dozen");
         Self { activity: activity.collect(), derivative: derivative.collect(), shift }
     }
 }
@@ -192,6 +212,9 @@ pub struct Rate {
     /// The layer's accumulator unit.
     pub unit: Unit,
 }
+
+/// Greatest shift of a table's step: an index is made of a 32-bit sum.
+pub const STEP_SHIFT_MAX: u32 = 30;
 
 /// Greatest shift of a rate.
 pub const SHIFT_MAX: u32 = 30;

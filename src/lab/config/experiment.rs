@@ -21,6 +21,10 @@ impl Config {
         classes: usize,
         image: Option<[usize; 3]>,
     ) -> Result<Experiment, ConfigError> {
+        if classes == 1 {
+            let allowed = "there is nothing to tell apart; give it at least 2";
+            return Err(wrong("data.classes", "is 1", allowed));
+        }
         let default = if self.rule == Rule::Kaneko && classes == 2 { 1 } else { classes };
         let outputs = self.outputs.unwrap_or(default);
         if outputs != classes && !(outputs == 1 && classes == 2) {

@@ -9,7 +9,7 @@ use crate::learn::error::Centre;
 use crate::learn::route::Route;
 use crate::learn::rule::{Rule, UpdateMode};
 use crate::num::fixed::OutOfRange;
-use crate::num::tables::SHIFT_MAX;
+use crate::num::tables::{Lut, SHIFT_MAX, STEP_SHIFT_MAX};
 
 /// `log2` of the least and the greatest `weight_max`.
 pub const WEIGHT_MAX_LOG2: std::ops::RangeInclusive<i32> = -8..=8;
@@ -30,6 +30,7 @@ pub(super) fn check(network: &NetworkSpec, hardware: &Hardware) -> Checked {
     sizes(network)?;
     layer::check(&network.layers, hardware)?;
     numbers(network)?;
+    tables(network, hardware)?;
     rule(network, hardware)?;
     wiring(network)?;
     batches(network, hardware)?;
@@ -73,6 +74,24 @@ fn numbers(network: &NetworkSpec) -> Checked {
             let key = if at == last { "network.init_gain_output" } else { "network.init_gain" };
             let found = format!("of layer {at} holds {gain}/64");
             return misfit(key, found, "gains are multiples of 1/64, up to 16");
+        }
+    }
+    Ok(())
+}
+
+/// Tables whose steps the look-up can shift by.
+fn tables(network: &NetworkSpec, hardware: &Hardware) -> Checked {
+    let bits = hardware.digital.lut_bits;
+    for (at, layer) in network.layers.iter().enumerate() {
+        let shift = Lut::step_shift(layer.activation, bits, layer::unit(layer, hardware));
+        if shift > STEP_SHIFT_MAX {
+            let found = format!("gives layer {at} a table whose step is 2^{shift} units of a sum");
+            let allowed = format!(
+                "it is 2^{STEP_SHIFT_MAX} at most: lower network.alpha (2^{} times is enough), or raise \
+                 network.weight_max or hw.lut.bits",
+                shift - STEP_SHIFT_MAX
+            );
+            return misfit("network.alpha", found, allowed);
         }
     }
     Ok(())

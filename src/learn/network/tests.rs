@@ -201,3 +201,26 @@ fn effective_rates_are_those_of_whole_shifts() {
         assert_ne!(*rate, network.rates[layer]);
     }
 }
+
+#[test]
+fn a_table_whose_steps_are_too_great_to_shift_by_is_refused() {
+    let mut network = plain();
+    network.layers[0].weight_max_log2 = -8;
+    network.layers[0].activation = Activation::Sigmoid(Positive::new(1e6).unwrap());
+    network.rates[0] = Positive::new(1e6).unwrap();
+    let hardware = Hardware::reference()
+        .with(|h| h.digital.lut_bits = crate::num::fixed::LutBits::new(2).unwrap())
+        .unwrap();
+    let error = network.check(&hardware).unwrap_err();
+    assert_eq!(error.key(), "network.alpha");
+    // 2 2^(lsh - 16) / (256 x 255) reaches 4,000,000 at 2^45; a table of 14 bits needs 2^12 less, and a smaller alpha
+    assert!(
+        error.to_string().contains("2^45 units") && error.to_string().contains("2^15 times"),
+        "{error}"
+    );
+    network.layers[0].activation = Activation::Sigmoid(Positive::new(16.0).unwrap());
+    assert!(
+        network.check(&hardware).is_ok()
+            || network.check(&hardware).unwrap_err().key() == "learning.rate"
+    );
+}

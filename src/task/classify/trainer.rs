@@ -106,6 +106,11 @@ impl Trainer {
             let allowed = format!("the examples have {features} values each");
             return Err(NetworkError::misfit("network.hidden", found, allowed));
         }
+        // a single output answers 0 or 1
+        if classes == 1 {
+            let allowed = "there is nothing to tell apart; give it at least 2";
+            return Err(NetworkError::misfit("data.classes", "is 1", allowed));
+        }
         if outputs != classes && !(outputs == 1 && classes == 2) {
             let found = format!("is {outputs}");
             let allowed =

@@ -45,10 +45,10 @@ impl Choices<'_> {
     /// A number of a range, one of its neighbours now and then, or any at all.
     fn near(&mut self, min: i64, max: i64) -> i64 {
         match self.byte() {
-            0..=1 => min - 1,
-            2..=3 => max.saturating_add(1),
-            4 => self.word() as i64,
-            5..=7 => max,
+            255 => min - 1,
+            254 => max.saturating_add(1),
+            253 => self.word() as i64,
+            248..=252 => max,
             _ => {
                 let span = (max - min).unsigned_abs() + 1;
                 min + (u64::from(self.byte()) << 8 | u64::from(self.byte())).rem_euclid(span) as i64
@@ -58,9 +58,9 @@ impl Choices<'_> {
 
     fn size(&mut self, min: usize, max: usize) -> usize {
         match self.byte() {
-            0 => 0,
-            1 => usize::MAX,
-            2 => 1 << 40,
+            255 => 0,
+            254 => usize::MAX,
+            253 => 1 << 40,
             _ => min + usize::from(self.byte()) % (max - min + 1),
         }
     }
