@@ -4,7 +4,7 @@
 use std::ops::Range;
 
 use dalean::chip::crossbar::kernel::Backend;
-use dalean::chip::engine::{Engine, Operation, Side, Write, Written};
+use dalean::chip::engine::{Engine, Operation, Side, Write, WritesDone};
 use dalean::chip::hardware::{Adc, AdcRange, DitherBits, Hardware, Subtract, Window};
 use dalean::chip::layer::{CHUNK_BLOCKS, DrivenBy, Layer, LayerSpec, SIDE_MAX, Taps};
 use dalean::chip::population::Wiring;
@@ -137,7 +137,7 @@ fn one_code_in_64_may_lie_on_the_rail() {
         let mut engine = engine(chip.clone(), Backend::Scalar, 1, 1);
         let before = engine.layers()[0].adc_shifts[0][0];
         engine.layers_mut()[0].rails[0][0] = rails;
-        (0..writes).for_each(|_| engine.written(Written::Sample));
+        (0..writes).for_each(|_| engine.written(WritesDone::Sample));
         engine.layers()[0].adc_shifts[0][0] - before
     };
     let rails = [[1, 65], [1, 64], [1, 63], [2, 128], [2, 127], [0, 0]];
