@@ -193,10 +193,10 @@ fn changed_checkpoints(bytes: &[u8], honest: bool) -> Vec<(String, Vec<u8>)> {
         for at in [0, 1] {
             let mut other = tensors.clone();
             let bytes = &mut other.get_mut(name).unwrap().2;
-            let place = if at == 0 { 0 } else { bytes.len() - bytes.len() / 3 - 1 };
             if bytes.is_empty() {
                 continue;
             }
+            let place = if at == 0 { 0 } else { bytes.len() - bytes.len() / 3 - 1 };
             bytes[place] ^= 1;
             all.push((format!("{name}, byte {place}"), put_together(&other, entries.clone())));
         }
@@ -370,4 +370,23 @@ fn what_a_run_goes_on_from_is_checked_before() {
         assert!(!is_resumed(work.path(), &with(&stopped, "metrics.jsonl", metrics)), "{what}");
     }
     assert!(count > 300, "{count}");
+}
+
+#[test]
+fn a_state_that_is_not_the_one_its_file_names_is_not_restored() {
+    let config = load(&Sources { experiment: Some(("it", EVERYTHING)), ..Sources::default() });
+    let config = config.unwrap();
+    let data = dalean::lab::data::load(&config.source().unwrap(), &root()).unwrap();
+    let mut session = run::Session::new(&config, data, machine()).unwrap();
+    let whole = session.checkpoint();
+    session.restore(&whole).unwrap();
+    let mut count = 0;
+    for (what, bytes) in changed_checkpoints(&whole, false) {
+        if what.contains("levels, byte") {
+            count += 1;
+            let error = session.restore(&bytes).expect_err(&what).to_string();
+            assert!(error.contains("state_hash") || error.contains("holds"), "{what}: {error}");
+        }
+    }
+    assert!(count > 4, "{count}");
 }
