@@ -66,7 +66,7 @@ struct Rounding {
     flip: __m256i,
 }
 
-/// See [`super::super::Kernel::single`].
+/// See [`super::super::Kernel::one_sample`].
 #[target_feature(enable = "avx2,popcnt")]
 pub(super) fn one_sample(strip: OneSample<'_>) -> Option<WriteCounts> {
     let rounding = strip.one_product()?;
@@ -85,7 +85,7 @@ fn strip_of<const USUAL: bool>(
     let OneSample { low, blocks, turned, gates, column, draws, write, mut peaks } = strip;
     let vectors = gates.len() / (4 * LANES);
     let zero = _mm256_setzero_si256();
-    let least_loud = 1u32 << (right - 1);
+    let least_moving = 1u32 << (right - 1);
     let rounding = Rounding {
         factor: _mm256_set1_epi16(1 << (15 - right)),
         floor: _mm256_set1_epi8((floor ^ 0x80).cast_signed()),
@@ -108,7 +108,7 @@ fn strip_of<const USUAL: bool>(
         if drives.most == 0 {
             continue;
         }
-        let least = at_least(least_loud.div_ceil(drives.most));
+        let least = at_least(least_moving.div_ceil(drives.most));
         let mut live = [0u8; COLUMNS / LANES];
         let (mut starts, mut columns) = ([0; COLUMNS / LANES], 0);
         for (vector, gates) in all.iter().enumerate() {
@@ -132,7 +132,7 @@ fn strip_of<const USUAL: bool>(
             }
         }
         for (vector, gates) in all.iter().enumerate().filter(|(vector, _)| live[*vector] != 0) {
-            let mut groups = drives.groups_above(at_least(least_loud.div_ceil(gates.most)));
+            let mut groups = drives.groups_above(at_least(least_moving.div_ceil(gates.most)));
             let places = place_lanes(live[vector]);
             let panel = vector / 4 * blocks * BLOCK_CELLS + block * BLOCK_CELLS;
             let at = panel + vector / 2 % 2 * HALF_CELLS;

@@ -53,7 +53,7 @@ struct Rounding {
     flip: __m512i,
 }
 
-/// See [`super::super::Kernel::single`].
+/// See [`super::super::Kernel::one_sample`].
 #[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi,popcnt")]
 pub(super) fn one_sample(strip: OneSample<'_>) -> Option<WriteCounts> {
     let rounding = strip.one_product()?;
@@ -72,7 +72,7 @@ fn strip_of<const USUAL: bool>(
     let OneSample { low, blocks, turned, gates, column, draws, write, mut peaks } = strip;
     let halves = gates.len() / 64;
     let zero = _mm512_setzero_si512();
-    let least_loud = 1u32 << (right - 1);
+    let least_moving = 1u32 << (right - 1);
     let rounding = Rounding {
         factor: _mm512_set1_epi16(1 << (15 - right)),
         floor: _mm512_set1_epi8((floor ^ 0x80).cast_signed()),
@@ -94,7 +94,7 @@ fn strip_of<const USUAL: bool>(
         if drives.most == 0 {
             continue;
         }
-        let least = _mm512_set1_epi32(least_loud.div_ceil(drives.most).cast_signed());
+        let least = _mm512_set1_epi32(least_moving.div_ceil(drives.most).cast_signed());
         let (mut live, mut starts, mut columns) = ([0u16; HALVES], [0; HALVES], 0);
         for (half, gates) in all.iter().enumerate() {
             live[half] = _mm512_cmpge_epi32_mask(gates.sizes, least);
@@ -115,7 +115,7 @@ fn strip_of<const USUAL: bool>(
             });
         }
         for (half, gates) in all.iter().enumerate().filter(|(half, _)| live[*half] != 0) {
-            let least = _mm512_set1_epi32(least_loud.div_ceil(gates.most).cast_signed());
+            let least = _mm512_set1_epi32(least_moving.div_ceil(gates.most).cast_signed());
             let mut groups = _mm512_cmpge_epi32_mask(drives.groups, least);
             let places = _mm512_maskz_expand_epi32(live[half], lanes());
             let at = half / 2 * blocks * BLOCK_CELLS + block * BLOCK_CELLS + half % 2 * HALF_CELLS;
