@@ -21,12 +21,15 @@ mod bench;
 mod data;
 mod export;
 mod hw;
+mod keys;
 mod price;
 mod progress;
 mod report;
 mod run;
+mod runs;
 mod store;
 mod sweep;
+mod table;
 mod trace;
 
 /// What stops a command.
@@ -76,6 +79,10 @@ enum Command {
     Eval(run::EvalArgs),
     /// Do a run again and compare every state hash
     Verify(run::VerifyArgs),
+    /// List runs, the newest first: how far they are, what they know, what sets them apart
+    Runs(runs::RunsArgs),
+    /// Put runs side by side: keys that differ, results, the first epoch whose states differ
+    Compare(runs::CompareArgs),
     /// Carry out many runs from one file, and keep them in a store
     Sweep(sweep::SweepArgs),
     /// Write the table of a sweep as CSV, JSON or Parquet
@@ -95,6 +102,8 @@ enum Command {
     /// Show and check hardware models
     #[command(subcommand)]
     Hw(hw::HwCommand),
+    /// Every key of every file: what it takes, its default, its meaning
+    Keys(keys::KeysArgs),
     /// Write one update as waves: registers of a tile (VCD), operations of all tiles (Perfetto)
     Trace(trace::TraceArgs),
     /// Measure how fast this machine is: kernels, and whole updates
@@ -202,6 +211,9 @@ pub fn main() -> ExitCode {
         Command::Train(args) => run::train(&args),
         Command::Eval(args) => run::eval(&args),
         Command::Verify(args) => run::verify(&args),
+        Command::Runs(args) => runs::list(&args),
+        Command::Compare(args) => runs::compare(&args),
+        Command::Keys(args) => keys::execute(&args),
         Command::Sweep(args) => sweep::execute(&args),
         Command::Export(args) => export::execute(&args),
         Command::Store(command) => store::execute(&command),

@@ -7,15 +7,19 @@
 mod check;
 mod chip;
 mod data;
+mod differs;
 mod experiment;
 pub mod file;
 mod given;
 mod hardware;
+pub mod keys;
 mod layers;
 mod quantity;
 pub mod sweep;
+mod wrong;
 
 pub use check::{Config, DataConfig, Select, TrainOn};
+pub use differs::{Difference, flat};
 pub use file::{ExperimentFile, HardwareFile};
 pub use hardware::{Model, builtin_models, load_model, model_names};
 pub use layers::{Overlay, Sources, load, overlay, setting, setting_table};

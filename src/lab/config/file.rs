@@ -18,14 +18,25 @@ pub enum PerLayer<T> {
     Each(Vec<T>),
 }
 
-/// Structures of optional keys that refuse unknown ones.
+/// Structures of optional keys that refuse unknown ones. What stands above a key is its meaning, for `dalean keys` too.
 macro_rules! keys {
-    ($($(#[$doc:meta])* $name:ident { $($(#[$field_doc:meta])* $field:ident: $kind:ty,)* })*) => {$(
-        $(#[$doc])*
+    ($($(#[doc = $doc:literal])* $name:ident {
+        $($(#[doc = $meaning:literal])* $(#[cfg($when:meta)])? $field:ident: $kind:ty,)*
+    })*) => {$(
+        $(#[doc = $doc])*
         #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
         #[serde(deny_unknown_fields)]
         pub struct $name {
-            $($(#[$field_doc])* #[serde(skip_serializing_if = "Option::is_none")] pub $field: Option<$kind>,)*
+            $(
+                $(#[doc = $meaning])* $(#[cfg($when)])?
+                #[serde(skip_serializing_if = "Option::is_none")] pub $field: Option<$kind>,
+            )*
+        }
+
+        impl $name {
+            /// Each key and what it means.
+            pub(super) const MEANINGS: &'static [(&'static str, &'static str)] =
+                &[$($(#[cfg($when)])? (stringify!($field), concat!($($meaning),*)),)*];
         }
     )*};
 }

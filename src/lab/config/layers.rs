@@ -1,6 +1,7 @@
 //! Laying texts over one another: built-in defaults, hardware model, experiment file, a sweep's keys, `--set`, `--hw`.
 
 use super::file::{ExperimentFile, HardwareFile};
+use super::wrong::text_error;
 use super::{Config, ConfigError, check, hardware};
 
 /// Where a configuration comes from, weakest first.
@@ -88,17 +89,18 @@ pub fn load(sources: &Sources<'_>) -> Result<Config, ConfigError> {
         let _: HardwareFile = hardware::model_file(&name, &text)?;
         parse(&name, &text)?
     };
+    let model = own.get("name").is_none().then(|| hw.clone());
     overlay(&mut hw, own);
     hw.remove("model");
     table.insert("hw".into(), toml::Value::Table(hw));
-    check::config(table_of("configuration", &table)?)
+    let mut config = check::config(table_of("configuration", &table)?)?;
+    config.model = model;
+    Ok(config)
 }
 
 /// A table as what its keys mean.
 fn table_of(place: &str, table: &toml::Table) -> Result<ExperimentFile, ConfigError> {
-    let error =
-        |e: toml::de::Error| ConfigError::Text { place: place.into(), error: e.to_string() };
-    table.clone().try_into().map_err(error)
+    table.clone().try_into().map_err(|error| text_error(place, &error))
 }
 
 /// One key with its value as a table: `hw.cell.level_bits` and 4 make `{ hw = { cell = { level_bits = 4 } } }`.
@@ -117,8 +119,7 @@ pub(super) fn parse<T: serde::de::DeserializeOwned>(
     place: &str,
     text: &str,
 ) -> Result<T, ConfigError> {
-    toml::from_str(text)
-        .map_err(|e| ConfigError::Text { place: place.into(), error: e.to_string() })
+    toml::from_str(text).map_err(|error| text_error(place, &error))
 }
 
 /// `key=value` as a table: the value as TOML, or as a bare word.
