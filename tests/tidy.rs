@@ -39,8 +39,8 @@ const HOUSE: [(&str, &[&str]); 6] = [
     (
         "cli",
         &[
-            "progress", "table", "data", "hw", "keys", "run", "report", "sweep", "export", "store",
-            "price", "runs", "trace", "bench",
+            "out", "known", "progress", "table", "data", "hw", "keys", "run", "report", "sweep",
+            "export", "store", "price", "runs", "trace", "bench",
         ],
     ),
 ];

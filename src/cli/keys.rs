@@ -2,13 +2,14 @@
 
 use clap::Args;
 
-use super::{Done, Failure, say};
+use super::{Done, Failure, known, say};
 use crate::lab::config::keys;
 use crate::lab::near;
 
 #[derive(Debug, Args)]
 pub(super) struct KeysArgs {
     /// Part of a key's name, or of its meaning [default: all keys, a line each]
+    #[arg(value_parser = known::key_names(), hide_possible_values = true)]
     word: Option<String>,
     /// All keys as the page docs/CONFIG.md
     #[arg(long, conflicts_with_all = ["word", "json", "quiet"])]

@@ -15,6 +15,7 @@ use crate::lab::store::record::Score;
 #[derive(Debug, Args)]
 pub(super) struct RunsArgs {
     /// Folders of runs, stores, or runs [default: runs, or DALEAN_RUNS]
+    #[arg(value_hint = clap::ValueHint::DirPath)]
     places: Vec<PathBuf>,
     /// One JSON object a line on standard output, each with an `event`
     #[arg(long)]

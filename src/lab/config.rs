@@ -17,6 +17,7 @@ pub mod keys;
 mod layers;
 mod quantity;
 pub mod sweep;
+mod template;
 mod wrong;
 
 pub use absent::{Absent, EFFECTS, Effect, absent_words};
@@ -28,6 +29,7 @@ pub use layers::{Overlay, Sources, load, overlay, setting, setting_table};
 pub use quantity::{
     Constant, Constants, CostClass, CostTable, Kind, Per, QUANTITIES, Quantity, Standing,
 };
+pub use template::template;
 
 /// Why a configuration cannot be used. Each message says where, what was found, what is allowed.
 ///

@@ -4,7 +4,7 @@
 use std::collections::BTreeMap;
 use std::fmt::Display;
 
-use super::file::{DataFile, ExperimentFile, HardwareFile, LearningFile, NetworkFile, PerLayer};
+use super::file::{ChipFile, DataFile, ExperimentFile, LearningFile, NetworkFile, PerLayer};
 use super::quantity::Constants;
 use super::{ConfigError, Sources, chip, data};
 use crate::chip::hardware::Hardware;
@@ -169,7 +169,7 @@ pub(super) fn positive(key: &str, value: f64) -> Result<Positive, ConfigError> {
 pub(super) fn config(mut file: ExperimentFile) -> Result<Config, ConfigError> {
     word("task", &mut file.task, "classify", &[("classify", ())])?;
     let seed = *file.seed.get_or_insert(1);
-    let hw = file.hw.get_or_insert_with(HardwareFile::default);
+    let ChipFile(hw) = file.hw.get_or_insert_with(ChipFile::default);
     let hardware = chip::resolve(hw, "hw.")?;
     let constants = Constants::new(hw, "hw.")?;
     let hardware_name = hw.name.get_or_insert_with(|| "unnamed".into()).clone();

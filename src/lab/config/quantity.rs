@@ -284,6 +284,16 @@ impl Constant {
     }
 }
 
+impl Constant {
+    /// What one unit of its key is in joules, watts or square metres.
+    #[must_use]
+    pub fn worth(&self) -> f64 {
+        let ends = |unit: &str| self.key.rsplit('_').next() == Some(unit);
+        let unit = self.quantity.table.units().iter().find(|(unit, _)| ends(unit));
+        unit.map_or(1.0, |(_, worth)| *worth)
+    }
+}
+
 /// The physical numbers of a model, in the order of [`QUANTITIES`].
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Constants(Vec<Constant>);
