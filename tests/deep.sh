@@ -11,9 +11,10 @@
 #   rtl        hw_models/rtl, src/chip/engine/tick/tile      plants faults into the SystemVerilog
 #   emulated   src/chip/crossbar/kernel                      AVX-512 and AMX on an emulated processor
 #   grown      src/lab, src/chip/ledger.rs                   the program with more keys, events and columns
+#   extending  docs/EXTENDING.md                             its changes, applied to a copy, compiled and trained with
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
-known=(release cases faults rtl emulated grown)
+known=(release cases faults rtl emulated grown extending)
 chosen=("$@")
 [[ ${#chosen[@]} -gt 0 ]] || chosen=("${known[@]}")
 for name in "${chosen[@]}"; do
@@ -38,6 +39,7 @@ for name in "${chosen[@]}"; do
             cargo build --release
             tests/emulated.sh
             ;;
+        extending) cargo test --test it extending -- --ignored ;;
         grown) cargo test --features grown --test it golden_run ;;
     esac
     printf '== %s: passed in %d s\n' "$name" $((SECONDS - before))

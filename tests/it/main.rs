@@ -11,6 +11,7 @@ mod bench;
 mod browser;
 mod damage;
 mod examples;
+mod extending;
 mod facade;
 mod golden_run;
 mod hardware;

@@ -160,7 +160,7 @@ impl Difference {
 
     /// `level-bits4`, `hidden64x32`, `overlap`, `no-overlap`.
     fn word(&self) -> String {
-        let key = clean(&self.key_short(), usize::MAX);
+        let key = clean(&self.key_short().replace('.', "-"), usize::MAX);
         match &*self.value {
             "true" => key,
             "false" => format!("no-{key}"),
