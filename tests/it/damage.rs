@@ -16,6 +16,7 @@ use safetensors::SafeTensors;
 use serde_json::Value;
 
 use super::golden_run::EVERYTHING;
+use super::program::only_run;
 
 fn machine() -> Machine {
     Machine::new(Backend::best(), 1).unwrap()
@@ -52,7 +53,7 @@ fn made(finished: bool) -> Files {
         Ok(_) => assert!(finished),
         Err(error) => assert!(matches!(error, RunError::Stopped { .. }) && !finished, "{error}"),
     }
-    files(&work.path().join("xor-ed-seed1"))
+    files(&only_run(work.path()))
 }
 
 /// Places of everything that is no list or table, as JSON pointers, and of lists and tables that are empty.

@@ -86,7 +86,7 @@ impl Config {
 
     /// Keys whose value is another than by saying nothing but data, rule and chip; the seed aside.
     #[must_use]
-    pub fn differences(&self) -> Vec<Difference> {
+    pub(crate) fn differences(&self) -> Vec<Difference> {
         let silent = self.silent().map(|file| lines_of(&file)).unwrap_or_default();
         let all = lines_of(&self.resolved).into_iter();
         let others = all.filter(|(key, _)| key != "seed" && !key.starts_with("data."));
@@ -100,7 +100,7 @@ impl Config {
 
     /// Name of the folder of its runs: says data, rule, what differs from saying nothing, and the seed.
     #[must_use]
-    pub fn run_name(&self) -> String {
+    pub(crate) fn run_name(&self) -> String {
         let mut parts = vec![clean(&self.data_name(), WORD_MAX), clean(self.rule_name(), WORD_MAX)];
         if self.hardware_name != "ideal" {
             parts.push(clean(&self.hardware_name, WORD_MAX));
@@ -124,7 +124,7 @@ impl Config {
 
     /// What differs from saying nothing, for headings: `level_bits 4, rate 5, seed 2`; empty when nothing does.
     #[must_use]
-    pub fn differences_text(&self) -> String {
+    pub(crate) fn differences_text(&self) -> String {
         let differences = self.differences();
         let mut words: Vec<String> = differences.iter().map(Difference::text).collect();
         let more = words.len().saturating_sub(SHOWN_MAX);
