@@ -221,8 +221,8 @@ pub struct Engine {
     potentiation_only: bool,
     /// What is told of the pulses of a write.
     collect: Collect,
-    /// Rate mantissa.
-    mantissa: u32,
+    /// Small factor of the rate of each layer.
+    mantissas: Vec<u32>,
     unit: ErrorUnit,
     layers: Vec<Layer>,
     /// What units hand on and how steep they are there, by layer.
@@ -268,7 +268,7 @@ impl Engine {
             seed,
             potentiation_only: false,
             collect,
-            mantissa: 1,
+            mantissas: vec![1; count],
             unit: ErrorUnit::new(
                 Centre::None,
                 hardware.digital.error_bits,
@@ -306,15 +306,19 @@ impl Engine {
         self.potentiation_only = only;
     }
 
-    /// Sets the small factor of the rate, 1..=15.
-    pub const fn set_mantissa(&mut self, mantissa: u32) {
-        self.mantissa = mantissa;
+    /// Sets the small factor of the rate of each layer, 1..=15.
+    ///
+    /// # Panics
+    /// When there is not one a layer.
+    pub fn set_mantissas(&mut self, mantissas: &[u32]) {
+        assert!(mantissas.len() == self.layers.len(), "one mantissa a layer");
+        self.mantissas = mantissas.to_vec();
     }
 
-    /// Small factor of the rate.
+    /// Small factor of the rate of each layer.
     #[must_use]
-    pub const fn mantissa(&self) -> u32 {
-        self.mantissa
+    pub fn mantissas(&self) -> &[u32] {
+        &self.mantissas
     }
 
     /// Whether writes only potentiate.

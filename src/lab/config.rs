@@ -7,6 +7,7 @@
 mod check;
 mod chip;
 mod data;
+mod defaults;
 mod experiment;
 pub mod file;
 mod given;
@@ -16,6 +17,7 @@ mod quantity;
 pub mod sweep;
 
 pub use check::{Config, DataConfig, Select, TrainOn};
+pub use defaults::{SET_DEFAULTS, SetDefaults};
 pub use file::{ExperimentFile, HardwareFile};
 pub use hardware::{Model, builtin_models, load_model, model_names};
 pub use layers::{Overlay, Sources, load, overlay, setting, setting_table};

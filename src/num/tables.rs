@@ -243,6 +243,23 @@ impl Rate {
         k.ok_or(OutOfRange { name: "k", found, min: 0, max: SHIFT_MAX.into() })
     }
 
+    /// This rate with the mantissa whose effective rate comes nearest to it, by ratio: the least one on ties. Its own
+    /// where no shift stands for the rate with any.
+    #[must_use]
+    pub fn with_nearest_mantissa(self) -> Self {
+        let all = (RateMantissa::MIN..=RateMantissa::MAX)
+            .map(|m| Self { mantissa: RateMantissa::new(m.into()).expect("in range"), ..self });
+        let off = |rate: &Self| {
+            let off = (rate.shift_exact() - f64::from(rate.shift().ok()?)).abs();
+            // one in a million is nothing: 2 and 4 stand for the same rates as 1
+            #[expect(clippy::cast_possible_truncation, reason = "at most half a million")]
+            let millionths = libm::floor(off * 1e6 + 0.5) as i64;
+            Some(millionths)
+        };
+        let found = all.filter_map(|rate| Some((off(&rate)?, rate)));
+        found.min_by_key(|(off, _)| *off).map_or(self, |(_, rate)| rate)
+    }
+
     /// The rate that `k` and the mantissa really give: within a factor of `sqrt(2)` of the one asked for.
     ///
     /// # Errors
@@ -269,25 +286,40 @@ impl Rate {
     pub fn shifts(self, decay: Decay, updates: u64) -> Result<Vec<(u64, u32)>, OutOfRange> {
         self.shift()?;
         let exact = self.shift_exact();
-        let mut table: Vec<(u64, u32)> = Vec::new();
-        for update in 0..updates.max(1) {
+        let k = |update: u64| {
             let factor = match decay {
                 Decay::Constant => 1.0,
                 Decay::Cosine => {
                     #[expect(clippy::cast_precision_loss, reason = "far fewer than 2^53 updates")]
-                    let t = update as f64 / updates as f64;
+                    let t = update as f64 / updates.max(1) as f64;
                     0.5 * (1.0 + libm::cos(std::f64::consts::PI * t))
                 }
             };
             let nearest = libm::floor(exact - libm::log2(factor) + 0.5);
             #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0..=30")]
             let k = nearest.min(f64::from(SHIFT_MAX)) as u32;
-            if table.last().is_none_or(|&(_, last)| last != k) {
-                table.push((update, k));
+            k
+        };
+        let end = match decay {
+            Decay::Constant => 0,
+            Decay::Cosine => updates.saturating_sub(1),
+        };
+        let (mut update, mut now) = (0, k(0));
+        let mut table = vec![(update, now)];
+        let at_end = k(end);
+        while now < at_end {
+            // k only rises: the update at which it does is found by halving, however long the run is
+            let mut above = end;
+            while above - update > 1 {
+                let middle = update + (above - update) / 2;
+                if k(middle) > now {
+                    above = middle;
+                } else {
+                    update = middle;
+                }
             }
-            if decay == Decay::Constant {
-                break;
-            }
+            (update, now) = (above, k(above));
+            table.push((update, now));
         }
         Ok(table)
     }
@@ -410,6 +442,68 @@ mod tests {
         let effective = rate(20.0, 6.0).effective().unwrap().get();
         assert_eq!(effective, 255.0 * 127.0 * 255.0 * 12.0 * 32.0 * 4.0 / 65536.0 / 8192.0);
         assert!((23.62..23.63).contains(&effective), "{effective}");
+    }
+
+    /// What the law says of every update, one by one.
+    fn one_by_one(rate: Rate, updates: u64) -> Vec<(u64, u32)> {
+        let mut table: Vec<(u64, u32)> = Vec::new();
+        for update in 0..updates.max(1) {
+            let t = update as f64 / updates as f64;
+            let factor = 0.5 * (1.0 + libm::cos(std::f64::consts::PI * t));
+            let k = libm::floor(rate.shift_exact() - libm::log2(factor) + 0.5);
+            let k = k.min(f64::from(SHIFT_MAX)) as u32;
+            if table.last().is_none_or(|&(_, last)| last != k) {
+                table.push((update, k));
+            }
+        }
+        table
+    }
+
+    #[test]
+    fn a_schedule_found_by_halving_is_that_of_every_update() {
+        for asked in [0.5, 3.0, 20.0, 23.625, 70.0, 4000.0] {
+            for updates in (1..300).chain([1000, 4096, 99_991]) {
+                let table = rate(asked, 6.0).shifts(Decay::Cosine, updates).unwrap();
+                assert_eq!(table, one_by_one(rate(asked, 6.0), updates), "{asked} {updates}");
+            }
+        }
+    }
+
+    /// A run of 4,000,000,000 epochs once did not come to its first update.
+    #[test]
+    fn the_longest_schedule_takes_no_time() {
+        let table = rate(20.0, 6.0).shifts(Decay::Cosine, u64::MAX).unwrap();
+        assert_eq!((table[0], table.len()), ((0, 13), 18));
+        // the same parts of the way as of 1,000 updates
+        let part = |update: u64| (update as f64 / u64::MAX as f64 * 1000.0).ceil() as u64;
+        assert_eq!(
+            table[1..4].iter().map(|&(u, k)| (part(u), k)).collect::<Vec<_>>(),
+            [(267, 14), (553, 15), (698, 16)]
+        );
+    }
+
+    /// Rates 14 to 22 once were one rate, and nobody said so.
+    #[test]
+    fn the_nearest_mantissa_comes_within_seven_percent() {
+        let mut shifts = vec![];
+        for asked in 14..=22 {
+            let asked = rate(f64::from(asked), 6.0);
+            let near = asked.with_nearest_mantissa();
+            let ratio = near.effective().unwrap().get() / asked.rate.get();
+            assert!((0.94..1.07).contains(&ratio), "{asked:?}: {ratio}");
+            shifts.push((near.mantissa.get(), near.shift().unwrap()));
+        }
+        shifts.dedup();
+        assert!(shifts.len() >= 5, "{shifts:?}");
+        // 20 is 13.2404 with 1: 2^0.2404 too much; with 7 it is 16.0478
+        assert_eq!((shifts.contains(&(1, 13)), shifts.contains(&(7, 16))), (false, true));
+        // an exact power of two keeps the least mantissa
+        let exact = Rate { rate: rate(20.0, 6.0).effective().unwrap(), ..rate(20.0, 6.0) };
+        assert_eq!(exact.with_nearest_mantissa().mantissa.get(), 1);
+        // where 1 would need a shift below 0, more than 1 does not
+        let great = Rate { rate: Positive::new(20.0 * 32768.0).unwrap(), ..rate(20.0, 6.0) };
+        let near = great.with_nearest_mantissa();
+        assert_eq!((great.shift().is_err(), near.shift().is_ok()), (true, true));
     }
 
     #[test]

@@ -18,6 +18,18 @@ pub enum PerLayer<T> {
     Each(Vec<T>),
 }
 
+/// `rate_mantissa = 3`, `[3, 5]` or `"auto"`.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(untagged, expecting = "a whole number, a list with one a layer, or \"auto\"")]
+pub enum MantissaFile {
+    /// By name.
+    Named(String),
+    /// The same in every layer.
+    All(i64),
+    /// Input to output.
+    Each(Vec<i64>),
+}
+
 /// Structures of optional keys that refuse unknown ones.
 macro_rules! keys {
     ($($(#[$doc:meta])* $name:ident { $($(#[$field_doc:meta])* $field:ident: $kind:ty,)* })*) => {$(
@@ -112,8 +124,8 @@ keys! {
         rate: f64,
         /// Factor of the rate of each layer.
         rate_multipliers: PerLayer<f64>,
-        /// Small factor beside the shift.
-        rate_mantissa: i64,
+        /// Small factor beside the shift of each layer, 1..=15; `auto`: the one whose rate comes nearest.
+        rate_mantissa: MantissaFile,
         /// `cosine` or `constant`.
         decay: String,
         /// `none`, `batch`, `running`.

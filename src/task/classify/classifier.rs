@@ -40,7 +40,7 @@ use crate::learn::network::NetworkError;
 ///     centre: Centre::Batch,
 ///     route: Some(Route::Modulo { taps: 1, shift: None }),
 ///     batch: Batch::new(4)?,
-///     mantissa: RateMantissa::new(1)?,
+///     mantissas: vec![RateMantissa::new(1)?; 2],
 ///     rates: vec![Positive::new(20.0).ok_or("a rate")?; 2],
 ///     decay: Decay::Constant,
 /// };
