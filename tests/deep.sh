@@ -11,9 +11,10 @@
 #   rtl        hw_models/rtl, src/chip/engine/tick/tile      plants faults into the SystemVerilog
 #   emulated   src/chip/crossbar/kernel                      AVX-512 and AMX on an emulated processor
 #   grown      src/lab, src/chip/ledger.rs                   the program with more keys, events and columns
+#   defaults   hw_models, src/lab/config, src/chip/engine    every chip and converter width trains by default, three seeds
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
-known=(release cases faults rtl emulated grown)
+known=(release cases faults rtl emulated grown defaults)
 chosen=("$@")
 [[ ${#chosen[@]} -gt 0 ]] || chosen=("${known[@]}")
 for name in "${chosen[@]}"; do
@@ -39,6 +40,7 @@ for name in "${chosen[@]}"; do
             tests/emulated.sh
             ;;
         grown) cargo test --features grown --test it golden_run ;;
+        defaults) cargo test --release --test it defaults -- --include-ignored --nocapture ;;
     esac
     printf '== %s: passed in %d s\n' "$name" $((SECONDS - before))
 done

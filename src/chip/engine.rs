@@ -31,6 +31,7 @@ mod currents;
 mod each;
 mod error;
 mod forward;
+mod mute;
 #[cfg(test)]
 mod pairs;
 mod passes;
@@ -229,6 +230,8 @@ pub struct Engine {
     tables: Vec<LookUp>,
     registers: Vec<Registers>,
     currents: Vec<Currents>,
+    /// What layers said while they were evaluated.
+    said: Vec<mute::Said>,
     /// Sums of levels of each row, by layer and array; forgotten when a level moves.
     row_sums: Vec<Option<Vec<Vec<i64>>>>,
     samples: usize,
@@ -276,6 +279,7 @@ impl Engine {
             ),
             registers: vec![Registers::default(); layers.len()],
             currents: vec![[[0; 2]; 2]; layers.len()],
+            said: vec![mute::Said::default(); layers.len()],
             row_sums: vec![None; layers.len()],
             tables,
             layers,

@@ -4,6 +4,7 @@
 //! one. Neither prints: callers get [`RunEvent`]s.
 
 mod classify;
+mod notes;
 mod profile;
 mod proof;
 mod report;
@@ -13,6 +14,7 @@ mod task;
 mod train;
 mod verify;
 
+pub use notes::notes;
 pub use profile::{Act, Profile, profile};
 pub use proof::records;
 pub use report::{ReportMade, report};

@@ -189,7 +189,7 @@ pub(super) fn config(mut file: ExperimentFile) -> Result<Config, ConfigError> {
         shift_pixels,
         train_on,
         select,
-    } = learning::resolve(learning, hidden.len() + 1, defaults)?;
+    } = learning::resolve(learning, &hidden, defaults)?;
     let Network { activations, weight_max_log2, bias_rows, gain_64ths } =
         network::resolve(network, hidden.len() + 1, kind, defaults)?;
     let asked = rates.iter().zip(activations.iter().zip(&weight_max_log2));

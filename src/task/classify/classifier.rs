@@ -80,13 +80,16 @@ impl Classifier {
     /// One pass over the training examples, in the epoch's order. Returns right answers given while learning.
     ///
     /// # Errors
-    /// [`Stop`] when `go_on` says so; the state then lies inside an epoch.
+    /// [`Stop`] when `go_on` says so, the state then lies inside an epoch, or when the experiment has no epoch left.
     pub fn learn(&mut self, go_on: &mut dyn FnMut(EpochProgress) -> bool) -> Result<u64, Stop> {
         let again = matches!(
             self.trainer.experiment().hardware.adc,
             Adc::Finite { range: AdcRange::Calibrated { every_epoch: true, .. }, .. }
         );
         let Self { trainer, train } = self;
+        if trainer.epoch() >= trainer.experiment().epochs {
+            return Err(Stop);
+        }
         if again && trainer.epoch() > 0 {
             trainer.calibrate(train);
         }

@@ -45,10 +45,10 @@ pub(super) struct Learning {
     pub(super) select: Select,
 }
 
-/// Checks how a network of so many layers learns and writes defaults back.
+/// Checks how a network of such hidden layers learns and writes defaults back.
 pub(super) fn resolve(
     file: &mut LearningFile,
-    layers: usize,
+    hidden: &[usize],
     defaults: &SetDefaults,
 ) -> Result<Learning, ConfigError> {
     let seeded = file.rule.as_deref() == Some("ed_seed");
@@ -61,8 +61,6 @@ pub(super) fn resolve(
     ];
     let kind = Kind { rule: word("learning.rule", &mut file.rule, "ed", &rules)?, seeded };
     let centres = [("none", Centre::None), ("batch", Centre::Batch), ("running", Centre::Running)];
-    let default = if kind.is_raw() { "none" } else { "batch" };
-    let centre = word("learning.centre", &mut file.centre, default, &centres)?;
     let modes = [
         ("accumulate", UpdateMode::Accumulate),
         ("replay", UpdateMode::Replay),
@@ -71,13 +69,23 @@ pub(super) fn resolve(
     let mode = word("learning.mode", &mut file.mode, "accumulate", &modes)?;
     let decays = [("cosine", Decay::Cosine), ("constant", Decay::Constant)];
     let (train_on, select) = selection(file, defaults)?;
+    let batch = range("learning.batch", Batch::new(*file.batch.get_or_insert(defaults.batch)))?;
+    file.rate.get_or_insert_with(|| defaults.rate_of(batch));
+    // one sample has no mean but that of those before it
+    let alone = batch.get() == 1 || mode == UpdateMode::Online;
+    let default = match (kind.is_raw(), alone) {
+        (true, _) => "none",
+        (false, true) => "running",
+        (false, false) => "batch",
+    };
+    let centre = word("learning.centre", &mut file.centre, default, &centres)?;
     Ok(Learning {
         kind,
         mode,
         centre,
         route: route::resolve(file, kind.rule, defaults)?,
-        batch: range("learning.batch", Batch::new(*file.batch.get_or_insert(defaults.batch)))?,
-        rates: rates(file, layers, defaults)?,
+        batch,
+        rates: rates(file, hidden, defaults)?,
         decay: word("learning.decay", &mut file.decay, "cosine", &decays)?,
         epochs: *file.epochs.get_or_insert(defaults.epochs),
         shift_pixels: *file.shift_pixels.get_or_insert(0),
@@ -89,13 +97,13 @@ pub(super) fn resolve(
 /// Rate times multiplier, of each layer.
 fn rates(
     file: &mut LearningFile,
-    layers: usize,
+    hidden: &[usize],
     defaults: &SetDefaults,
 ) -> Result<Vec<Positive>, ConfigError> {
     const KEY: &str = "learning.rate_multipliers";
     let rate = positive("learning.rate", *file.rate.get_or_insert(defaults.rate))?;
-    file.rate_multipliers.get_or_insert_with(|| defaults.multipliers(layers));
-    let factors = per_layer(KEY, &mut file.rate_multipliers, 1.0, layers)?;
+    file.rate_multipliers.get_or_insert_with(|| defaults.multipliers(hidden));
+    let factors = per_layer(KEY, &mut file.rate_multipliers, 1.0, hidden.len() + 1)?;
     let rates = factors.into_iter().map(|factor| {
         let product = rate.times(positive(KEY, factor)?);
         product.ok_or_else(|| wrong(KEY, "times the rate is out of range", "keep it in 1e-6..=1e6"))
