@@ -8,7 +8,8 @@ use clap::Args;
 use serde_json::json;
 
 use super::progress::Meter;
-use super::{Done, Failure, Shared, configuration, environment, say, usage};
+use super::{Done, Failure, Shared, configuration, environment, known, say, usage};
+use crate::lab::price::{EnergySplit, PerImage};
 use crate::lab::run::{self, Machine, RunError, RunEvent, Trained, Verdict};
 use crate::lab::store::index::{INDEX, Store};
 use crate::lab::store::record::{TestOutcome, TestRecord};
@@ -17,9 +18,10 @@ use crate::lab::sweep::{self, Sampled};
 #[derive(Debug, Args)]
 pub(super) struct TrainArgs {
     /// Experiment file [default: the built-in digits]
+    #[arg(value_hint = clap::ValueHint::FilePath)]
     file: Option<PathBuf>,
     /// Hardware model: a built-in name or a file
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", value_parser = known::models(), hide_possible_values = true)]
     hw: Option<String>,
     /// Change a key, such as hw.cell.level_bits=4; KEY=default takes back what a file said (repeatable)
     #[arg(long = "set", value_name = "KEY=VALUE")]
@@ -31,7 +33,7 @@ pub(super) struct TrainArgs {
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Continue a run from its last finished epoch
-    #[arg(long, value_name = "RUN", conflicts_with_all = ["file", "hw", "settings", "seed", "out"])]
+    #[arg(long, value_name = "RUN", value_hint = clap::ValueHint::DirPath, conflicts_with_all = ["file", "hw", "settings", "seed", "out"])]
     resume: Option<PathBuf>,
     #[command(flatten)]
     shared: Shared,
@@ -40,6 +42,7 @@ pub(super) struct TrainArgs {
 #[derive(Debug, Args)]
 pub(super) struct EvalArgs {
     /// Folder of a run
+    #[arg(value_hint = clap::ValueHint::DirPath)]
     run: PathBuf,
     #[command(flatten)]
     shared: Shared,
@@ -48,6 +51,7 @@ pub(super) struct EvalArgs {
 #[derive(Debug, Args)]
 pub(super) struct VerifyArgs {
     /// Folder of a run, or a store
+    #[arg(value_hint = clap::ValueHint::DirPath)]
     run: PathBuf,
     /// Compare only the first N epochs
     #[arg(long, value_name = "N", conflicts_with = "sample")]
@@ -171,6 +175,9 @@ fn done(run: &str, outcome: &Trained) -> serde_json::Value {
     let last = outcome.records.last();
     let images: u64 =
         outcome.records.iter().filter_map(|r| r.train()).map(|score| score.total).sum();
+    let cost = &outcome.cost;
+    let each: Vec<_> = cost.per_image.iter().map(PerImage::to_json).collect();
+    let split: Vec<_> = cost.split.iter().map(EnergySplit::to_json).collect();
     json!({
         "event": "done",
         "run": run,
@@ -180,10 +187,15 @@ fn done(run: &str, outcome: &Trained) -> serde_json::Value {
         "validation_accuracy": last.and_then(|r| r.validation()).map(|score| score.fraction()),
         "state_hash": last.map(|record| record.state_hash.clone()),
         "epochs": last.map(|record| record.epoch),
-        "cycles": outcome.cost.cycles,
-        "simulated_seconds": outcome.cost.seconds,
-        "joules": outcome.cost.joules,
-        "joules_assumed_share": outcome.cost.joules.map(|_| outcome.cost.assumed_share),
+        "cycles": cost.cycles,
+        "simulated_seconds": cost.seconds,
+        "joules": cost.energy.and_then(|energy| energy.whole()),
+        "joules_at_least": cost.energy.and_then(|energy| energy.at_least()),
+        "parts_priced": cost.energy.map(|energy| energy.priced),
+        "parts": cost.energy.map(|energy| energy.parts),
+        "by_class": split,
+        "per_image": each,
+        "joules_assumed_share": cost.energy.map(|_| cost.assumed_share),
         "train_seconds": seconds,
         "images_per_second": images as f64 / seconds.max(1e-9),
     })

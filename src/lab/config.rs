@@ -4,24 +4,34 @@
 //! own, so an unknown key is reported with its line and a caret; then they are laid over one another and checked.
 //! The result is a [`Config`], which can be written back as one self-contained file.
 
+mod absent;
 mod check;
 mod chip;
 mod data;
 mod defaults;
+mod differs;
 mod experiment;
 pub mod file;
 mod given;
 mod hardware;
+pub mod keys;
 mod layers;
 mod quantity;
 pub mod sweep;
+mod template;
+mod wrong;
 
+pub use absent::{Absent, EFFECTS, Effect, absent_words};
 pub use check::{Config, DataConfig, Select, TrainOn};
 pub use defaults::{SET_DEFAULTS, SetDefaults};
+pub use differs::{Difference, flat};
 pub use file::{ExperimentFile, HardwareFile};
 pub use hardware::{Model, builtin_models, load_model, model_names};
 pub use layers::{Overlay, Sources, load, overlay, setting, setting_table};
-pub use quantity::{Constant, Constants, CostTable, Kind, Per, QUANTITIES, Quantity};
+pub use quantity::{
+    Constant, Constants, CostClass, CostTable, Kind, Per, QUANTITIES, Quantity, Standing,
+};
+pub use template::template;
 
 /// Why a configuration cannot be used. Each message says where, what was found, what is allowed.
 ///

@@ -37,6 +37,10 @@ pub struct SetDefaults {
     pub select: &'static str,
 }
 
+/// Keys whose default follows from other keys of an experiment than data and rule.
+pub(super) const FOLLOWING: [&str; 3] =
+    ["learning.rate", "learning.rate_multipliers", "learning.centre"];
+
 /// One entry a data set that has defaults of its own, then the entry of all others.
 pub const SET_DEFAULTS: [SetDefaults; 2] = [
     SetDefaults {
@@ -99,7 +103,7 @@ impl SetDefaults {
     #[must_use]
     pub fn keys(&self) -> Vec<(&'static str, String)> {
         let multipliers = match self.multipliers(self.hidden) {
-            PerLayer::All(one) => one.to_string(),
+            PerLayer::All(one) => format!("{one:?}"),
             PerLayer::Each(list) => format!("{list:?}"),
         };
         vec![
@@ -175,6 +179,17 @@ mod tests {
         let said = resolved("", &["learning.batch=1", "learning.centre=batch", "learning.rate=3"]);
         assert_eq!((said.centre, said.rates[0].get()), (Centre::Batch, 3.0));
         assert!(said.experiment(64, 10, None).is_err());
+    }
+
+    #[test]
+    fn the_list_of_keys_says_the_defaults_of_both() {
+        let [digits, others] = &SET_DEFAULTS;
+        for ((name, digits), (_, others)) in digits.keys().into_iter().zip(others.keys()) {
+            let key = crate::lab::config::keys::matching(name);
+            let entry = key.iter().find(|key| key.full() == name).unwrap().entry;
+            assert_eq!(entry.default, digits, "{name}");
+            assert!(digits == others || entry.otherwise.contains(&*others), "{name}: {others}");
+        }
     }
 
     #[test]

@@ -12,6 +12,10 @@
 use serde::de::{self, Deserializer};
 use serde::{Deserialize, Serialize};
 
+mod class;
+
+pub use class::CostClass;
+
 use super::ConfigError;
 use super::check::wrong;
 use super::file::{HardwareFile, NumberFile};
@@ -39,8 +43,17 @@ impl CostTable {
         }
     }
 
+    /// Unit of its numbers.
+    const fn unit(self) -> &'static str {
+        match self {
+            Self::Energy => "J",
+            Self::Power => "W",
+            Self::Area => "m2",
+        }
+    }
+
     /// Units of its keys, and what one is in joules, watts or square metres.
-    const fn units(self) -> &'static [(&'static str, f64)] {
+    pub(super) const fn units(self) -> &'static [(&'static str, f64)] {
         match self {
             Self::Energy => {
                 &[("aj", 1e-18), ("fj", 1e-15), ("pj", 1e-12), ("nj", 1e-9), ("uj", 1e-6)]
@@ -83,6 +96,30 @@ pub struct Quantity {
     pub sane: [f64; 2],
     /// Why that interval.
     pub why: &'static str,
+}
+
+impl Quantity {
+    /// What it is and where it can lie, in words.
+    #[must_use]
+    pub fn about(&self) -> String {
+        let (unit, per) = (self.table.unit(), self.per.text());
+        let [least, most] = self.sane;
+        format!("{per}; on any chip it lies in {least:e} to {most:e} {unit}: {}", self.why)
+    }
+}
+
+impl Per {
+    fn text(self) -> String {
+        match self {
+            Self::Event(event) => format!("An event `{}`", event.name()),
+            Self::Chip => "The chip".into(),
+            Self::Tile => "A tile in use".into(),
+            Self::Column => "A column of a bank of a tile in use".into(),
+            Self::Cell => "A cell of the network".into(),
+            Self::Row => "A row driver of a bank of a tile in use".into(),
+            Self::Converter => "A converter of a tile in use".into(),
+        }
+    }
 }
 
 const fn energy(name: &'static str, event: Event, sane: [f64; 2], why: &'static str) -> Quantity {
@@ -208,6 +245,17 @@ pub enum Kind {
     Assumed,
 }
 
+/// How a number came to the setting that it prices.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Standing {
+    /// The model gives it for this setting.
+    Stated,
+    /// The model gives it for another setting, and a law of the model brought it here: what law, from where to where.
+    Scaled(String),
+    /// The model gives it for another setting and says no law: what has changed. It prices nothing.
+    NotHere(String),
+}
+
 /// A physical number of a model.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Constant {
@@ -221,6 +269,29 @@ pub struct Constant {
     pub source: String,
     /// How far to trust it.
     pub kind: Kind,
+    /// Whether it is a number of this setting.
+    pub standing: Standing,
+}
+
+impl Constant {
+    /// Why it prices nothing here, if it does not.
+    #[must_use]
+    pub fn not_here(&self) -> Option<&str> {
+        match &self.standing {
+            Standing::NotHere(why) => Some(why),
+            Standing::Stated | Standing::Scaled(_) => None,
+        }
+    }
+}
+
+impl Constant {
+    /// What one unit of its key is in joules, watts or square metres.
+    #[must_use]
+    pub fn worth(&self) -> f64 {
+        let ends = |unit: &str| self.key.rsplit('_').next() == Some(unit);
+        let unit = self.quantity.table.units().iter().find(|(unit, _)| ends(unit));
+        unit.map_or(1.0, |(_, worth)| *worth)
+    }
 }
 
 /// The physical numbers of a model, in the order of [`QUANTITIES`].
@@ -271,6 +342,7 @@ impl Constants {
                 value: [low, typical, high].map(|number| number * unit),
                 source: source.into(),
                 kind,
+                standing: Standing::Stated,
             });
         }
         let place = |c: &Constant| QUANTITIES.iter().position(|q| q == c.quantity);

@@ -14,7 +14,7 @@ use super::session::chosen;
 use super::train::read_config;
 use crate::lab::config::Config;
 use crate::lab::data::{self, DataRoot, ImageShape};
-use crate::lab::price::{Cost, Footprint, price};
+use crate::lab::price::{Cost, Footprint, Images, price};
 use crate::lab::report::{self, Heat, Picture, RunView};
 use crate::lab::store::checkpoint::{self, CheckpointError, Identity};
 use crate::lab::store::folder::{self, FolderError, RunFolder, names};
@@ -96,7 +96,7 @@ pub fn report(path: &Path, data_root: Option<&DataRoot>) -> Result<ReportMade, R
 pub(super) fn cost(config: &Config, ledger: &LedgerRecord, records: &[EpochRecord]) -> Cost {
     let plan = Footprint::of_records(records.last().map_or(&[], |record| &record.pathways));
     let bill = price(ledger, &plan, &config.hardware, &config.constants, &[]);
-    Cost::of(&bill, ledger, &config.constants)
+    Cost::of(&bill, ledger, &config.constants, &Images::of_records(records))
 }
 
 /// The file of the state that reads the test set; `None` when it was not kept.
@@ -152,6 +152,7 @@ impl Parts<'_> {
             notes(self.receipt, self.records).iter().map(ToString::to_string).collect();
         let warnings: Vec<_> =
             self.config.warnings().into_iter().chain(notes.iter().cloned()).collect();
+        let absent = self.config.absent();
         let view = RunView {
             title: self.title(),
             config: self.text,
@@ -159,6 +160,7 @@ impl Parts<'_> {
             data: format!("{}: {}", self.config.data_name(), self.receipt.data),
             timing: self.timing,
             warnings: &warnings,
+            absent: &absent,
             epochs: self.records,
             level_max: self.config.hardware.cell.level_bits.level_max(),
             heats: &heats,
@@ -179,12 +181,14 @@ impl Parts<'_> {
         let first = sizes.first().map_or(0, |(_, [rows, _])| rows.saturating_sub(bias));
         let units = sizes.iter().map(|(_, [_, columns])| columns);
         let sizes: Vec<_> = std::iter::once(&first).chain(units).map(usize::to_string).collect();
+        let differs = self.config.differences_text();
         format!(
-            "{} by {}: {} on {}",
+            "{} by {}: {} on {}{}{differs}",
             self.config.data_name(),
             self.config.rule_name(),
             sizes.join("-"),
-            self.config.hardware_name
+            self.config.hardware_name,
+            if differs.is_empty() { "" } else { "; " }
         )
     }
 
