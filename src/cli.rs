@@ -17,6 +17,13 @@ use crate::lab::config::{self, Config, Sources};
 use crate::lab::data::DataRoot;
 use crate::lab::run::Machine;
 
+/// A line on standard error, as `eprintln!`, which would end the program where nobody hears it.
+macro_rules! tell {
+    ($($words:tt)*) => {
+        $crate::cli::note(&format!($($words)*))
+    };
+}
+
 mod bench;
 mod data;
 mod export;
@@ -193,11 +200,27 @@ fn say(line: &str) {
     let _ = writeln!(std::io::stdout(), "{line}");
 }
 
+/// Prints a line to standard error; that nobody hears it, or that its disk is full, is no reason to end.
+fn note(line: &str) {
+    use std::io::Write;
+    let _ = writeln!(std::io::stderr(), "{line}");
+}
+
+/// Turns the end of a file's allowed size into an error of the write that met it, which says where and what to do.
+fn hear_file_limits() {
+    #[cfg(unix)]
+    {
+        let heard = std::sync::Arc::default();
+        let _ = signal_hook::flag::register(signal_hook::consts::SIGXFSZ, heard);
+    }
+}
+
 /// Runs the program and gives its exit code.
 #[must_use]
 pub fn main() -> ExitCode {
+    hear_file_limits();
     let cli = Cli::parse();
-    let json = std::env::args().any(|argument| argument == "--json");
+    let json = std::env::args_os().any(|argument| argument == "--json");
     let done = match cli.command {
         Command::Train(args) => run::train(&args),
         Command::Eval(args) => run::eval(&args),
@@ -228,7 +251,7 @@ pub fn main() -> ExitCode {
             }
             let red = std::io::stderr().is_terminal();
             let word = if red { "\u{1b}[31merror\u{1b}[0m" } else { "error" };
-            eprintln!("{word}: {message}");
+            note(&format!("{word}: {message}"));
             ExitCode::from(code)
         }
     }

@@ -103,7 +103,7 @@ fn fetch(name: &str, from: &str, data_dir: Option<PathBuf>, json: bool) -> Done 
         if json {
             say(&json!({"event": "fetch", "message": line}).to_string());
         } else {
-            eprintln!("{}{line}", if live { "\r\u{1b}[K" } else { "" });
+            tell!("{}{line}", if live { "\r\u{1b}[K" } else { "" });
         }
     };
     data::fetch(set, &origin, &root, &mut tell)?;

@@ -1,7 +1,6 @@
 //! `export`: the table of a sweep as a file.
 
-use std::fs::File;
-use std::io::BufWriter;
+use std::io::Write;
 use std::path::PathBuf;
 
 use clap::Args;
@@ -9,8 +8,8 @@ use serde_json::json;
 
 use super::sweep::store_path;
 use super::{Done, Failure, say, usage};
-use crate::lab::store::folder::write_whole;
 use crate::lab::store::index::Store;
+use crate::lab::store::place::write_out;
 use crate::lab::sweep::{self, SweepError};
 use crate::lab::table::Format;
 
@@ -50,18 +49,24 @@ pub(super) fn execute(args: &ExportArgs) -> Done {
         code: 1,
         message: format!("cannot write {place}: {error}"),
     };
+    if results.lost > 0 {
+        tell!(
+            "warning: {} points were finished, but their folders are gone; `dalean sweep` does them again",
+            results.lost
+        );
+    }
+    // the whole table first, then its place: half a table is none
+    let mut bytes = Vec::new();
+    results.table.write(format, &mut bytes).map_err(|e| failure("the table", &e))?;
     match &args.out {
         None => {
-            let out = BufWriter::new(std::io::stdout());
-            results.table.write(format, out).map_err(|e| failure("standard output", &e))?;
+            let mut out = std::io::stdout();
+            let written = out.write_all(&bytes).and_then(|()| out.flush());
+            written.map_err(|e| failure("standard output", &e))?;
         }
         Some(out) => {
             let place = out.display().to_string();
-            let write = |file: &mut File| {
-                let out = BufWriter::new(file);
-                results.table.write(format, out).map_err(std::io::Error::other)
-            };
-            write_whole(out, write).map_err(|e| failure(&place, &e))?;
+            write_out(out, &bytes).map_err(|e| failure(&place, &e))?;
             let (points, finished) = (results.table.len(), results.finished);
             if args.json {
                 say(&json!({"event": "done", "sweep": record.name, "file": place,

@@ -97,6 +97,7 @@ impl Task for Classify {
             Adc::Finite { range: AdcRange::Calibrated { every_epoch: true, .. }, .. }
         );
         let Self { trainer, train, .. } = self;
+        let epochs = trainer.experiment().epochs;
         if again && trainer.epoch() > 0 {
             let _ = trainer.calibrate(train);
         }
@@ -107,7 +108,7 @@ impl Task for Classify {
                                                     correct,
                                                 }| {
             let answers = Some(Score { correct, total: samples as u64 });
-            go_on(Progress { epoch, done: samples, total: samples_total, answers })
+            go_on(Progress { epoch, epochs, done: samples, total: samples_total, answers })
         });
         let (correct, total) = (learnt.ok()?, train.len() as u64);
         let seconds = started.elapsed().as_secs_f64();

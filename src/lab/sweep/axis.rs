@@ -166,6 +166,22 @@ impl Axis {
         }
     }
 
+    /// The keys it sets, with dots, each once.
+    #[must_use]
+    pub fn keys(&self) -> Vec<String> {
+        let mut keys = match &self.source {
+            Source::Range { keys, .. } => keys.clone(),
+            Source::List(list) => {
+                let mut keys = Vec::new();
+                list.iter().for_each(|choice| leaves(&choice.keys, "", &mut keys));
+                keys
+            }
+        };
+        keys.sort();
+        keys.dedup();
+        keys
+    }
+
     /// Whether all values are numbers.
     #[must_use]
     pub fn is_number(&self) -> bool {
@@ -188,6 +204,17 @@ impl Axis {
             Source::Range { keys, from, to, whole: false } => {
                 choice(keys, Value::Real(round(bend(*from, *to, self.log, part))))
             }
+        }
+    }
+}
+
+/// Names of everything in a table that is no table, with dots.
+fn leaves(table: &toml::Table, place: &str, into: &mut Vec<String>) {
+    for (name, value) in table {
+        let name = if place.is_empty() { name.clone() } else { format!("{place}.{name}") };
+        match value {
+            toml::Value::Table(inside) => leaves(inside, &name, into),
+            _ => into.push(name),
         }
     }
 }
