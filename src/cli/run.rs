@@ -1,8 +1,8 @@
 //! `train`, `eval`, `verify`.
 
 use std::path::PathBuf;
-use std::sync::{Arc, Mutex};
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex};
 
 use clap::Args;
 use serde_json::json;
@@ -282,12 +282,14 @@ fn sample(args: &VerifyArgs, count: usize, machine: Machine, stop: &AtomicBool) 
                 busy += 1;
                 return;
             }
-            Finding::Done(Verdict::Different { what, wanted, found }) => {
-                (format!("{what} differs: its folder says {wanted}, doing it again gives {found}"), 4)
-            }
-            Finding::Index { column, index, folder } => {
-                (format!("`{column}` differs: the index says {index}, its folder gives {folder}"), 4)
-            }
+            Finding::Done(Verdict::Different { what, wanted, found }) => (
+                format!("{what} differs: its folder says {wanted}, doing it again gives {found}"),
+                4,
+            ),
+            Finding::Index { column, index, folder } => (
+                format!("`{column}` differs: the index says {index}, its folder gives {folder}"),
+                4,
+            ),
             Finding::Address { found } => {
                 (format!("the folder of that name holds the run {found}"), 4)
             }
@@ -295,7 +297,8 @@ fn sample(args: &VerifyArgs, count: usize, machine: Machine, stop: &AtomicBool) 
         };
         let text = format!("run {key}: {text}");
         if shared.json {
-            say(&json!({"event": "run", "key": key, "verified": false, "message": text}).to_string());
+            say(&json!({"event": "run", "key": key, "verified": false, "message": text})
+                .to_string());
         }
         note(&text);
         wrong.push(code);

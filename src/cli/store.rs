@@ -86,7 +86,9 @@ fn indexed(made: &Reindexed, json: bool) -> Done {
         say(&format!("{finished} finished runs, {unfinished} folders that are not finished"));
     }
     if *forgotten > 0 {
-        tell!("{forgotten} runs that the index knew have no such folder; `dalean sweep` does them again");
+        tell!(
+            "{forgotten} runs that the index knew have no such folder; `dalean sweep` does them again"
+        );
     }
     left_behind(damaged, "the sweep that they belong to does them again")
 }
@@ -99,7 +101,8 @@ fn left_behind(runs: &[Skipped], cure: &str) -> Done {
     if runs.is_empty() {
         return Ok(());
     }
-    let message = format!("{} runs are broken and were left out, as said above; {cure}", runs.len());
+    let message =
+        format!("{} runs are broken and were left out, as said above; {cure}", runs.len());
     Err(Failure { code: 1, message })
 }
 
@@ -108,15 +111,19 @@ fn list(store: &Store, json: bool) -> Done {
     let runs = rows.iter().filter(|(key, ..)| store.has_folder(key)).count();
     if runs < rows.len() {
         let lost = rows.len() - runs;
-        tell!("{lost} more were finished, but their folders are gone; `dalean sweep` does them again");
+        tell!(
+            "{lost} more were finished, but their folders are gone; `dalean sweep` does them again"
+        );
     }
     if !json {
         say(&format!("{}: {runs} finished runs", store.path().display()));
     }
     for record in store.sweeps()? {
         let points = store.points(&record.name)?;
-        let is_there = |point: &PointRecord| point.key.as_ref().is_some_and(|key| store.has_folder(key));
-        let finished = points.iter().filter(|(point, row)| row.is_some() && is_there(point)).count();
+        let is_there =
+            |point: &PointRecord| point.key.as_ref().is_some_and(|key| store.has_folder(key));
+        let finished =
+            points.iter().filter(|(point, row)| row.is_some() && is_there(point)).count();
         if json {
             say(&json!({"event": "sweep", "name": record.name, "points": points.len(),
                 "finished": finished})
@@ -140,7 +147,10 @@ fn merge(into: &mut Store, from: &Store, json: bool) -> Done {
             "held": merged.held, "skipped": skipped, "sweeps": merged.sweeps,
             "different": merged.different})
         .to_string());
-        return left_behind(&merged.skipped, "`dalean verify` on both folders tells which is wrong");
+        return left_behind(
+            &merged.skipped,
+            "`dalean verify` on both folders tells which is wrong",
+        );
     }
     say(&format!(
         "{place}: {} new runs, {} known with the same result, {} new sweeps",

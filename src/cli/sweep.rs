@@ -151,11 +151,7 @@ fn announce(shared: &Shared, plan: &SweepPlan, path: &std::path::Path) {
         {
             let others =
                 if refused > 1 { format!(" (and {} more)", refused - 1) } else { String::new() };
-            tell!(
-                "warning: point {} ({}) cannot run{others}: {why}",
-                first + 1,
-                plan.words(first)
-            );
+            tell!("warning: point {} ({}) cannot run{others}: {why}", first + 1, plan.words(first));
         }
         tell!("store {}", path.display());
     }
@@ -197,7 +193,9 @@ fn dry_run(args: &SweepArgs, plan: &SweepPlan, machine: Machine, path: &std::pat
     let tasks: Vec<&PlannedRun> = tasks.collect();
     let store = Store::existing(path).ok();
     let finished = |task: &&PlannedRun| {
-        store.as_ref().is_some_and(|store| store.is_finished(&task.key).is_ok_and(|finished| finished))
+        store
+            .as_ref()
+            .is_some_and(|store| store.is_finished(&task.key).is_ok_and(|finished| finished))
     };
     let all = tasks.len();
     let todo: Vec<&PlannedRun> = tasks.into_iter().filter(|task| !finished(task)).collect();

@@ -83,6 +83,14 @@ pub enum SweepError {
         /// What it may use.
         names: String,
     },
+    /// Data that an earlier point could not read.
+    #[error("{0}")]
+    Unread(String),
+    /// Files that a sweep leans on are not what they were.
+    #[error(
+        "a file that the point leans on was changed since the sweep was planned; give the command again"
+    )]
+    Changed,
     /// No point is left.
     #[error("the sweep has no points: its filters refuse all {points}")]
     Empty {

@@ -100,7 +100,8 @@ pub fn load(sources: &Sources<'_>) -> Result<Config, ConfigError> {
 fn named(hw: &toml::Table) -> Result<(), ConfigError> {
     let Some(name) = hw.get("name") else { return Ok(()) };
     let model = hw.get("model");
-    let missing = ["cell", "tile", "drive", "adc", "write"].iter().find(|table| !hw.contains_key(**table));
+    let missing =
+        ["cell", "tile", "drive", "adc", "write"].iter().find(|table| !hw.contains_key(**table));
     let allowed = match (model, missing) {
         (None, None) => return Ok(()),
         (Some(model), _) => format!(

@@ -56,6 +56,7 @@ impl Classify {
             let hint = "choose the last epoch with learning.select = \"last\"";
             return Err(RunError::Empty { part: "validation", hint });
         }
+        super::weigh(&experiment.network.layers, &experiment.hardware, super::Memory::left())?;
         let seeded = experiment.build(machine.backend(), train.len())?;
         let mut trainer = Trainer::new(experiment, seeded);
         let (threads, engine) = (machine.threads(), trainer.driver_mut().engine_mut());

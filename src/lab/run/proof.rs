@@ -96,7 +96,8 @@ pub(super) fn records_text(path: &Path, receipt: &Receipt) -> Result<String, Run
     let spoken_of = end.and_then(|end| text.get(..end));
     // but nothing comes behind the last one of a finished run
     if receipt.status == "finished" && end.is_some_and(|end| end < text.len()) {
-        let found = format!("holds more than the {epochs} records that {} speaks of", names::RECEIPT);
+        let found =
+            format!("holds more than the {epochs} records that {} speaks of", names::RECEIPT);
         return Err(damaged(found).into());
     }
     match spoken_of.filter(|text| hash::bytes(text) == receipt.metrics) {

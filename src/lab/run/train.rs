@@ -319,7 +319,10 @@ impl<'a> Run<'a> {
         if !path.join(names::CHECKPOINT).exists() && !path.join(names::RECEIPT).exists() {
             // the ledger is written when the last epoch is done: such a run is never begun anew behind its owner's back
             if path.join(names::LEDGER).exists() {
-                let found = format!("is missing, though {} says that the run came to its end", names::LEDGER);
+                let found = format!(
+                    "is missing, though {} says that the run came to its end",
+                    names::LEDGER
+                );
                 return Err(FolderError::Content { path: path.join(names::RECEIPT), found }.into());
             }
             return Ok(());
@@ -334,7 +337,9 @@ impl<'a> Run<'a> {
             // killed before the first one was in its place; later there is always one
             if receipt.epoch_hashes.len() > 1 && self.keeping == Keeping::ALL {
                 let found = format!("is missing, though {} speaks of it", names::RECEIPT);
-                return Err(FolderError::Content { path: path.join(names::CHECKPOINT), found }.into());
+                return Err(
+                    FolderError::Content { path: path.join(names::CHECKPOINT), found }.into()
+                );
             }
             return Ok(());
         }

@@ -88,7 +88,8 @@ pub mod names {
 pub fn is_of_run(name: &str) -> bool {
     use names::{CHECKPOINT, CONFIG, LEDGER, METRICS, RECEIPT, REPORT, TIMING};
     let best = name.strip_prefix("best-").and_then(|rest| rest.strip_suffix(".safetensors"));
-    let is_best = best.is_some_and(|n| (5..=10).contains(&n.len()) && n.bytes().all(|b| b.is_ascii_digit()));
+    let is_best =
+        best.is_some_and(|n| (5..=10).contains(&n.len()) && n.bytes().all(|b| b.is_ascii_digit()));
     is_best || [CONFIG, METRICS, LEDGER, CHECKPOINT, TIMING, RECEIPT, REPORT].contains(&name)
 }
 

@@ -293,7 +293,8 @@ impl Store {
         let mut query = self.index.prepare(text).map_err(self.fail())?;
         let rows = query.query_map([], |row| Ok((row.get(0)?, row.get(1)?, row.get(2)?)));
         let rows = rows.map_err(self.fail())?;
-        let rows: Vec<(String, String, f64)> = rows.collect::<Result<_, _>>().map_err(self.fail())?;
+        let rows: Vec<(String, String, f64)> =
+            rows.collect::<Result<_, _>>().map_err(self.fail())?;
         rows.iter().try_for_each(|(key, ..)| self.check_key(key))?;
         Ok(rows)
     }
@@ -330,7 +331,10 @@ impl Store {
             (text, experiment) == (&sweep.text, &sweep.experiment)
         };
         if !replace && known.as_ref().is_some_and(|known| !same(known)) {
-            return Err(StoreError::OtherSweep { path: self.path.clone(), name: sweep.name.clone() });
+            return Err(StoreError::OtherSweep {
+                path: self.path.clone(),
+                name: sweep.name.clone(),
+            });
         }
         let text = "INSERT OR REPLACE INTO sweep (name, text, experiment) VALUES (?1, ?2, ?3)";
         change.execute(text, params![sweep.name, sweep.text, sweep.experiment]).map_err(&fail)?;

@@ -115,7 +115,8 @@ fn folder_of(place: &Path) -> &Path {
 pub fn write_out(place: &Path, bytes: &[u8]) -> io::Result<()> {
     match fs::symlink_metadata(place) {
         Ok(found) if !found.is_file() && !found.is_dir() => {
-            let plain = found.is_symlink() && fs::metadata(place).is_ok_and(|found| found.is_file());
+            let plain =
+                found.is_symlink() && fs::metadata(place).is_ok_and(|found| found.is_file());
             let missing = found.is_symlink() && fs::metadata(place).is_err();
             let mut file =
                 OpenOptions::new().write(true).create(missing).truncate(plain).open(place)?;
@@ -131,12 +132,16 @@ pub fn write_out(place: &Path, bytes: &[u8]) -> io::Result<()> {
 
 /// Removes parts that a kill has left in a folder; those that someone is writing stay.
 pub fn clear_parts(folder: &Path) {
-    each_part(folder, |name| name.strip_prefix(PART).is_some_and(is_random), |path| {
-        let file = open(path, OpenOptions::new().read(true).write(true), false);
-        if file.is_ok_and(|file| file.try_lock().is_ok()) {
-            let _ = fs::remove_file(path);
-        }
-    });
+    each_part(
+        folder,
+        |name| name.strip_prefix(PART).is_some_and(is_random),
+        |path| {
+            let file = open(path, OpenOptions::new().read(true).write(true), false);
+            if file.is_ok_and(|file| file.try_lock().is_ok()) {
+                let _ = fs::remove_file(path);
+            }
+        },
+    );
 }
 
 /// Removes all parts of a folder that the caller holds.

@@ -265,15 +265,11 @@ impl<'a> Crew<'a> {
             return Ok(Came::Done { row, seconds, elsewhere: true });
         }
         let machine = Machine::new(self.options.backend, 1).expect("one thread");
-        let samples = f64::from(task.config.epochs) * data.split.train.len().max(1) as f64;
+        let config = self.plan.config(task).map_err(|error| Trouble::Run(error.to_string()))?;
+        let samples = f64::from(task.epochs) * data.split.train.len().max(1) as f64;
         let mut before = None;
-        let outcome = run::carry_on(
-            &task.config,
-            data,
-            folder,
-            machine,
-            self.options.keeping,
-            &mut |event| {
+        let outcome =
+            run::carry_on(&config, data, folder, machine, self.options.keeping, &mut |event| {
                 if let run::RunEvent::Batch(progress) = event {
                     let seen =
                         f64::from(progress.epoch) * progress.total as f64 + progress.done as f64;
@@ -281,8 +277,7 @@ impl<'a> Crew<'a> {
                     (self.on_event)(SweepEvent::Work(task.work * done / samples));
                 }
                 !self.stopped()
-            },
-        );
+            });
         match outcome {
             Ok(_) => {
                 let (row, seconds) = row(&path).map_err(Trouble::place)?;

@@ -147,8 +147,7 @@ impl Sweep {
 
 /// Names of columns that are not axes.
 fn reserved(name: &str) -> bool {
-    super::table::NAMES.contains(&name)
-        || RESULTS.iter().any(|result| result.name == name)
+    super::table::NAMES.contains(&name) || RESULTS.iter().any(|result| result.name == name)
 }
 
 /// Whether no two axes set one key: the later one would win at every point, and the other be a name for nothing.
@@ -157,12 +156,13 @@ fn distinct(axes: &[Axis]) -> Result<(), SweepError> {
     let keys: Vec<_> = axes.iter().map(Axis::keys).collect();
     for (at, axis) in axes.iter().enumerate() {
         for (other, theirs) in axes.iter().zip(&keys).take(at) {
-            let both = keys[at].iter().find(|key| {
-                theirs.iter().any(|other| covers(key, other) || covers(other, key))
-            });
+            let both = keys[at]
+                .iter()
+                .find(|key| theirs.iter().any(|other| covers(key, other) || covers(other, key)));
             if let Some(key) = both {
                 let found = format!("sets `{key}`, and so does axis `{}`", other.name);
-                let allowed = "one key has one axis: take one out, or join the two with [[axis.case]]";
+                let allowed =
+                    "one key has one axis: take one out, or join the two with [[axis.case]]";
                 return Err(SweepError::axis(&axis.name, &found, allowed));
             }
         }
@@ -191,7 +191,8 @@ fn sampled(file: SampleFile) -> Result<Sample, SweepError> {
 const SEEDS_MAX: u32 = 100_000;
 
 fn seeds(file: Option<SeedsFile>) -> Result<Vec<u64>, SweepError> {
-    let allowed = "give 1 to 100000 different ones; ten of them tell a difference of one standard deviation";
+    let allowed =
+        "give 1 to 100000 different ones; ten of them tell a difference of one standard deviation";
     let wrong = |count: u64| SweepError::key("seeds", &format!("are {count}"), allowed);
     let list = match file {
         None => return Ok(vec![]),

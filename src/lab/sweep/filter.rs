@@ -101,12 +101,8 @@ mod tests {
 
     fn passes(text: &str) -> Result<bool, String> {
         let names = ["bits", "rate", "rule", "on"];
-        let values = [
-            Value::Whole(4),
-            Value::Real(2.0),
-            Value::Text("ed".into()),
-            Value::Flag(true),
-        ];
+        let values =
+            [Value::Whole(4), Value::Real(2.0), Value::Text("ed".into()), Value::Flag(true)];
         Filter::new(&[text.into()], &names)
             .and_then(|filter| filter.passes(&names, &values))
             .map_err(|e| e.to_string())

@@ -159,7 +159,10 @@ pub fn merge(
 /// Why a run here and one there cannot both be right.
 fn contradiction(into: &Store, from: &Store, key: &str, here: &str, row: &Row) -> Option<String> {
     let Ok(here) = serde_json::from_str::<Row>(here) else {
-        return Some(format!("the index of {} has a row of it that cannot be read", into.path().display()));
+        return Some(format!(
+            "the index of {} has a row of it that cannot be read",
+            into.path().display()
+        ));
     };
     here.disagreement(row, false)?;
     let error = SweepError::Contradiction {

@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 
 use super::{Results, SweepError, results};
 use crate::lab::report::sweep::{SweepView, figures, html, png, text};
-use crate::lab::store::place::{clear_parts, make_folder, write_whole};
 use crate::lab::store::index::{Store, StoreError, SweepRecord};
+use crate::lab::store::place::{clear_parts, make_folder, write_whole};
 
 /// Files that were written.
 #[derive(Debug, Clone, PartialEq, Eq)]

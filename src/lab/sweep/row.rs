@@ -164,9 +164,9 @@ impl Row {
         let wrong = |column: &&ResultColumn| differs(column) || made_up(column);
         let column = RESULTS.iter().filter(counts).find(wrong).map(|column| column.name);
         let said = one_folder && self.priced_with == other.priced_with;
-        column
-            .or_else(|| (said && self.hardware != other.hardware).then_some("hardware"))
-            .or_else(|| (said && self.not_simulated != other.not_simulated).then_some("not_simulated"))
+        column.or_else(|| (said && self.hardware != other.hardware).then_some("hardware")).or_else(
+            || (said && self.not_simulated != other.not_simulated).then_some("not_simulated"),
+        )
     }
 
     /// What it says of a column, for people.

@@ -149,7 +149,8 @@ fn is_in(left: Cell<'_>, at: usize, right: &Tree, values: &[Value]) -> Result<bo
     match (left, evaluate(right, values)?) {
         (Cell::Text(part), Cell::Text(whole)) => Ok(whole.contains(part)),
         (left, right) => {
-            let what = format!("{left} in {right}: behind `in` stands a list, such as [1, 2], or a text");
+            let what =
+                format!("{left} in {right}: behind `in` stands a list, such as [1, 2], or a text");
             Err(Fault::new(at, what))
         }
     }

@@ -84,8 +84,8 @@ enum Token {
 
 /// Signs, longer ones first.
 const SIGNS: [&str; 19] = [
-    "||", "&&", "==", "!=", "<=", ">=", "**", "<", ">", "+", "-", "*", "/", "%", "!", "(", ")", "[",
-    "]",
+    "||", "&&", "==", "!=", "<=", ">=", "**", "<", ">", "+", "-", "*", "/", "%", "!", "(", ")",
+    "[", "]",
 ];
 
 /// Reads a condition on columns of these names.
@@ -101,7 +101,9 @@ pub(super) fn read(text: &str, names: &[&str]) -> Result<Tree, Fault> {
         (Token::Sign(sign @ ("<" | "<=" | ">" | ">=")), at) => {
             Err(Fault::new(*at, format!("`{sign}` comes behind another order; join two with &&")))
         }
-        (_, at) => Err(Fault::new(*at, "something is missing between two values, such as && or ==")),
+        (_, at) => {
+            Err(Fault::new(*at, "something is missing between two values, such as && or =="))
+        }
     }
 }
 
@@ -119,7 +121,8 @@ fn tokens(text: &str) -> Result<Vec<(Token, usize)>, Fault> {
             found.push((token, at));
             at += bytes;
         } else if matches!(first, '"' | '\'' | '`') {
-            let (text, bytes) = quoted(rest, first).map_err(|(more, what)| Fault::new(at + more, what))?;
+            let (text, bytes) =
+                quoted(rest, first).map_err(|(more, what)| Fault::new(at + more, what))?;
             found.push((Token::Text(text), at));
             at += bytes;
         } else if first.is_ascii_alphabetic() || first == '_' {
@@ -134,12 +137,19 @@ fn tokens(text: &str) -> Result<Vec<(Token, usize)>, Fault> {
             found.push((Token::Sign(sign), at));
             at += sign.len();
         } else {
-            return Err(Fault::new(at, match first {
-                '=' => "one = sets something, which no condition does; compare with ==".to_owned(),
-                '&' => "one & is nothing here; write && for `and`".to_owned(),
-                '|' => "one | is nothing here; write || for `or`".to_owned(),
-                other => format!("`{other}` is nothing here; a condition compares names, numbers and \"words\""),
-            }));
+            return Err(Fault::new(
+                at,
+                match first {
+                    '=' => {
+                        "one = sets something, which no condition does; compare with ==".to_owned()
+                    }
+                    '&' => "one & is nothing here; write && for `and`".to_owned(),
+                    '|' => "one | is nothing here; write || for `or`".to_owned(),
+                    other => format!(
+                        "`{other}` is nothing here; a condition compares names, numbers and \"words\""
+                    ),
+                },
+            ));
         }
     }
     found.push((Token::End, text.len()));
@@ -247,8 +257,11 @@ impl Reader<'_> {
         let mut more = Vec::new();
         loop {
             let (_, place) = *self.peek();
-            let Some(&sign) = between.iter().find(|between| self.takes(between.sign())) else { break };
-            let next = if sign == Between::In { self.listed(level + 1)? } else { self.chain(level + 1)? };
+            let Some(&sign) = between.iter().find(|between| self.takes(between.sign())) else {
+                break;
+            };
+            let next =
+                if sign == Between::In { self.listed(level + 1)? } else { self.chain(level + 1)? };
             more.push((sign, place, next));
             if ONCE.contains(&level) {
                 break;
@@ -327,7 +340,8 @@ impl Reader<'_> {
             Token::Whole(value) => Node::Whole(value),
             Token::Real(value) => Node::Real(value),
             Token::Text(text) => Node::Text(text),
-            Token::Name(name) => match (&*name, self.names.iter().position(|known| *known == name)) {
+            Token::Name(name) => match (&*name, self.names.iter().position(|known| *known == name))
+            {
                 (_, Some(column)) => Node::Column(column),
                 ("true", None) => Node::Flag(true),
                 ("false", None) => Node::Flag(false),
