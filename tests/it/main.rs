@@ -20,6 +20,7 @@ mod program;
 mod report;
 mod rules;
 mod same_bits;
+mod strangers;
 mod sweep;
 mod tile;
 mod tile_program;

@@ -345,7 +345,7 @@ mod tests {
         let rule = axis(text, false).unwrap();
         assert_eq!((values(&rule).as_str(), rule.is_number()), ("ed bp", false));
         assert_eq!(
-            toml::to_string(&rule.list()[0].keys).unwrap(),
+            toml::to_string(&*rule.list()[0].keys).unwrap(),
             "[learning]\nrate = 4.0\nrule = \"ed\"\n"
         );
     }

@@ -296,6 +296,20 @@ mod tests {
                 &format!("{GRID}[[axis]]\nname = 'cycles'\nkey = 'a'\nvalues = [1]"),
                 "another column",
             ),
+            (
+                &format!("{GRID}[[axis]]\nname = 'hardware'\nkey = 'a'\nvalues = [1]"),
+                "another column",
+            ),
+            (
+                &format!("{GRID}[[axis]]\nname = 'b'\nkey = 'hw.cell.level_bits'\nvalues = [3]"),
+                "sets `hw.cell.level_bits`, and so does axis `level_bits`",
+            ),
+            (
+                &format!(
+                    "{GRID}[[axis]]\nname = 'b'\n[[axis.case]]\nname = 'x'\nset.hw.cell.level_bits = 3"
+                ),
+                "sets `hw.cell.level_bits`, and so does axis `level_bits`",
+            ),
             (&format!("{GRID}[base.learning]\nepoch = 3"), "unknown field `epoch`"),
             (&format!("filter = ['bits > 3']\n{GRID}"), "level_bits, rule, seed"),
         ] {
