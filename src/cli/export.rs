@@ -1,11 +1,11 @@
 //! `export`: the table of a sweep as a file.
 
-use std::io::Write;
 use std::path::PathBuf;
 
 use clap::Args;
 use serde_json::json;
 
+use super::out::print;
 use super::sweep::store_path;
 use super::{Done, Failure, say, usage};
 use crate::lab::store::index::Store;
@@ -29,6 +29,9 @@ pub(super) struct ExportArgs {
     /// One JSON object a line on standard output, each with an `event`
     #[arg(long, requires = "out")]
     json: bool,
+    /// Print only the name of the file
+    #[arg(long, short, requires = "out")]
+    quiet: bool,
 }
 
 pub(super) fn execute(args: &ExportArgs) -> Done {
@@ -60,9 +63,7 @@ pub(super) fn execute(args: &ExportArgs) -> Done {
     results.table.write(format, &mut bytes).map_err(|e| failure("the table", &e))?;
     match &args.out {
         None => {
-            let mut out = std::io::stdout();
-            let written = out.write_all(&bytes).and_then(|()| out.flush());
-            written.map_err(|e| failure("standard output", &e))?;
+            print(&bytes);
         }
         Some(out) => {
             let place = out.display().to_string();
@@ -72,6 +73,8 @@ pub(super) fn execute(args: &ExportArgs) -> Done {
                 say(&json!({"event": "done", "sweep": record.name, "file": place,
                     "points": points, "finished": finished})
                 .to_string());
+            } else if args.quiet {
+                say(&place);
             } else {
                 say(&format!("{place}: {points} points, {finished} finished"));
             }

@@ -15,12 +15,14 @@ mod verify;
 mod weigh;
 
 pub use profile::{Act, Profile, profile};
-pub use proof::records;
+pub use proof::{records, untouched};
 pub use report::{ReportMade, report};
 pub use repriced::{Prices, Repriced, reprice, reprice_as};
 pub use session::Session;
 pub use task::Progress;
-pub use train::{Keeping, RunEvent, Trained, address_of, carry_on, evaluate, resume, train};
+pub use train::{
+    Keeping, RunEvent, Trained, address_of, carry_on, configuration, evaluate, resume, train,
+};
 pub use verify::{Verdict, verify};
 pub use weigh::Memory;
 pub(crate) use weigh::weigh;
