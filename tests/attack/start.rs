@@ -253,7 +253,9 @@ fn asked(world: &World, chance: &mut Chance, here: &Path) -> (&'static str, Ask)
         4 | 5 => {
             copy(&world.made("run"), &here.join("run"));
             damage_run(world, chance, &here.join("run"));
-            let (line, answer) = match chance.below(7) {
+            let (line, answer) = match chance.below(9) {
+                7 => ("runs . --json", Answer::Event("done")),
+                8 => ("compare run run --json", Answer::Words),
                 0 | 1 => ("verify run --json", Answer::Event("done")),
                 2 => ("report run --json", Answer::Event("report")),
                 3 => ("price run", Answer::Words),
