@@ -45,10 +45,8 @@ fn the_tables_hold_the_keys_that_the_reader_of_files_knows_and_no_others() {
 }
 
 fn with(settings: &[String]) -> Result<Config, ConfigError> {
-    // a model that is silent, so that defaults are the program's and not a model's; a set without defaults of its own
-    let data = settings.iter().any(|setting| setting.starts_with("data."));
-    let set = if data { "" } else { "data.set = \"mnist\"\n" };
-    let text = &format!("{set}[hw]\nname = \"silent\"");
+    // a model that is silent, so that defaults are the program's and not a model's
+    let text = "[hw]\nname = \"silent\"";
     let experiment = Some(("x", text));
     load(&Sources { experiment, settings, ..Sources::default() })
 }
