@@ -18,7 +18,7 @@ pub mod sweep;
 pub use check::{Config, DataConfig, Select, TrainOn};
 pub use file::{ExperimentFile, HardwareFile};
 pub use hardware::{Model, builtin_models, load_model, model_names};
-pub use layers::{Overlay, Sources, load, overlay, setting, setting_table};
+pub use layers::{Overlay, Sources, anchor, load, overlay, setting, setting_table};
 pub use quantity::{Constant, Constants, CostTable, Kind, Per, QUANTITIES, Quantity};
 
 /// Why a configuration cannot be used. Each message says where, what was found, what is allowed.

@@ -1,7 +1,9 @@
 //! Laying texts over one another: built-in defaults, hardware model, experiment file, a sweep's keys, `--set`, `--hw`.
 
+use std::path::Path;
+
 use super::file::{ExperimentFile, HardwareFile};
-use super::{Config, ConfigError, check, hardware};
+use super::{Config, ConfigError, check, data, hardware};
 
 /// Where a configuration comes from, weakest first.
 ///
@@ -22,7 +24,7 @@ use super::{Config, ConfigError, check, hardware};
 /// ```
 #[derive(Debug, Clone, Default)]
 pub struct Sources<'a> {
-    /// Name and text of the experiment file.
+    /// Name and text of the experiment file; paths in it are relative to the folder of that name.
     pub experiment: Option<(&'a str, &'a str)>,
     /// What a sweep sets, weakest first.
     pub overlays: &'a [Overlay<'a>],
@@ -51,7 +53,9 @@ pub fn load(sources: &Sources<'_>) -> Result<Config, ConfigError> {
     let mut table = toml::Table::new();
     if let Some((name, text)) = sources.experiment {
         let _: ExperimentFile = parse(name, text)?;
-        overlay(&mut table, parse(name, text)?);
+        let mut file = parse(name, text)?;
+        anchor(&mut file, Path::new(name).parent().unwrap_or(Path::new("")));
+        overlay(&mut table, file);
     }
     for Overlay { place, table: over } in sources.overlays {
         let _: ExperimentFile = table_of(place, over)?;
@@ -92,6 +96,17 @@ pub fn load(sources: &Sources<'_>) -> Result<Config, ConfigError> {
     hw.remove("model");
     table.insert("hw".into(), toml::Value::Table(hw));
     check::config(table_of("configuration", &table)?)
+}
+
+/// Makes paths that a file in `folder` names relative to where the program runs: those of data and of a hardware model.
+pub fn anchor(table: &mut toml::Table, folder: &Path) {
+    data::anchor(table, folder);
+    if let Some(toml::Value::Table(hw)) = table.get_mut("hw")
+        && let Some(toml::Value::String(model)) = hw.get_mut("model")
+        && !hardware::model_names().contains(&&**model)
+    {
+        *model = folder.join(&*model).display().to_string();
+    }
 }
 
 /// A table as what its keys mean.
