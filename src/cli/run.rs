@@ -8,7 +8,8 @@ use clap::Args;
 use serde_json::json;
 
 use super::progress::Meter;
-use super::{Done, Failure, Shared, configuration, environment, say, usage};
+use super::{Done, Failure, Moved, Shared, configuration, environment, say, usage};
+use crate::lab::price::{EnergySplit, PerImage};
 use crate::lab::run::{self, Machine, RunError, RunEvent, Trained, Verdict};
 use crate::lab::store::index::{INDEX, Store};
 use crate::lab::store::record::{TestOutcome, TestRecord};
@@ -34,6 +35,8 @@ pub(super) struct TrainArgs {
     #[arg(long, value_name = "RUN", conflicts_with_all = ["file", "hw", "settings", "seed", "out"])]
     resume: Option<PathBuf>,
     #[command(flatten)]
+    moved: Moved,
+    #[command(flatten)]
     shared: Shared,
 }
 
@@ -41,6 +44,8 @@ pub(super) struct TrainArgs {
 pub(super) struct EvalArgs {
     /// Folder of a run
     run: PathBuf,
+    #[command(flatten)]
+    moved: Moved,
     #[command(flatten)]
     shared: Shared,
 }
@@ -58,6 +63,8 @@ pub(super) struct VerifyArgs {
     /// Which runs are drawn [default: from the clock, and printed]
     #[arg(long, value_name = "N", requires = "sample")]
     sample_seed: Option<u64>,
+    #[command(flatten)]
+    moved: Moved,
     #[command(flatten)]
     shared: Shared,
 }
@@ -89,6 +96,12 @@ pub(super) fn stop_flag() -> Arc<AtomicBool> {
 pub(super) fn train(args: &TrainArgs) -> Done {
     let shared = &args.shared;
     let machine = shared.machine()?;
+    if args.resume.is_none() && args.moved.data.is_some() {
+        return Err(usage(
+            "--data says where the data of a run are that is continued (--resume); of a new run, say it with --set \
+             data.train=FILE or in its file",
+        ));
+    }
     let stop = stop_flag();
     let config = match &args.resume {
         Some(_) => None,
@@ -101,16 +114,19 @@ pub(super) fn train(args: &TrainArgs) -> Done {
     let mut folder = PathBuf::new();
     let mut on_event = |event: RunEvent<'_>| {
         match event {
-            RunEvent::Started { folder: path, data, warnings, epoch, epochs } => {
+            RunEvent::Started { folder: path, data, said, warnings, epoch, epochs } => {
                 folder = path.into();
                 meter = Meter::new(quiet, epochs);
                 if json {
                     let run = path.display().to_string();
-                    say(&json!({"event": "started", "run": run, "data": data, "epoch": epoch,
+                    say(&json!({"event": "started", "run": run, "data": data, "data_read": said, "epoch": epoch,
                         "epochs": epochs, "warnings": warnings})
                     .to_string());
                 } else if !quiet {
                     meter.line(data);
+                    for line in said {
+                        meter.line(&format!("data: {line}"));
+                    }
                     meter.line(&format!(
                         "run {}  kernel {}  threads {}",
                         path.display(),
@@ -141,7 +157,7 @@ pub(super) fn train(args: &TrainArgs) -> Done {
         }
         !stop.load(Ordering::SeqCst)
     };
-    let data = shared.data_root();
+    let data = args.moved.root(shared.data_root());
     let outcome = match (&args.resume, &config) {
         (Some(path), _) => run::resume(path, &data, machine, &mut on_event),
         (None, Some(config)) => {
@@ -168,6 +184,9 @@ fn done(run: &str, outcome: &Trained) -> serde_json::Value {
     let last = outcome.records.last();
     let images: u64 =
         outcome.records.iter().filter_map(|r| r.train()).map(|score| score.total).sum();
+    let cost = &outcome.cost;
+    let each: Vec<_> = cost.per_image.iter().map(PerImage::to_json).collect();
+    let split: Vec<_> = cost.split.iter().map(EnergySplit::to_json).collect();
     json!({
         "event": "done",
         "run": run,
@@ -176,10 +195,15 @@ fn done(run: &str, outcome: &Trained) -> serde_json::Value {
         "validation_accuracy": last.and_then(|r| r.validation()).map(|score| score.fraction()),
         "state_hash": last.map(|record| record.state_hash.clone()),
         "epochs": last.map(|record| record.epoch),
-        "cycles": outcome.cost.cycles,
-        "simulated_seconds": outcome.cost.seconds,
-        "joules": outcome.cost.joules,
-        "joules_assumed_share": outcome.cost.joules.map(|_| outcome.cost.assumed_share),
+        "cycles": cost.cycles,
+        "simulated_seconds": cost.seconds,
+        "joules": cost.energy.and_then(|energy| energy.whole()),
+        "joules_at_least": cost.energy.and_then(|energy| energy.at_least()),
+        "parts_priced": cost.energy.map(|energy| energy.priced),
+        "parts": cost.energy.map(|energy| energy.parts),
+        "by_class": split,
+        "per_image": each,
+        "joules_assumed_share": cost.energy.map(|_| cost.assumed_share),
         "train_seconds": seconds,
         "images_per_second": images as f64 / seconds.max(1e-9),
     })
@@ -187,7 +211,7 @@ fn done(run: &str, outcome: &Trained) -> serde_json::Value {
 
 pub(super) fn eval(args: &EvalArgs) -> Done {
     let shared = &args.shared;
-    let (test, state_hash) = run::evaluate(&args.run, &shared.data_root(), shared.machine()?)?;
+    let (test, state_hash) = run::evaluate(&args.run, &args.moved.root(shared.data_root()), shared.machine()?)?;
     let TestOutcome::Classify(TestRecord { epoch, ref select, score, .. }) = test;
     if shared.json {
         say(&json!({
@@ -227,7 +251,7 @@ pub(super) fn verify(args: &VerifyArgs) -> Done {
     let total = args.epochs.unwrap_or(0);
     let mut meter = Meter::new(shared.quiet || shared.json, total);
     let verdict =
-        run::verify(&args.run, &shared.data_root(), machine, args.epochs, &mut |progress| {
+        run::verify(&args.run, &args.moved.root(shared.data_root()), machine, args.epochs, &mut |progress| {
             meter.batch(progress);
             !stop.load(Ordering::SeqCst)
         });
@@ -288,7 +312,7 @@ fn sample(args: &VerifyArgs, count: usize, machine: Machine, stop: &AtomicBool) 
         }
     };
     let mut go_on = |_| !stop.load(Ordering::SeqCst);
-    let root = shared.data_root();
+    let root = args.moved.root(shared.data_root());
     let runs = sweep::sample(&store, count, seed, &root, machine, &mut on_run, &mut go_on)?;
     if let Some(message) = different {
         return Err(Failure { code: 4, message });

@@ -136,6 +136,7 @@ fn announce(shared: &Shared, plan: &SweepPlan, path: &std::path::Path) {
         eprintln!("{}", describe(plan));
         for data in &plan.data {
             eprintln!("{}", data.description);
+            data.said.iter().for_each(|line| eprintln!("data: {line}"));
         }
         let first = plan.points.iter().position(|planned| planned.key.is_err());
         if let Some(first) = first

@@ -1,7 +1,7 @@
 //! A sweep file, checked.
 #![expect(clippy::disallowed_methods, reason = "the file the user named")]
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use super::filter::Filter;
 use super::row::RESULTS;
@@ -44,6 +44,8 @@ pub struct Sweep {
     pub text: String,
     /// Name and text of the experiment file; empty when there is none.
     pub experiment: [String; 2],
+    /// Folder of the sweep file: paths in it are relative to it.
+    pub folder: PathBuf,
     pub(super) filter: Filter,
 }
 
@@ -139,6 +141,7 @@ impl Sweep {
             base,
             text,
             experiment,
+            folder: Path::new(place).parent().map(PathBuf::from).unwrap_or_default(),
             filter,
         })
     }

@@ -166,9 +166,15 @@ fn resolve(
     point: &Point,
 ) -> Result<Config, config::ConfigError> {
     let axes = sweep.axes.iter().map(|axis| format!("axis `{}`", axis.name)).collect::<Vec<_>>();
-    let base = Overlay { place: "base", table: &sweep.base };
+    let anchored = |table: &toml::Table| {
+        let mut table = table.clone();
+        config::anchor(&mut table, &sweep.folder);
+        table
+    };
+    let (base, keys) = (anchored(&sweep.base), point.keys.iter().map(anchored).collect::<Vec<_>>());
+    let base = Overlay { place: "base", table: &base };
     let settings = settings.iter().map(|table| Overlay { place: "--set", table });
-    let axes = axes.iter().zip(&point.keys).map(|(place, table)| Overlay { place, table });
+    let axes = axes.iter().zip(&keys).map(|(place, table)| Overlay { place, table });
     let overlays: Vec<_> = std::iter::once(base).chain(settings).chain(axes).collect();
     let [name, text] = &sweep.experiment;
     let experiment = (!text.is_empty()).then_some((&**name, &**text));
