@@ -211,7 +211,8 @@ fn done(run: &str, outcome: &Trained) -> serde_json::Value {
 
 pub(super) fn eval(args: &EvalArgs) -> Done {
     let shared = &args.shared;
-    let (test, state_hash) = run::evaluate(&args.run, &args.moved.root(shared.data_root()), shared.machine()?)?;
+    let (test, state_hash) =
+        run::evaluate(&args.run, &args.moved.root(shared.data_root()), shared.machine()?)?;
     let TestOutcome::Classify(TestRecord { epoch, ref select, score, .. }) = test;
     if shared.json {
         say(&json!({
@@ -250,11 +251,16 @@ pub(super) fn verify(args: &VerifyArgs) -> Done {
     }
     let total = args.epochs.unwrap_or(0);
     let mut meter = Meter::new(shared.quiet || shared.json, total);
-    let verdict =
-        run::verify(&args.run, &args.moved.root(shared.data_root()), machine, args.epochs, &mut |progress| {
+    let verdict = run::verify(
+        &args.run,
+        &args.moved.root(shared.data_root()),
+        machine,
+        args.epochs,
+        &mut |progress| {
             meter.batch(progress);
             !stop.load(Ordering::SeqCst)
-        });
+        },
+    );
     meter.finish();
     match verdict? {
         Verdict::Same { epochs, state_hash, test, unchecked } => {

@@ -81,7 +81,10 @@ pub(super) fn resolve(data: &mut DataFile) -> Result<DataFile, ConfigError> {
             let (found, allowed) = match (format, known) {
                 (Some(format), _) => (
                     format!("is given beside data.format = \"{format}\""),
-                    format!("it belongs to files of the format {}; take it out", formats.join(", ")),
+                    format!(
+                        "it belongs to files of the format {}; take it out",
+                        formats.join(", ")
+                    ),
                 ),
                 (None, Some(known)) => (
                     "is given without data.format".into(),
@@ -116,7 +119,8 @@ fn own(data: &DataFile) -> Result<FileSet, ConfigError> {
         return missing("train", "give the file of training examples");
     };
     let mut found = [None, None, None];
-    for (place, (part, [file, labels, array, labels_array])) in parts(data).into_iter().enumerate() {
+    for (place, (part, [file, labels, array, labels_array])) in parts(data).into_iter().enumerate()
+    {
         // the arrays of a part lie in the training file, unless another is named
         let file = match (file, array) {
             (None, Some(_)) => Some(train),
@@ -126,7 +130,11 @@ fn own(data: &DataFile) -> Result<FileSet, ConfigError> {
             for (key, given) in [("labels", labels), ("labels_array", labels_array)] {
                 if given.is_some() {
                     let key = format!("data.{part}_{key}");
-                    let beside = if format == "npz" { format!(" or data.{part}_array") } else { String::new() };
+                    let beside = if format == "npz" {
+                        format!(" or data.{part}_array")
+                    } else {
+                        String::new()
+                    };
                     let allowed = format!("give data.{part}{beside} too, or take it out");
                     return Err(wrong(&key, format!("is given without data.{part}"), allowed));
                 }
@@ -242,7 +250,8 @@ fn seen_from(path: &str, folder: &Path) -> String {
     let (Some(path_whole), Some(folder)) = (whole(Path::new(path)), whole(folder)) else {
         return path.to_owned();
     };
-    let common = path_whole.components().zip(folder.components()).take_while(|(a, b)| a == b).count();
+    let common =
+        path_whole.components().zip(folder.components()).take_while(|(a, b)| a == b).count();
     let root = path_whole.components().take_while(|c| !matches!(c, Component::Normal(_))).count();
     if common <= root {
         return path_whole.display().to_string();

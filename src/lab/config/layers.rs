@@ -252,7 +252,10 @@ mod tests {
             (&["hw.write.dither_bits=0", "hw.write.dither=per_cell"], "hw.write.dither"),
             (&["data.label_column=last"], "data.label_column"),
             (&["data.format=csv", "data.train=a", "data.train_labels=b"], "data.train_labels"),
-            (&["data.format=idx", "data.test_labels=b"], "data.test_labels"),
+            (
+                &["data.format=idx", "data.train=a", "data.train_labels=b", "data.test_labels=b"],
+                "data.test_labels",
+            ),
             (&["data.format=idx", "data.labels_array=b"], "data.labels_array"),
         ] {
             let error = with(settings).unwrap_err().to_string();

@@ -114,7 +114,9 @@ pub fn one(part: PartName, names: &[String], which: usize) -> Option<String> {
     if let [single] = names {
         return Some(single.clone());
     }
-    let of = |whole: bool| pairs(part, whole).into_iter().map(|mut pair| std::mem::take(&mut pair[which]));
+    let of = |whole: bool| {
+        pairs(part, whole).into_iter().map(|mut pair| std::mem::take(&mut pair[which]))
+    };
     let there = |name: &String| names.contains(name);
     only(of(false).filter(there)).or_else(|| only(of(true).filter(there)))
 }
@@ -141,7 +143,14 @@ mod tests {
         assert_eq!(found(Train, &keras).unwrap(), "x_train y_train");
         assert_eq!(found(Test, &keras).unwrap(), "x_test y_test");
         assert_eq!(found(Validation, &keras), None);
-        let med = names(&["test_images", "test_labels", "train_images", "train_labels", "val_images", "val_labels"]);
+        let med = names(&[
+            "test_images",
+            "test_labels",
+            "train_images",
+            "train_labels",
+            "val_images",
+            "val_labels",
+        ]);
         assert_eq!(found(Validation, &med).unwrap(), "val_images val_labels");
         assert_eq!(found(Train, &names(&["x", "y"])).unwrap(), "x y");
         assert_eq!(found(Test, &names(&["arr_0", "arr_1"])).unwrap(), "arr_0 arr_1");

@@ -97,9 +97,8 @@ impl Layout {
     #[must_use]
     pub fn key(&self, at: usize) -> String {
         let alone = |name: &&String| self.names.iter().filter(|other| other == name).count() == 1;
-        let plain = |name: &&String| {
-            !name.is_empty() && matches!(name.parse(), Ok(ColumnKey::Named(_)))
-        };
+        let plain =
+            |name: &&String| !name.is_empty() && matches!(name.parse(), Ok(ColumnKey::Named(_)));
         self.names.get(at).filter(alone).filter(plain).map_or_else(|| at.to_string(), Clone::clone)
     }
 
@@ -230,7 +229,9 @@ fn by_places(
             if like.names.is_empty() == names.is_empty() {
                 // neither has names
             } else {
-                said.push("its columns are told by their places: not every part has a header".into());
+                said.push(
+                    "its columns are told by their places: not every part has a header".into(),
+                );
             }
             (like.ignored.clone(), vec![], like.label)
         }
@@ -244,7 +245,8 @@ fn by_places(
                 Some(key) => columns::place(key, columns, &names)?,
                 None => {
                     let (at, told) = columns::label(scan, &names, &ignored)?;
-                    let name = names.get(at).map_or_else(|| at.to_string(), |name| format!("`{name}`"));
+                    let name =
+                        names.get(at).map_or_else(|| at.to_string(), |name| format!("`{name}`"));
                     let place = match at {
                         0 => format!("the first of {columns}"),
                         at if at + 1 == columns => format!("the last of {columns}"),
@@ -275,8 +277,7 @@ fn leave_out(
     said: &mut Vec<String>,
 ) -> Result<(), CsvError> {
     for at in columns::unnamed(scan, names, ignored)? {
-        let what =
-            if scan.columns[at].present == 0 { "is empty" } else { "numbers the rows" };
+        let what = if scan.columns[at].present == 0 { "is empty" } else { "numbers the rows" };
         said.push(format!("column {at} has no name and {what}: it is left out"));
         ignored.push(at);
     }
@@ -303,7 +304,9 @@ fn by_names(
         }
         let mut found = names.iter().enumerate().filter(|(_, other)| **other == name);
         match (found.next(), found.next()) {
-            (Some((at, _)), None) if like.names.iter().filter(|n| **n == name).count() == 1 => Ok(at),
+            (Some((at, _)), None) if like.names.iter().filter(|n| **n == name).count() == 1 => {
+                Ok(at)
+            }
             (None, _) => Err(CsvError::Lacks { name, label }),
             _ => Err(CsvError::Twice { name }),
         }
@@ -337,14 +340,16 @@ fn range(
     }
     let columns = || layout.values.iter().map(|&at| (at, &scan.columns[at]));
     let first = |found: fn(&scan::Column) -> Option<&(u64, String)>| {
-        columns().filter_map(move |(at, column)| Some((at, found(column)?))).min_by_key(|(_, f)| f.0)
+        columns()
+            .filter_map(move |(at, column)| Some((at, found(column)?)))
+            .min_by_key(|(_, f)| f.0)
     };
     if let Some((at, (line, found))) = first(|column| column.text.as_ref()) {
         let key = layout.key(at);
-        let advice = if *line == 1 && !header {
-            "if the first line names the columns, say data.header = true".into()
-        } else if separator_is_comma_like(layout.separator, found) {
+        let advice = if separator_is_comma_like(layout.separator, found) {
             "for decimal commas separate the fields by semicolons".into()
+        } else if *line == 1 && !header {
+            "if the first line names the columns, say data.header = true".into()
         } else {
             format!(
                 "write numbers, or leave the column out with data.ignore_columns = [\"{key}\"]; if it is the label, \

@@ -60,7 +60,11 @@ fn a_table_that_says_nothing_is_told_by_names_text_and_ends() {
 fn an_index_without_a_name_is_left_out_and_said() {
     let table = with(",a,label\n0,7,1\n1,8,0\n2,9,1\n", &Reading::default(), None).unwrap();
     assert_eq!(seen(&table), (vec![7, 8, 9], words(&["1", "0", "1"])));
-    assert!(table.said[0].contains("column 0 has no name and numbers the rows"), "{:?}", table.said);
+    assert!(
+        table.said[0].contains("column 0 has no name and numbers the rows"),
+        "{:?}",
+        table.said
+    );
     let shuffled = with(",a,label\n71,7,1\n5,8,0\n31,9,1\n", &Reading::default(), None).unwrap();
     assert_eq!(shuffled.values, [7, 8, 9]);
     let error = with(",a,label\n1,7,1\n1,8,0\n2,9,1\n", &Reading::default(), None).unwrap_err();
@@ -121,8 +125,14 @@ fn every_kind_of_damage_says_where_and_what_to_do() {
     }
     for (text, wanted) in [
         ("1,5,0\n0,7,1\n1,5,0\n0,7,1\n", "column 0, column 2 may each be the label"),
-        ("a,b,c\n1,1,1\n2,2,2\n3,3,3\n4,4,4\n5,5,5\n", "neither the first (5 different values, 1 to 5)"),
-        ("a,b,c\nx,y,1\nz,w,2\n", "`a`, `b` may each be the label; say which with data.label_column"),
+        (
+            "a,b,c\n1,1,1\n2,2,2\n3,3,3\n4,4,4\n5,5,5\n",
+            "neither the first (5 different values, 1 to 5)",
+        ),
+        (
+            "a,b,c\nx,y,1\nz,w,2\n",
+            "`a`, `b` may each be the label; say which with data.label_column",
+        ),
         ("class,label,c\n1,1,1\n0,0,2\n", "`class`, `label` may each"),
         ("label\tclass\n1\t1\n", "may each be the label"),
     ] {
@@ -131,7 +141,10 @@ fn every_kind_of_damage_says_where_and_what_to_do() {
     }
     let rows: String = (0..9).map(|row| format!("{row},{},{}\n", row * 3, row % 2)).collect();
     let found = with(&format!("id,a,label\n{rows}"), &Reading::default(), None).unwrap_err();
-    assert!(found.contains("column 0 (`id`) numbers the rows") && found.contains("[\"id\"]"), "{found}");
+    assert!(
+        found.contains("column 0 (`id`) numbers the rows") && found.contains("[\"id\"]"),
+        "{found}"
+    );
     let keep = Reading { ignore: Some(vec![]), ..Reading::default() };
     assert_eq!(with(&format!("id,a,label\n{rows}"), &keep, None).unwrap().features, 2);
 }

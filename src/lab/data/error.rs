@@ -186,16 +186,16 @@ pub enum DataError {
         /// A full scale that joins them.
         full_scale: u8,
     },
-    /// Values that are all the same.
+    /// Examples that are all the same.
     #[error(
-        "{path}: every training value is {found}, so there is nothing to learn from; check the file and what is read \
-         of it", path = .path.display()
+        "{path}: all {examples} training examples have the same values, so there is nothing to learn from; check the \
+         file and what is read of it", path = .path.display()
     )]
     Constant {
         /// The training file.
         path: PathBuf,
-        /// The value.
-        found: u8,
+        /// How many there are.
+        examples: usize,
     },
     /// A class that lost its training examples to the parts that were cut off.
     #[error(
@@ -245,7 +245,9 @@ pub enum DataError {
         there: Vec<String>,
     },
     /// A column to be left out that no table has.
-    #[error("no table has the column `{name}` that data.ignore_columns leaves out; mend the name or take it out")]
+    #[error(
+        "no table has the column `{name}` that data.ignore_columns leaves out; mend the name or take it out"
+    )]
     NoColumn {
         /// Its name.
         name: String,
@@ -281,7 +283,9 @@ pub enum DataError {
         source: ExamplesError,
     },
     /// A full scale of 0.
-    #[error("`data.full_scale` is 0, allowed are 1 to 255; leave it out to take the greatest value")]
+    #[error(
+        "`data.full_scale` is 0, allowed are 1 to 255; leave it out to take the greatest value"
+    )]
     FullScale,
     /// A number of classes that bytes cannot number.
     #[error("`data.classes` is {found}, allowed are 2 to 256; leave it out to count the labels")]

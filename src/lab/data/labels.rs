@@ -212,7 +212,8 @@ pub fn classes(
     let (least, greatest) = (all.first(), all.last());
     let found = all.len();
     let plain = |n: usize| {
-        let below = |l: &Label| matches!(l, Label::Number(x) if usize::try_from(*x).is_ok_and(|x| x < n));
+        let below =
+            |l: &Label| matches!(l, Label::Number(x) if usize::try_from(*x).is_ok_and(|x| x < n));
         all.iter().all(below)
     };
     let (count, numbers) = match stated {
@@ -300,12 +301,18 @@ mod tests {
         assert_eq!((plain.count, &plain.labels[0][..]), (2, &[1, 0, 1, 0][..]));
         assert!(plain.names.is_empty());
         let signed = two(numbers(&[1, -1, 1, -1]));
-        assert_eq!((&signed.labels[0][..], &signed.names[..]), (&[1, 0, 1, 0][..], &["-1".to_owned(), "1".to_owned()][..]));
+        assert_eq!(
+            (&signed.labels[0][..], &signed.names[..]),
+            (&[1, 0, 1, 0][..], &["-1".to_owned(), "1".to_owned()][..])
+        );
         let gaps = two(numbers(&[10, 9, 30, 30, 9, 10]));
         assert_eq!(gaps.labels[0], [1, 0, 2, 2, 0, 1]);
         assert_eq!(gaps.names, ["9", "10", "30"]);
         let text = two(words(&["dog", "cat", "dog", "cat"]));
-        assert_eq!((&text.labels[1][..], text.names), (&[1, 0, 1, 0][..], vec!["cat".to_owned(), "dog".into()]));
+        assert_eq!(
+            (&text.labels[1][..], text.names),
+            (&[1, 0, 1, 0][..], vec!["cat".to_owned(), "dog".into()])
+        );
     }
 
     #[test]

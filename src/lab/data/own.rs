@@ -7,6 +7,7 @@
 //! All parts have one scale, one set of classes ([`super::labels`]) and the same values an example; no two parts are the
 //! same. What was told from the files and not stated is said, and goes into the resolved configuration as [`Told`].
 
+use std::collections::BTreeSet;
 use std::path::Path;
 
 mod parts;
@@ -17,7 +18,7 @@ use super::error::DataError;
 use super::labels::{self, Classes, Labels};
 use super::load::{Data, finish};
 use super::numbers::NumberKind;
-use super::source::{FileSet, ImageShape, PartFile};
+use super::source::{FileSet, ImageShape};
 use crate::task::classify::{Examples, Split};
 
 const TEST_EVERY: usize = 6;
@@ -72,6 +73,7 @@ pub(crate) fn load(files: &FileSet) -> Result<Data, DataError> {
     }
     let (told, mut said) = reader.told()?;
 
+    different(&parts)?;
     let full_scale = scales(&parts, files.full_scale)?;
     let of: Vec<(&'static str, &Labels)> =
         parts.iter().map(|(name, part)| (name.word(), &part.labels)).collect();
@@ -112,18 +114,18 @@ pub(crate) fn load(files: &FileSet) -> Result<Data, DataError> {
             cut(&mut train, VALIDATION_EVERY, PartName::Validation, path)?
         }
     };
-    let first = train.all_values().first().copied().unwrap_or(0);
-    if train.all_values().iter().all(|&value| value == first) {
-        return Err(DataError::Constant { path: path.to_owned(), found: first });
+    if (1..train.len()).all(|e| train.values(e) == train.values(0)) {
+        return Err(DataError::Constant { path: path.to_owned(), examples: train.len() });
     }
     let split = Split { train, validation, test };
-    different(&split)?;
+    said.extend(known(&split, cut_test));
     let class = |class: usize| names.get(class).cloned().unwrap_or_else(|| class.to_string());
     said.extend(missing(&split, count, &class));
     if files.classes.is_none()
         && let Some(at) = (0..count).find(|&at| !has(&split.train, at))
     {
-        let part = if cut_test && has(&split.test, at) { PartName::Test } else { PartName::Validation };
+        let part =
+            if cut_test && has(&split.test, at) { PartName::Test } else { PartName::Validation };
         let (path, class, part) = (path.to_owned(), class(at), part.key());
         return Err(DataError::Thin { path, class, part, classes: count });
     }
@@ -183,7 +185,8 @@ fn has(part: &Examples, class: usize) -> bool {
 
 /// Which part has no example of which class.
 fn missing(split: &Split, classes: usize, name: &dyn Fn(usize) -> String) -> Vec<String> {
-    let parts = [("training", &split.train), ("validation", &split.validation), ("test", &split.test)];
+    let parts =
+        [("training", &split.train), ("validation", &split.validation), ("test", &split.test)];
     let said = parts.into_iter().filter_map(|(part, examples)| {
         let missing: Vec<usize> = (0..classes).filter(|&class| !has(examples, class)).collect();
         let some: Vec<_> = missing.iter().take(NAMED).map(|&class| name(class)).collect();
@@ -196,15 +199,11 @@ fn missing(split: &Split, classes: usize, name: &dyn Fn(usize) -> String) -> Vec
 }
 
 /// Refuses parts that hold the same examples.
-fn different(split: &Split) -> Result<(), DataError> {
-    let parts = [
-        (PartName::Train, &split.train),
-        (PartName::Validation, &split.validation),
-        (PartName::Test, &split.test),
-    ];
+fn different(parts: &[(PartName, OwnPart)]) -> Result<(), DataError> {
     for (at, (one, first)) in parts.iter().enumerate() {
         for (other, second) in &parts[at + 1..] {
-            if first.len() > 1 && first == second {
+            let same = first.values == second.values && first.labels == second.labels;
+            if same && first.labels.of.len() > 1 {
                 return Err(DataError::SamePart {
                     one: one.word(),
                     other: other.word(),
@@ -215,6 +214,17 @@ fn different(split: &Split) -> Result<(), DataError> {
         }
     }
     Ok(())
+}
+
+/// Whether every test example is one that is learnt from, where that part has a file of its own.
+fn known(split: &Split, cut_test: bool) -> Option<String> {
+    let Split { train, test, .. } = split;
+    if cut_test || test.is_empty() {
+        return None;
+    }
+    let learnt: BTreeSet<&[u8]> = (0..train.len()).map(|e| train.values(e)).collect();
+    let all = (0..test.len()).all(|e| learnt.contains(test.values(e)));
+    all.then(|| format!("every one of the {} test examples is a training example too", test.len()))
 }
 
 /// Takes every `every`-th example out of `from`.

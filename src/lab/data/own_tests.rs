@@ -8,7 +8,7 @@ use super::*;
 use crate::lab::data::csv::Reading;
 use crate::lab::data::{
     npy::tests::file as npy,
-    source::{DataRoot, Source},
+    source::{DataRoot, PartFile, Source},
 };
 
 struct Files(tempfile::TempDir);
@@ -68,7 +68,7 @@ fn loaded(files: FileSet) -> Result<Data, String> {
 }
 
 fn rows(count: u8) -> String {
-    (0..count).map(|e| format!("{},{e},{}\n", e / 12, 2 * e)).collect()
+    (0..count).map(|e| format!("{},{},{}\n", e / 12, e + 2, 2 * e)).collect()
 }
 
 #[test]
@@ -78,8 +78,8 @@ fn one_table_is_cut_evenly_even_when_sorted_by_class() {
     let Split { train, validation, test } = &set.split;
     assert_eq!((train.len(), validation.len(), test.len()), (28, 2, 6));
     assert_eq!(test.labels(), [0, 0, 1, 1, 2, 2]);
-    assert_eq!((test.values(0), train.full_scale(), train.classes()), (&[5, 10][..], 70, 3));
-    assert_eq!(validation.values(0), [13, 26]);
+    assert_eq!((test.values(0), train.full_scale(), train.classes()), (&[7, 10][..], 70, 3));
+    assert_eq!(validation.values(0), [15, 26]);
     assert!(set.description.ends_with(
         "all.csv: 28 training, 2 validation, 6 test examples of 2 values 0 to 70, 3 classes; test is \
          every 6th example of the file; validation is every 12th example of the training part"
@@ -134,8 +134,8 @@ fn every_mistake_names_the_file_and_the_way_out() {
         (only(folder), "cannot read", "directory"),
         (
             FileSet { test: other("narrow.csv", "0,1\n"), ..only(train()) },
-            "narrow.csv has 1 values",
-            "has 2",
+            "narrow.csv has 2 columns",
+            "the training part has 3",
         ),
         (
             FileSet { test: other("bright.csv", "0,1,99\n"), ..only(train()) },
@@ -147,21 +147,48 @@ fn every_mistake_names_the_file_and_the_way_out() {
         (FileSet { classes: Some(257), ..only(train()) }, "`data.classes` is 257", "2 to 256"),
         (FileSet { full_scale: Some(0), ..only(train()) }, "`data.full_scale` is 0", "1 to 255"),
         (FileSet { image, ..only(train()) }, "3 x 3 x 1", "examples of 2 values"),
-        (only(files.csv("few.csv", "0,1\n1,2\n0,3\n1,4\n0,5\n")), "few.csv has 5 examples", "at least 6"),
-        (only(files.csv("bad.csv", "0,x1\n0,1\n0\n")), "bad.csv line 3 has 1 fields", "complete the line"),
-        (only(files.idx("i", &[3, 1], &[0; 3], &[0; 2])), "shape [2]", "3 examples need"),
-        (only(files.idx("j", &[3], &[0; 3], &[0; 3])), "all 3 labels are `0`", "nothing to tell apart"),
-        (FileSet { test: Some(train()), ..only(train()) }, "training and the test part are the same examples", "take data.test out"),
-        (FileSet { test: other("dark.csv", "0,1,0\n1,0,1\n"), ..only(train()) }, "two scales", "data.full_scale = 70"),
-        (FileSet { test: other("new.csv", "7,1,40\n"), ..only(train()) }, "the label `7`", "data.classes = 4"),
         (
-            only(files.csv("thin.csv", "0,1\n0,2\n1,3\n1,4\n1,5\n2,6\n0,7\n0,8\n1,9\n1,5\n1,5\n2,6\n0,7\n0,8\n0,9\n")),
+            only(files.csv("few.csv", "0,7\n1,2\n0,3\n1,4\n0,5\n")),
+            "few.csv has 5 examples",
+            "at least 6",
+        ),
+        (
+            only(files.csv("bad.csv", "0,x1\n0,1\n0\n")),
+            "bad.csv line 3 has 1 fields",
+            "complete the line",
+        ),
+        (only(files.idx("i", &[3, 1], &[0; 3], &[0; 2])), "shape [2]", "3 examples need"),
+        (
+            only(files.idx("j", &[3], &[0; 3], &[0; 3])),
+            "all 3 labels are `0`",
+            "nothing to tell apart",
+        ),
+        (
+            FileSet { test: Some(train()), ..only(train()) },
+            "training and the test part are the same examples",
+            "take data.test out",
+        ),
+        (
+            FileSet { test: other("dark.csv", "0,1,0\n1,0,1\n"), ..only(train()) },
+            "two scales",
+            "data.full_scale = 70",
+        ),
+        (
+            FileSet { test: other("new.csv", "7,1,40\n"), ..only(train()) },
+            "the label `7`",
+            "data.classes = 4",
+        ),
+        (
+            only(files.csv(
+                "thin.csv",
+                "0,5\n0,2\n1,3\n1,4\n1,5\n2,6\n0,7\n0,8\n1,9\n1,5\n1,5\n2,6\n0,7\n0,8\n0,9\n",
+            )),
             "the class `2` has too few examples",
             "data.classes = 3",
         ),
         (
             only(files.csv("flat.csv", &"0,9\n1,9\n".repeat(12))),
-            "every training value is 9",
+            "training examples have the same values",
             "check the file",
         ),
     ];
@@ -195,7 +222,10 @@ fn the_arrays_of_known_archives_are_the_parts_they_name() {
         labels: None,
     };
     let set = loaded(only(npz(&path))).unwrap();
-    assert_eq!((set.split.train.len(), set.split.validation.len(), set.split.test.len()), (22, 2, 6));
+    assert_eq!(
+        (set.split.train.len(), set.split.validation.len(), set.split.test.len()),
+        (22, 2, 6)
+    );
     assert_eq!(set.split.test.values(0), [30, 31]);
     assert_eq!(set.told.in_training_file, [false, false, true]);
     assert!(set.said[0].contains("training examples are array `x_train`"), "{:?}", set.said);
@@ -208,10 +238,8 @@ fn the_arrays_of_known_archives_are_the_parts_they_name() {
         values: Some(values.into()),
         labels: Some(labels.into()),
     };
-    let twice = FileSet {
-        test: Some(named("x_train", "y_train")),
-        ..only(named("x_train", "y_train"))
-    };
+    let twice =
+        FileSet { test: Some(named("x_train", "y_train")), ..only(named("x_train", "y_train")) };
     let error = loaded(twice).unwrap_err();
     assert!(error.contains("the same examples") && error.contains("data.test_array"), "{error}");
 }

@@ -223,7 +223,12 @@ impl FileSet {
     pub(crate) fn moved(&self, place: &Path) -> Result<Self, DataError> {
         let mut set = self.clone();
         let mut paths: Vec<&mut PathBuf> = set.train.paths_mut();
-        paths.extend([&mut set.validation, &mut set.test].into_iter().flatten().flat_map(PartFile::paths_mut));
+        paths.extend(
+            [&mut set.validation, &mut set.test]
+                .into_iter()
+                .flatten()
+                .flat_map(PartFile::paths_mut),
+        );
         let name = |path: &Path| path.file_name().map(PathBuf::from).unwrap_or_default();
         let folder = place.is_dir();
         let mut names: Vec<PathBuf> = paths.iter().map(|path| (**path).clone()).collect();

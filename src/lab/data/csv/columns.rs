@@ -66,7 +66,7 @@ pub(super) fn header(
     if counts && numbers.len() >= COUNTED {
         return Ok((true, true));
     }
-    if counts && numbers.len() == first.len() {
+    if counts && numbers.len() == first.len() && like.is_none() {
         return Err(CsvError::Doubt { found: super::list(first.iter().map(|f| super::shown(f))) });
     }
     Ok((false, false))
@@ -92,11 +92,7 @@ pub(super) fn places(
 }
 
 /// The place of the column that `key` names.
-pub(super) fn place(
-    key: &ColumnKey,
-    columns: usize,
-    names: &[String],
-) -> Result<usize, CsvError> {
+pub(super) fn place(key: &ColumnKey, columns: usize, names: &[String]) -> Result<usize, CsvError> {
     let missing = |there| CsvError::Column { wanted: key.clone(), there };
     match key {
         ColumnKey::First => Ok(0),
@@ -104,9 +100,7 @@ pub(super) fn place(
         ColumnKey::Number(at) => {
             let named = names.iter().position(|name| *name == at.to_string());
             match named {
-                Some(named) if named != *at => {
-                    Err(CsvError::TwoMeanings { number: *at, named })
-                }
+                Some(named) if named != *at => Err(CsvError::TwoMeanings { number: *at, named }),
                 _ if *at < columns => Ok(*at),
                 _ => Err(missing(format!("there are 0 to {}", columns - 1))),
             }

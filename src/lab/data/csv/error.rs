@@ -14,36 +14,37 @@ pub enum CsvError {
         "line {line} has the single field `{found}`, but needs a label and at least one value; separate them by \
          commas, semicolons, tabs or bars"
     )]
-    Narrow { 
+    Narrow {
         /// Line, counted from 1.
-        line: u64, 
+        line: u64,
         /// Start of the field.
-        found: String },
+        found: String,
+    },
     /// A line of another length than the first.
     #[error(
         "line {line} has {found} fields, but the lines before it have {wanted}; complete the line (a header that \
          leaves out the column of row names: write the table without them, index=False or row.names=FALSE)"
     )]
-    Ragged { 
+    Ragged {
         /// Line.
-        line: u64, 
+        line: u64,
         /// Fields found.
-        found: usize, 
+        found: usize,
         /// Fields of the first.
-        wanted: usize },
+        wanted: usize,
+    },
     /// A value that is no number.
     #[error("line {line}, column {column} holds `{found}`, which is no number; {advice}")]
     Field {
-        
         /// Line.
         line: u64,
-        
+
         /// Column, by name or number.
         column: String,
-        
+
         /// Start of the field.
         found: String,
-        
+
         /// What to try.
         advice: String,
     },
@@ -53,16 +54,15 @@ pub enum CsvError {
         if *.trailing { " (a separator at the end of every line makes an empty column)" } else { "" }
     )]
     Missing {
-        
         /// Line.
         line: u64,
-        
+
         /// Column.
         column: String,
-        
+
         /// What stands there.
         found: String,
-        
+
         /// Whether the column is the last and empty.
         trailing: bool,
     },
@@ -71,103 +71,117 @@ pub enum CsvError {
         "line {line}, column {column} holds the label `{found}`: a class is a whole number or a word; if this is a \
          measurement, name another column with data.label_column"
     )]
-    Fraction { 
+    Fraction {
         /// Line.
-        line: u64, 
+        line: u64,
         /// Column.
-        column: String, 
+        column: String,
         /// The label.
-        found: String },
+        found: String,
+    },
     /// A column that is not there.
     #[error("has no column `{wanted}`; {there}")]
-    Column { 
+    Column {
         /// Column asked for.
-        wanted: ColumnKey, 
+        wanted: ColumnKey,
         /// What there is instead.
-        there: String },
+        there: String,
+    },
     /// A number that is a name elsewhere.
     #[error(
         "column `{number}` may mean column {number} or the one that is called `{number}`, column {named}; give the \
          header other names"
     )]
-    TwoMeanings { 
+    TwoMeanings {
         /// The number.
-        number: usize, 
+        number: usize,
         /// Column of that name.
-        named: usize },
+        named: usize,
+    },
     /// A name that two columns have.
     #[error("has two columns `{name}`; give them different names")]
-    Twice { 
+    Twice {
         /// The name.
-        name: String },
+        name: String,
+    },
     /// A column without a name that is no index.
     #[error(
         "column {column} has no name and does not number the rows; name it in the first line, or leave it out with \
          data.ignore_columns = [\"{column}\"]"
     )]
-    Unnamed { 
+    Unnamed {
         /// The column.
-        column: usize },
+        column: usize,
+    },
     /// Several columns that may be the label.
     #[error("{found} may each be the label; say which with data.label_column, such as data.label_column = \"{}\"",
         .example.trim_start_matches("column ").trim_matches('`'))]
-    Several { 
+    Several {
         /// The columns.
-        found: String, 
+        found: String,
         /// The first of them.
-        example: String },
+        example: String,
+    },
     /// No column that may be the label.
     #[error(
         "no column is called label, class or target, and neither the first ({first}) nor the last ({last}) looks like \
          one; say which is the label with data.label_column"
     )]
-    NoLabel { 
+    NoLabel {
         /// What the first holds.
-        first: String, 
+        first: String,
         /// What the last holds.
-        last: String },
+        last: String,
+    },
     /// A first line that may be a header or an example.
     #[error(
         "the first line ({found}) may be a header or an example; say data.header = true or data.header = false"
     )]
-    Doubt { 
+    Doubt {
         /// The line.
-        found: String },
+        found: String,
+    },
     /// A column that numbers the rows.
     #[error(
         "column {column} numbers the rows, which is no value to learn from; leave it out with \
          data.ignore_columns = [\"{key}\"], or keep it with data.ignore_columns = []"
     )]
-    RowNumber { 
+    RowNumber {
         /// The column.
-        column: String, 
+        column: String,
         /// Its name.
-        key: String },
+        key: String,
+    },
     /// A column of the training part that this part lacks.
     #[error(
         "has no column `{name}`, which the training part {}; all parts need the same columns, in any order",
         if *.label { "has as label (a part without labels cannot be scored)" } else { "has" }
     )]
-    Lacks { 
+    Lacks {
         /// The column.
-        name: String, 
+        name: String,
         /// Whether it is the label.
-        label: bool },
+        label: bool,
+    },
     /// A column that the training part lacks.
     #[error(
         "has the column `{name}`, which the training part lacks; leave it out with data.ignore_columns = [\"{name}\"]"
     )]
-    Extra { 
+    Extra {
         /// The column.
-        name: String },
+        name: String,
+    },
     /// Another number of columns than the training part, and no names to tell them by.
-    #[error("has {found} columns, but the training part has {wanted}, and not both have a header to tell them by; \
-        write all parts alike")]
-    Width { 
+    #[error(
+        "has {found} columns, but the training part has {wanted}, and not both have a header to tell them by; \
+        write all parts alike"
+    )]
+    Width {
         /// Columns.
-        found: usize, 
+        found: usize,
         /// Of the training part.
-        wanted: usize },
+        wanted: usize,
+    },
     /// Every column is left out or the label.
     #[error("has no column of values beside the label; nothing is left to learn from")]
     NoValues,
@@ -181,17 +195,20 @@ pub enum CsvError {
     #[error("holds zero bytes, so it is no text, or UTF-16 without a mark; save it as UTF-8")]
     Binary,
     /// A zip archive.
-    #[error("is a zip archive, such as a spreadsheet (.xlsx); save it as CSV in UTF-8, or with data.format = \"npz\" \
-        if it holds arrays")]
+    #[error(
+        "is a zip archive, such as a spreadsheet (.xlsx); save it as CSV in UTF-8, or with data.format = \"npz\" \
+        if it holds arrays"
+    )]
     Spreadsheet,
     /// A broken gzip file.
     #[error("{0} while unpacking; the file is cut short or corrupt, so get it again")]
     Gzip(std::io::Error),
     /// A gzip file of too much.
     #[error("unpacks to more than the {limit} bytes allowed; cut it into parts")]
-    Large { 
+    Large {
         /// Most bytes.
-        limit: u64 },
+        limit: u64,
+    },
     /// A line that the CSV reader refuses.
     #[error("is not CSV: {0}")]
     Format(#[from] ::csv::Error),

@@ -247,7 +247,10 @@ mod tests {
         assert_eq!((seen.rows, &ends[..2]), (2, &[[1.0, 2.0], [5.0, 7.5]][..]));
         assert!(seen.columns[0].steady && seen.columns[1].again && !seen.columns[1].steady);
         seen.take_first(false);
-        assert_eq!((seen.rows, seen.columns[0].ends, seen.columns[0].start), (3, [0.0, 2.0], Some(0.0)));
+        assert_eq!(
+            (seen.rows, seen.columns[0].ends, seen.columns[0].start),
+            (3, [0.0, 2.0], Some(0.0))
+        );
         assert!(seen.columns[0].steady && seen.columns[2].text == Some((1, "a".into())));
     }
 }

@@ -13,7 +13,7 @@ use crate::lab::data::inflate::{content, is_gzip, read_up_to};
 /// Lines looked at to find the separator.
 const LINES: usize = 20;
 /// Separators, the least likely to stand inside a field first.
-pub const SEPARATORS: [u8; 4] = [b'\t', b'|', b';', b','];
+const SEPARATORS: [u8; 4] = [b'\t', b'|', b';', b','];
 
 /// The text in `bytes`, of at most `limit` bytes, without a mark.
 pub(super) fn decode(bytes: &[u8], limit: u64) -> Result<Cow<'_, [u8]>, CsvError> {
@@ -46,9 +46,7 @@ pub(super) fn decode(bytes: &[u8], limit: u64) -> Result<Cow<'_, [u8]>, CsvError
         return Err(CsvError::Binary);
     }
     Ok(match bytes {
-        Cow::Borrowed(bytes) => {
-            Cow::Borrowed(bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes))
-        }
+        Cow::Borrowed(bytes) => Cow::Borrowed(bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes)),
         Cow::Owned(bytes) => match bytes.strip_prefix(b"\xef\xbb\xbf") {
             Some(text) => Cow::Owned(text.to_vec()),
             None => Cow::Owned(bytes),
@@ -87,7 +85,8 @@ pub(super) fn separator(text: &[u8]) -> u8 {
     if empty && lines.len() > 1 {
         lines.pop();
     }
-    let even = |at: &usize| lines[0][*at] > 0 && lines.iter().all(|line| line[*at] == lines[0][*at]);
+    let even =
+        |at: &usize| lines[0][*at] > 0 && lines.iter().all(|line| line[*at] == lines[0][*at]);
     let all = || 0..SEPARATORS.len();
     let most = || all().max_by_key(|&at| (lines[0][at], at)).unwrap_or(SEPARATORS.len() - 1);
     SEPARATORS[all().find(even).unwrap_or_else(most)]
@@ -101,7 +100,8 @@ mod tests {
 
     #[test]
     fn marks_utf16_and_gzip_are_taken_off() {
-        let text = |bytes: &[u8]| decode(bytes, 100).map(Cow::into_owned).map_err(|e| e.to_string());
+        let text =
+            |bytes: &[u8]| decode(bytes, 100).map(Cow::into_owned).map_err(|e| e.to_string());
         let utf16 = |mark: [u8; 2], to: fn(u16) -> [u8; 2]| {
             let mut bytes = mark.to_vec();
             bytes.extend("a,é\n".encode_utf16().flat_map(to));

@@ -111,7 +111,8 @@ impl<'a> Reader<'a> {
             }
             return Ok([values.clone(), labels.clone()]);
         }
-        let wrong = |path: &Path, what, there| DataError::Arrays { path: path.into(), part, what, there };
+        let wrong =
+            |path: &Path, what, there| DataError::Arrays { path: path.into(), part, what, there };
         let names = self.names(path)?;
         let found = match labels_path {
             Some(labels_path) => {
@@ -161,7 +162,9 @@ impl<'a> Reader<'a> {
                 if array.range.whole_floats() {
                     let top = array.range.greatest();
                     let word = name.word();
-                    let line = format!("the {word} values are floats without fractions, read as whole numbers 0 to {top}");
+                    let line = format!(
+                        "the {word} values are floats without fractions, read as whole numbers 0 to {top}"
+                    );
                     self.said.push(line);
                 }
                 let labels_path = labels_path.as_ref().unwrap_or(path);
@@ -190,12 +193,16 @@ impl<'a> Reader<'a> {
         let table = csv::read(&bytes, reading, like, self.scale, FILE_BYTES_MAX)
             .map_err(|source| DataError::Csv { path: path.to_owned(), source })?;
         let csv::CsvTable { features, values, labels, range, kind, layout, said } = table;
-        let of = |line: String| if name == PartName::Train { line } else { format!("{}: {line}", name.word()) };
+        let of = |line: String| {
+            if name == PartName::Train { line } else { format!("{}: {line}", name.word()) }
+        };
         self.said.extend(said.into_iter().map(of));
         if range.whole_floats() {
             let top = range.greatest();
             let word = name.word();
-            self.said.push(format!("the {word} values are floats without fractions, read as whole numbers 0 to {top}"));
+            self.said.push(format!(
+                "the {word} values are floats without fractions, read as whole numbers 0 to {top}"
+            ));
         }
         self.tables.push((name, layout));
         let path = path.to_owned();
@@ -244,12 +251,13 @@ fn same_file(one: &Path, other: &Path) -> bool {
 fn apart(parts: &[Option<PartFile>; 3]) -> Result<(), DataError> {
     // the places of examples and of labels: file and array
     let places = |part: &PartFile| -> BTreeMap<&'static str, (PathBuf, String)> {
-        let at = |path: &Path, name: &Option<String>| (path.to_owned(), name.clone().unwrap_or_default());
+        let at = |path: &Path, name: &Option<String>| {
+            (path.to_owned(), name.clone().unwrap_or_default())
+        };
         match part {
-            PartFile::Idx { values, labels } => BTreeMap::from([
-                ("examples", at(values, &None)),
-                ("labels", at(labels, &None)),
-            ]),
+            PartFile::Idx { values, labels } => {
+                BTreeMap::from([("examples", at(values, &None)), ("labels", at(labels, &None))])
+            }
             PartFile::Npz { path, labels_path, values, labels } => BTreeMap::from([
                 ("examples", at(path, values)),
                 ("labels", at(labels_path.as_ref().unwrap_or(path), labels)),
@@ -269,7 +277,8 @@ fn apart(parts: &[Option<PartFile>; 3]) -> Result<(), DataError> {
                     array == array_two && same_file(path, path_two)
                 });
                 if same {
-                    let array = if array.is_empty() { String::new() } else { format!(", array `{array}`") };
+                    let array =
+                        if array.is_empty() { String::new() } else { format!(", array `{array}`") };
                     return Err(DataError::SamePart {
                         one: one.word(),
                         other: other.word(),
