@@ -8,6 +8,7 @@ use super::{Config, ConfigError};
 use crate::lab::data::csv::{self, Reading};
 use crate::lab::data::{self, Data, DataError, DataRoot, FileSet, PartFile, Source, Told};
 
+const MISSING: &str = "is missing";
 const ANY: &[&str] = &["idx", "npz", "csv"];
 const ARRAYS: &[&str] = &["npz"];
 const WITH_LABEL_FILES: &[&str] = &["idx", "npz"];
@@ -106,7 +107,11 @@ pub(super) fn resolve(data: &mut DataFile) -> Result<DataFile, ConfigError> {
             let allowed = "name a set or files, not both";
             return Err(wrong("data.format", "is given beside data.set", allowed));
         }
-        own(data)?;
+        match own(data) {
+            // what is missing is told when it is needed
+            Err(ConfigError::Value { found, .. }) if found == MISSING => {}
+            files => drop(files?),
+        }
     }
     Ok(data.clone())
 }
@@ -114,7 +119,15 @@ pub(super) fn resolve(data: &mut DataFile) -> Result<DataFile, ConfigError> {
 /// The files of `[data]`, whose format is a known one.
 fn own(data: &DataFile) -> Result<FileSet, ConfigError> {
     let format = data.format.as_deref().unwrap_or_default();
-    let missing = |key: &str, why: &str| Err(wrong(&format!("data.{key}"), "is missing", why));
+    let missing = |key: &str, why: &str| Err(wrong(&format!("data.{key}"), MISSING, why));
+    if data.full_scale == Some(0) {
+        let allowed = "allowed are 1 to 255; leave it out to take the greatest value";
+        return Err(wrong("data.full_scale", "is 0", allowed));
+    }
+    if let Some(found) = data.classes.filter(|n| !(2..=256).contains(n)) {
+        let allowed = "allowed are 2 to 256; leave it out to count the labels";
+        return Err(wrong("data.classes", format!("is {found}"), allowed));
+    }
     let Some(train) = &data.train else {
         return missing("train", "give the file of training examples");
     };
