@@ -19,6 +19,7 @@ mod laws;
 mod oracle;
 mod output;
 mod own_data;
+mod own_runs;
 mod program;
 mod report;
 mod rules;

@@ -118,6 +118,7 @@ fn every_kind_of_damage_says_where_and_what_to_do() {
         ("b,b\n1,2\n", "b", "two columns `b`"),
         ("a,0\n1,2\n", "0", "column `0` may mean column 0 or the one that is called `0`"),
         ("1,2\n3,4\n", "last", "say data.header = true or data.header = false"),
+        ("?,7,1\n5,8,0\n", "last", "the first line (?, 7, 1) may be a header or an example"),
     ];
     for (text, label, wanted) in cases {
         let found = labelled(text, label).unwrap_err();

@@ -83,6 +83,15 @@ pub enum DataError {
         /// Why it failed.
         source: io::Error,
     },
+    /// A file of one's own that is not there.
+    #[error(
+        "cannot open {path}: there is no such file; check the path, which in a file is relative to that file (of a run, \
+         --data says where its data are now)", path = .path.display()
+    )]
+    NotThere {
+        /// The file.
+        path: PathBuf,
+    },
     /// A file too large to be read.
     #[error("{path} has {found} bytes, allowed are {limit}; cut it into parts", path = .path.display())]
     TooLarge {
@@ -356,9 +365,7 @@ fn advice(error: &io::Error) -> &'static str {
         io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded => {
             "; make room or choose another data folder"
         }
-        io::ErrorKind::NotFound => {
-            "; check the path: those in a file are relative to that file (of a run, --data says where its data are now)"
-        }
+        io::ErrorKind::NotFound => "; check the path",
         io::ErrorKind::PermissionDenied => "; check the permissions or choose another data folder",
         _ => "",
     }

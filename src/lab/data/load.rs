@@ -250,7 +250,12 @@ fn checked(entry: &CatalogEntry, file: &CatalogFile, path: &Path) -> Result<Vec<
 
 /// Reads a whole file of the user's own.
 pub(crate) fn read_own(path: &Path) -> Result<Vec<u8>, DataError> {
-    read_file(path, FILE_BYTES_MAX)
+    match read_file(path, FILE_BYTES_MAX) {
+        Err(DataError::Io { source, .. }) if source.kind() == io::ErrorKind::NotFound => {
+            Err(DataError::NotThere { path: path.to_owned() })
+        }
+        read => read,
+    }
 }
 
 fn read_file(path: &Path, limit: u64) -> Result<Vec<u8>, DataError> {

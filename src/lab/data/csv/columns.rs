@@ -53,23 +53,26 @@ pub(super) fn header(
     if !kinds.iter().any(number) {
         return Ok((true, false));
     }
-    let below = kinds.iter().zip(&scan.columns);
-    if below.clone().any(|(kind, column)| !number(kind) && column.numeric()) {
-        return Ok((true, false));
-    }
     let label = |(bytes, column): (&Vec<u8>, &Column)| is_label_name(bytes) && !column.again;
     if first.iter().zip(&scan.columns).any(label) {
         return Ok((true, false));
     }
-    let counts = numbers.first().is_some_and(|&x| x == 0.0 || x == 1.0)
+    let whole = !kinds.iter().any(|kind| matches!(kind, Field::Number(_, true)));
+    let counts = whole
+        && numbers.first().is_some_and(|&x| x == 0.0 || x == 1.0)
         && numbers.windows(2).all(|pair| pair[1] == pair[0] + 1.0);
     if counts && numbers.len() >= COUNTED {
         return Ok((true, true));
     }
-    if counts && numbers.len() == first.len() && like.is_none() {
-        return Err(CsvError::Doubt { found: super::list(first.iter().map(|f| super::shown(f))) });
+    // a word over numbers names them, or stands for a number that is missing
+    let word_over_numbers =
+        kinds.iter().zip(&scan.columns).any(|(kind, column)| !number(kind) && column.numeric());
+    let alone = counts && numbers.len() == first.len() && like.is_none();
+    match (word_over_numbers, counts) {
+        (true, true) => Ok((true, true)),
+        (false, _) if !alone => Ok((false, false)),
+        _ => Err(CsvError::Doubt { found: super::list(first.iter().map(|f| super::shown(f))) }),
     }
-    Ok((false, false))
 }
 
 /// Places of the columns that `keys` name; names that are not there are given back.
