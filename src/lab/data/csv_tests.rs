@@ -151,6 +151,13 @@ fn every_kind_of_damage_says_where_and_what_to_do() {
 }
 
 #[test]
+fn a_line_of_endless_fields_costs_no_memory() {
+    let text = format!("{}\n", "1,".repeat(300_000));
+    let error = with(&text, &Reading::default(), None).unwrap_err();
+    assert!(error.contains("has 300001 columns, at most 262144"), "{error}");
+}
+
+#[test]
 fn a_column_key_prints_as_it_is_read() {
     for text in ["first", "last", "3", "digit"] {
         assert_eq!(text.parse::<ColumnKey>().unwrap().to_string(), text);

@@ -20,6 +20,14 @@ pub enum CsvError {
         /// Start of the field.
         found: String,
     },
+    /// More fields than any example has values.
+    #[error("has {found} columns, at most {limit} are read; leave some out before the table is saved")]
+    Wide {
+        /// Columns.
+        found: usize,
+        /// Most columns.
+        limit: usize,
+    },
     /// A line of another length than the first.
     #[error(
         "line {line} has {found} fields, but the lines before it have {wanted}; complete the line (a header that \

@@ -7,6 +7,9 @@ use super::{CsvError, shown};
 /// Different fields remembered of a column.
 pub(super) const DISTINCT_MAX: usize = 4096;
 
+/// Most columns: each takes some hundred bytes.
+const COLUMNS_MAX: usize = 1 << 18;
+
 /// What a field is.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Field {
@@ -176,6 +179,9 @@ pub(super) fn scan(text: &[u8], separator: u8) -> Result<Scan, CsvError> {
     let first_line = line(&record);
     if record.len() < 2 {
         return Err(CsvError::Narrow { line: first_line, found: shown(&record[0]) });
+    }
+    if record.len() > COLUMNS_MAX {
+        return Err(CsvError::Wide { found: record.len(), limit: COLUMNS_MAX });
     }
     let first: Vec<Vec<u8>> = record.iter().map(<[u8]>::to_vec).collect();
     let columns = vec![Column::new(); first.len()];
