@@ -21,7 +21,9 @@ pub enum CsvError {
         found: String,
     },
     /// More fields than any example has values.
-    #[error("has {found} columns, at most {limit} are read; leave some out before the table is saved")]
+    #[error(
+        "has {found} columns, at most {limit} are read; leave some out before the table is saved"
+    )]
     Wide {
         /// Columns.
         found: usize,
