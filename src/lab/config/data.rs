@@ -355,10 +355,10 @@ mod tests {
     #[test]
     fn a_path_is_seen_from_a_folder_and_found_again() {
         for (path, folder, wanted) in [
-            ("/home/me/data/x.csv", "/home/me/runs/one", "../../data/x.csv"),
-            ("/home/me/runs/one/x.csv", "/home/me/runs/one", "x.csv"),
-            ("/home/me/./a/../x.csv", "/home/me/runs", "../x.csv"),
-            ("/data/x.csv", "/home/me/runs", "/data/x.csv"),
+            ("/users/me/data/x.csv", "/users/me/runs/one", "../../data/x.csv"),
+            ("/users/me/runs/one/x.csv", "/users/me/runs/one", "x.csv"),
+            ("/users/me/./a/../x.csv", "/users/me/runs", "../x.csv"),
+            ("/data/x.csv", "/users/me/runs", "/data/x.csv"),
         ] {
             assert_eq!(seen_from(path, Path::new(folder)), wanted);
         }

@@ -75,7 +75,7 @@ pub struct Reading {
 
 /// What a table turned out to be.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Layout {
+pub struct TableLayout {
     /// What separates fields.
     pub separator: u8,
     /// Names of all columns; empty without a header.
@@ -92,7 +92,7 @@ pub struct Layout {
     pub absent: Vec<String>,
 }
 
-impl Layout {
+impl TableLayout {
     /// A column as a key names it: by its name where that is one column's alone and no number.
     #[must_use]
     pub fn key(&self, at: usize) -> String {
@@ -124,7 +124,7 @@ pub struct CsvTable {
     /// Their kind.
     pub kind: NumberKind,
     /// How the table was read.
-    pub layout: Layout,
+    pub layout: TableLayout,
     /// What was told from the table and not stated.
     pub said: Vec<String>,
 }
@@ -137,7 +137,7 @@ pub struct CsvTable {
 pub fn read(
     bytes: &[u8],
     reading: &Reading,
-    like: Option<&Layout>,
+    like: Option<&TableLayout>,
     full_scale: u8,
     limit: u64,
 ) -> Result<CsvTable, CsvError> {
@@ -215,11 +215,11 @@ pub fn read(
 fn by_places(
     scan: &Scan,
     reading: &Reading,
-    like: Option<&Layout>,
+    like: Option<&TableLayout>,
     names: Vec<String>,
     separator: u8,
     said: &mut Vec<String>,
-) -> Result<Layout, CsvError> {
+) -> Result<TableLayout, CsvError> {
     let columns = scan.columns.len();
     let (ignored, absent, label) = match like {
         Some(like) if like.columns != columns => {
@@ -266,7 +266,7 @@ fn by_places(
     };
     let kept = |at: &usize| *at != label && ignored.binary_search(at).is_err();
     let values: Vec<usize> = (0..columns).filter(kept).collect();
-    Ok(Layout { separator, names, columns, label, ignored, values, absent })
+    Ok(TableLayout { separator, names, columns, label, ignored, values, absent })
 }
 
 /// Leaves out columns without a name that number the rows or are empty.
@@ -290,11 +290,11 @@ fn leave_out(
 fn by_names(
     scan: &Scan,
     reading: &Reading,
-    like: &Layout,
+    like: &TableLayout,
     names: Vec<String>,
     separator: u8,
     said: &mut Vec<String>,
-) -> Result<Layout, CsvError> {
+) -> Result<TableLayout, CsvError> {
     let columns = scan.columns.len();
     let same = names == like.names;
     let place = |at: usize, label: bool| {
@@ -325,13 +325,13 @@ fn by_names(
     if let Some(at) = extra {
         return Err(CsvError::Extra { name: names[at].clone() });
     }
-    Ok(Layout { separator, names, columns, label, ignored, values, absent })
+    Ok(TableLayout { separator, names, columns, label, ignored, values, absent })
 }
 
 /// What the columns of values hold together.
 fn range(
     scan: &Scan,
-    layout: &Layout,
+    layout: &TableLayout,
     reading: &Reading,
     header: bool,
 ) -> Result<NumberRange, CsvError> {
@@ -383,7 +383,7 @@ fn separator_is_comma_like(separator: u8, found: &str) -> bool {
 }
 
 /// Whether a number of the first examples is written with a decimal comma.
-fn range_has_commas(text: &[u8], separator: u8, layout: &Layout, header: bool) -> bool {
+fn range_has_commas(text: &[u8], separator: u8, layout: &TableLayout, header: bool) -> bool {
     let mut lines = scan::reader(text, separator);
     let rows = lines.byte_records().filter_map(Result::ok).skip(usize::from(header)).take(1000);
     let comma = |row: &::csv::ByteRecord| layout.values.iter().any(|&at| row[at].contains(&b','));

@@ -8,7 +8,7 @@ fn key(text: &str) -> ColumnKey {
     text.parse().unwrap()
 }
 
-fn with(text: &str, reading: &Reading, like: Option<&Layout>) -> Result<CsvTable, String> {
+fn with(text: &str, reading: &Reading, like: Option<&TableLayout>) -> Result<CsvTable, String> {
     read(text.as_bytes(), reading, like, 255, 1 << 20).map_err(|error| error.to_string())
 }
 

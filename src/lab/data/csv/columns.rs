@@ -6,7 +6,7 @@
 use std::collections::BTreeSet;
 
 use super::scan::{Column, DISTINCT_MAX, Field, Scan, field};
-use super::{ColumnKey, CsvError, Layout, Reading};
+use super::{ColumnKey, CsvError, Reading, TableLayout};
 
 /// Names that say label.
 const LABEL_NAMES: [&str; 9] =
@@ -26,7 +26,7 @@ fn is_label_name(name: &[u8]) -> bool {
 pub(super) fn header(
     scan: &Scan,
     reading: &Reading,
-    like: Option<&Layout>,
+    like: Option<&TableLayout>,
     comma: bool,
 ) -> Result<(bool, bool), CsvError> {
     let named = |key: &ColumnKey| matches!(key, ColumnKey::Named(_));

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use super::{ImageShape, TableKeys, Told};
 use crate::lab::data::arrays::{self, PartName};
-use crate::lab::data::csv::{self, Layout, Reading};
+use crate::lab::data::csv::{self, Reading, TableLayout};
 use crate::lab::data::error::DataError;
 use crate::lab::data::idx;
 use crate::lab::data::labels::{Label, Labels};
@@ -32,7 +32,7 @@ pub(super) struct Reader<'a> {
     scale: u8,
     /// The archive read last.
     last: Option<(PathBuf, Vec<u8>)>,
-    tables: Vec<(PartName, Layout)>,
+    tables: Vec<(PartName, TableLayout)>,
     told: Told,
     said: Vec<String>,
 }
@@ -217,7 +217,7 @@ impl<'a> Reader<'a> {
             if let Some(name) = first.absent.iter().find(everywhere) {
                 return Err(DataError::NoColumn { name: name.clone() });
             }
-            let alike = |of: fn(&Layout) -> u8| {
+            let alike = |of: fn(&TableLayout) -> u8| {
                 Some(of(first)).filter(|_| tables.iter().all(|(_, t)| of(t) == of(first)))
             };
             told.table = Some(TableKeys {
