@@ -11,6 +11,7 @@
 
 mod chart;
 mod colour;
+pub mod compare;
 mod figures;
 mod image;
 mod number;
@@ -18,6 +19,7 @@ mod page;
 mod scale;
 pub mod sweep;
 pub mod text;
+mod words;
 
 #[cfg(test)]
 mod sample;
