@@ -6,7 +6,7 @@ use serde_json::json;
 use super::{Done, Failure, say, usage};
 use crate::chip::hardware::{Adc, AdcRange, Hardware, PulseCode, Subtract, Timing};
 use crate::lab::config::{self, Config, Constant, CostTable, Sources, builtin_models, load_model};
-use crate::lab::price::{bounds, figures, peak, prefixed};
+use crate::lab::price::{Convention, bounds, figures, peak, prefixed};
 
 /// Error words that `hw show` reckons with: those of ten classes.
 const WORDS: u64 = 10;
@@ -164,21 +164,24 @@ fn show_peak(args: &PeakArgs) -> Done {
             return Err(usage(&format!("{name} is {value}, but must lie in 1..={}", 1 << 30)));
         }
     }
-    let Some(peak) = peak(hardware, tiles, slices, args.cells) else {
+    let convention = Convention::with_cells(args.cells);
+    let Some(peak) = peak(hardware, tiles, slices, convention) else {
         let message = "the model has no [timing]: give it at least hw.timing.clock_mhz";
         return Err(usage(message));
     };
     if args.json {
         let rate = |(figure, rate): &(crate::lab::price::Figure, f64)| json!({"cycles": figure.cycles, "seconds": figure.seconds, "operations_per_second": rate});
         say(&json!({"event": "peak", "model": config.hardware_name, "tiles": tiles,
-            "slices": slices, "cells_per_weight": args.cells, "macs": peak.macs,
+            "slices": slices, "convention": convention.to_json(), "macs": peak.macs,
             "alone": rate(&peak.alone), "back_to_back": rate(&peak.back_to_back)})
         .to_string());
         return Ok(());
     }
     say(&format!(
-        "{}: {tiles} tiles, {slices} slices, {} cells a weight, {} MACs a read",
-        config.hardware_name, args.cells, peak.macs
+        "{}: {tiles} tiles, {slices} slices, {} MACs a read ({})",
+        config.hardware_name,
+        peak.macs,
+        convention.words()
     ));
     for (name, (figure, rate)) in
         [("one read after the other", &peak.alone), ("back to back", &peak.back_to_back)]

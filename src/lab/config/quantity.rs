@@ -12,6 +12,10 @@
 use serde::de::{self, Deserializer};
 use serde::{Deserialize, Serialize};
 
+mod class;
+
+pub use class::CostClass;
+
 use super::ConfigError;
 use super::check::wrong;
 use super::file::{HardwareFile, NumberFile};
@@ -208,6 +212,17 @@ pub enum Kind {
     Assumed,
 }
 
+/// How a number came to the setting that it prices.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Standing {
+    /// The model gives it for this setting.
+    Stated,
+    /// The model gives it for another setting, and a law of the model brought it here: what law, from where to where.
+    Scaled(String),
+    /// The model gives it for another setting and says no law: what has changed. It prices nothing.
+    NotHere(String),
+}
+
 /// A physical number of a model.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Constant {
@@ -221,6 +236,19 @@ pub struct Constant {
     pub source: String,
     /// How far to trust it.
     pub kind: Kind,
+    /// Whether it is a number of this setting.
+    pub standing: Standing,
+}
+
+impl Constant {
+    /// Why it prices nothing here, if it does not.
+    #[must_use]
+    pub fn not_here(&self) -> Option<&str> {
+        match &self.standing {
+            Standing::NotHere(why) => Some(why),
+            Standing::Stated | Standing::Scaled(_) => None,
+        }
+    }
 }
 
 /// The physical numbers of a model, in the order of [`QUANTITIES`].
@@ -271,6 +299,7 @@ impl Constants {
                 value: [low, typical, high].map(|number| number * unit),
                 source: source.into(),
                 kind,
+                standing: Standing::Stated,
             });
         }
         let place = |c: &Constant| QUANTITIES.iter().position(|q| q == c.quantity);

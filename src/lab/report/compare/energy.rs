@@ -2,13 +2,12 @@
 
 use crate::lab::price::{Cost, prefixed};
 
-/// Parts of a bar at most; what is left is one more.
-const PARTS_MAX: usize = 6;
-
-/// Joules of a run by component, the greatest first.
+/// Typical joules of a run by class: device, converter, digital, static.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Parts {
     pub parts: Vec<(String, f64)>,
+    /// Whether something that was counted has no price.
+    least: bool,
 }
 
 impl Parts {
@@ -18,19 +17,16 @@ impl Parts {
 
     /// The total in words.
     pub(super) fn words(&self) -> String {
-        prefixed(self.total(), "J")
+        let total = prefixed(self.total(), "J");
+        if self.least { format!("\u{2265} {total}") } else { total }
     }
 }
 
 /// None where nothing has a price.
 pub(super) fn parts(cost: &Cost) -> Option<Parts> {
-    cost.joules?;
-    let of = |group: &crate::lab::price::Group| (group.name.replace('_', " "), group.joules[1]);
-    let mut parts: Vec<_> =
-        cost.components.iter().map(of).filter(|(_, joules)| *joules > 0.0).collect();
-    if parts.len() > PARTS_MAX + 1 {
-        let rest = parts.split_off(PARTS_MAX).iter().map(|(_, joules)| joules).sum();
-        parts.push(("other".into(), rest));
-    }
-    (!parts.is_empty()).then_some(Parts { parts })
+    let energy = cost.energy.filter(|energy| energy.priced > 0)?;
+    let classes = cost.split.iter();
+    let classes = classes.map(|one| (one.class.name().to_owned(), one.total.joules[1]));
+    let parts: Vec<_> = classes.filter(|(_, joules)| *joules > 0.0).collect();
+    (!parts.is_empty()).then(|| Parts { parts, least: energy.whole().is_none() })
 }

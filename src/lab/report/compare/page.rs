@@ -161,13 +161,17 @@ fn accuracy(comparison: &Comparison) -> Option<Figure> {
     };
     let validation = lines(comparison, |record| learnt(record, record.validation()));
     let train = lines(comparison, |record| learnt(record, record.train()));
-    let body = multiple(
-        "On the validation set",
-        percents(&validation, "accuracy", "Validation accuracy over epochs, a line a run"),
-    ) + &multiple(
-        "While learning",
-        percents(&train, "accuracy", "Accuracy while learning over epochs, a line a run"),
-    );
+    let body = [
+        multiple(
+            "On the validation set",
+            percents(&validation, "accuracy", "Validation accuracy over epochs, a line a run"),
+        ),
+        multiple(
+            "While learning",
+            percents(&train, "accuracy", "Accuracy while learning over epochs, a line a run"),
+        ),
+    ]
+    .concat();
     (!body.is_empty()).then(|| Figure {
         wide: true,
         id: "accuracy",
@@ -239,7 +243,7 @@ fn results(comparison: &Comparison) -> Option<Figure> {
                   says how far; <code>dalean sweep</code> with <code>seeds</code> does."
             .into(),
         body: format!(
-            "<div class=\"scroll\"><table class=\"stack sides\">{}<tbody>{rows}</tbody></table></div>",
+            "<div class=\"scroll\"><table class=\"stack one sides\">{}<tbody>{rows}</tbody></table></div>",
             heads(comparison, "result")
         ),
     })
@@ -259,7 +263,7 @@ fn keys(comparison: &Comparison) -> Option<Figure> {
         "<p>No key differs: the runs have one configuration.</p>".into()
     } else {
         format!(
-            "<div class=\"scroll\"><table class=\"stack sides\">{}<tbody>{rows}</tbody></table></div>",
+            "<div class=\"scroll\"><table class=\"stack one sides\">{}<tbody>{rows}</tbody></table></div>",
             heads(comparison, "key")
         )
     };
@@ -292,11 +296,14 @@ fn balance(comparison: &Comparison) -> Option<Figure> {
         "Excitation over inhibition over epochs, a line a run",
         |value| ratio(Some(value)),
     );
-    let body = multiple("Excitation over inhibition, stored levels", ratios)
-        + &multiple(
+    let body = [
+        multiple("Excitation over inhibition, stored levels", ratios),
+        multiple(
             "Cells on the floor",
             percents(&floor, "of the cells", "Cells on the floor over epochs, a line a run"),
-        );
+        ),
+    ]
+    .concat();
     (!body.is_empty()).then(|| Figure {
         wide: true,
         id: "balance",
@@ -329,12 +336,14 @@ fn writes(comparison: &Comparison) -> Option<Figure> {
         let y = Axis::counts(values, "per epoch (log scale)");
         chart(&all, y, alt, |value| short(value as u64))
     };
-    let body =
-        multiple("Pulses given", drawn("pulses_attempted", "Pulses per epoch, a line a run"))
-            + &multiple(
-                "Conversions that saturated while learning",
-                drawn("saturated_conversions", "Saturated conversions per epoch, a line a run"),
-            );
+    let body = [
+        multiple("Pulses given", drawn("pulses_attempted", "Pulses per epoch, a line a run")),
+        multiple(
+            "Conversions that saturated while learning",
+            drawn("saturated_conversions", "Saturated conversions per epoch, a line a run"),
+        ),
+    ]
+    .concat();
     (!body.is_empty()).then(|| Figure {
         wide: true,
         id: "writes",
@@ -410,8 +419,11 @@ fn energy(comparison: &Comparison) -> Option<Figure> {
 /// State hashes, and where they part.
 fn states(comparison: &Comparison) -> Option<Figure> {
     let longest = comparison.runs.iter().map(|run| run.records.len()).max()?;
+    fn hash(run: &ComparedRun, at: usize) -> Option<&str> {
+        Some(&run.records.get(at)?.state_hash)
+    }
     let epochs = (0..longest).map(|at| {
-        let of = |run: &ComparedRun| run.records.get(at).map(|record| record.state_hash.as_str());
+        let of = |run| hash(run, at);
         let first = comparison.runs.first().and_then(of);
         let cell = |(number, run): (usize, &ComparedRun)| match of(run) {
             None => "<td>–</td>".to_owned(),
@@ -433,7 +445,7 @@ fn states(comparison: &Comparison) -> Option<Figure> {
                   another than that of run 1."
             .into(),
         body: format!(
-            "<details{}><summary>State hashes of {} epochs</summary><div class=\"scroll\"><table class=\"stack sides\">{}\
+            "<details{}><summary>State hashes of {} epochs</summary><div class=\"scroll\"><table class=\"stack one sides\">{}\
              <tbody>{rows}</tbody></table></div></details>",
             if longest <= 12 { " open" } else { "" },
             longest,

@@ -26,10 +26,15 @@ function learning(look, width) {
   const kinds = [...groups.keys()].sort((a, b) => a - b);
   if (kinds.length === 0) return { none: `No finished run has records here.${rest.text}` };
   const kept = kinds.slice(0, learnersMost);
+  // What is known before the first update would press all else flat.
+  const start = kept.map((kind) => knownAt(groups.get(kind), 0)?.mean).filter((mean) => mean !== undefined);
+  const later = kept.map((kind) => knownAt(groups.get(kind), 1)?.mean).filter((mean) => mean !== undefined);
+  const cut = known.epochs[0] === 0 && known.epochs.length > 2 && Math.max(...start) < Math.min(...later);
+  const epochs = known.epochs.map((epoch, at) => [epoch, at]).slice(cut ? 1 : 0);
   const data = [];
   const all = [];
   for (const kind of kept) {
-    const points = known.epochs.map((epoch, at) => ({ epoch, ...knownAt(groups.get(kind), at) })).filter((point) => point.mean !== undefined);
+    const points = epochs.map(([epoch, at]) => ({ epoch, ...knownAt(groups.get(kind), at) })).filter((point) => point.mean !== undefined);
     const style = styleOf(series, kind, look);
     const banded = points.filter((point) => point.half !== null);
     if (banded.length > 1) {
@@ -43,18 +48,18 @@ function learning(look, width) {
       customdata: points.map((point) => [point.n, point.mean, point.half]), meta: { kind: "learning", series: series ? series.texts[kind] : "" } });
     all.push(...points);
   }
-  const learnt = all.filter((point) => point.epoch > 0);
-  const [low, high] = extent((learnt.length ? learnt : all).map((point) => 100 * point.mean));
+  const [low, high] = extent(all.map((point) => 100 * point.mean));
   const room = Math.max(0.5, 0.06 * (high - low));
   const keyHeight = series ? kept.length * 25 + 110 : 0;
   const tall = Math.round(Math.min(440, Math.max(320, width * 0.4)));
   const height = Math.max(tall, width < 620 ? 0 : keyHeight) + (width < 620 ? keyHeight / 2 : 0);
   const layout = layoutLook(look, width, height, {
     margin: { l: 70, r: 16, t: 14, b: 56 }, showlegend: series !== null, legend: series ? keyTitle(look, series.label) : {},
-    xaxis: axisLook(look, { title: "epoch", range: [known.epochs[0] - 0.4, known.epochs.at(-1) + 0.4], showgrid: false, nticks: 10, tickformat: "d" }),
+    xaxis: axisLook(look, { title: "epoch", range: [epochs[0][0] - 0.4, epochs.at(-1)[0] + 0.4], showgrid: false, tick0: 0, dtick: Math.max(1, Math.ceil((epochs.at(-1)[0] - epochs[0][0]) / 10)) }),
     yaxis: axisLook(look, { title: `${known.label} (%)`, range: [Math.max(0, low - room), Math.min(100.5, high + room)], nticks: 7 }),
   });
-  let caption = `Mean over runs that differ in the seed alone, ${countWords(all)} a point; bands are its 95${gap}% confidence interval. Epoch 0 is the state before the first update${low > 15 && all.some((point) => point.epoch === 0) ? ", below the frame" : ""}.`;
+  let caption = `Mean over runs that differ in the seed alone, ${countWords(all)} a point; bands are its 95${gap}% confidence interval.` +
+    (cut ? ` Before the first update it was ${extent(start).map((end) => `${(100 * end).toFixed(1)}${gap}%`).join(" to ")}, which is left out.` : "");
   if (rest.pooled.length) caption += ` Pooled over ${listed(rest.pooled.map((axis) => axis.label))}: different settings, no interval.`;
   caption += rest.text;
   if (kept.length < kinds.length) caption += ` The first ${kept.length} of ${kinds.length} curves are drawn.`;

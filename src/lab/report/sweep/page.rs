@@ -278,10 +278,19 @@ fn notices(view: &SweepView<'_>) -> String {
     let mut out = String::new();
     if !view.not_simulated.is_empty() {
         let list = view.not_simulated.iter();
-        let list: String = list
-            .map(|text| format!("<li>Not simulated: <code>{}</code></li>", escape(text)))
-            .collect();
-        out += &format!("<ul class=\"notices\">{list}</ul>\n");
+        let name = |text: &String| {
+            let name = text.split(" = ").next().unwrap_or_default();
+            escape(&name.replace('_', " "))
+        };
+        let mut names: Vec<String> = list.clone().map(name).collect();
+        names.dedup();
+        let list: String =
+            list.map(|text| format!("<li><code>{}</code></li>", escape(text))).collect();
+        out += &format!(
+            "<ul class=\"notices\"><li><details><summary>Not simulated on these chips: {}</summary><ul>{list}</ul></details>\
+             </li></ul>\n",
+            names.join(", ")
+        );
     }
     if !view.refused.is_empty() {
         let list = view.refused.iter().map(|one| {

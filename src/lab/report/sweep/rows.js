@@ -3,9 +3,9 @@ const pageRows = 50;
 const listedColumns = columns.filter((column) => column.name !== "run");
 let found = [];
 
-/** Columns by how much they are wanted: what was varied, what came out, what it cost; then the others as they stand. */
+/** Columns by how much they are wanted: what came out, what was varied, what it cost; then the others as they stand. */
 function wantedColumns() {
-  const chosen = [...varied.map((axis) => axis.name), "seed", state.sort, state.y, "validation_accuracy", "test_accuracy", state.cost];
+  const chosen = [state.y, state.sort, ...varied.map((axis) => axis.name), "validation_accuracy", "test_accuracy", "seed", state.cost];
   const rank = (column) => (chosen.includes(column.name) ? chosen.indexOf(column.name) : 100 + (column.role === "result" ? 0 : column.role === "name" ? 200 : 100) + listedColumns.indexOf(column));
   return listedColumns.toSorted((a, b) => rank(a) - rank(b));
 }
@@ -17,7 +17,7 @@ function shownColumns() {
     const cells = found.slice(state.page * pageRows, (state.page + 1) * pageRows).map((row) => Math.min(24, column.show(row).length));
     // a head may break between words
     const head = Math.max(...column.label.split(" ").map((word) => word.length), column.label.length / 2.2);
-    return 21 + 7.7 * Math.max(head, 1, ...cells);
+    return (innerWidth > 620 || onPaper ? 21 : 13) + 7.7 * Math.max(head, 1, ...cells);
   };
   let room = (onPaper ? 700 : document.querySelector("#rows .scroll").clientWidth) - 74;
   const kept = new Set();
