@@ -7,6 +7,7 @@ use dalean::lab::table::Role;
 use serde_json::Value;
 
 mod chromium;
+mod compare;
 mod parts;
 mod run;
 mod sample;

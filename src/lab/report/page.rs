@@ -54,7 +54,7 @@ impl<F: Iterator<Item = Figure>> Sheet<'_, F> {
             contents += "<a href=\"#words\">Words</a>";
             body += &format!(
                 "<section class=\"card wide\" id=\"words\"><h2>Words</h2><p class=\"caption\">What the heads of the \
-                 tables mean.</p><dl class=\"words\">{listed}</dl></section>\n"
+                 tables mean.</p><dl class=\"lexicon\">{listed}</dl></section>\n"
             );
         }
         format!(

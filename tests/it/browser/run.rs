@@ -151,19 +151,25 @@ fn values_of_a_run_are_told_to_pointer_and_keyboard_and_its_figures_can_be_saved
     assert!(words.contains("Accuracy") && words.contains("Validation peaks at"), "{words}");
 }
 
+/// What reaches beyond a window, or beyond the frame of its table.
+pub(super) const NARROW: &str = "await rest(200); \
+        const wide = document.documentElement.clientWidth; \
+        const over = [...document.querySelectorAll('main *')].filter((one) => !one.closest('svg, details, .scroll') && one.getBoundingClientRect().right > wide + 1); \
+        const tables = [...document.querySelectorAll('.scroll')].filter((one) => one.scrollWidth > one.clientWidth + 1); \
+        return { wide, over: over.map((one) => one.outerHTML.slice(0, 120)), tables: tables.map((one) => one.closest('.card').id) };";
+
+pub(super) fn check_narrow(found: &Value) {
+    clean(found);
+    assert_eq!(found["wide"], 420);
+    assert_eq!(found["over"], serde_json::json!([]));
+    assert_eq!(found["tables"], serde_json::json!([]), "tables that do not fit their frame");
+}
+
 #[test]
 fn no_part_of_a_runs_page_is_wider_than_a_narrow_window() {
     let folder = tempfile::tempdir().unwrap();
     let (run, _) = trained(folder.path(), &["--hw", "pcm14"]);
     let page = std::fs::read_to_string(run.join("report.html")).unwrap();
-    let steps = "await rest(200); \
-        const wide = document.documentElement.clientWidth; \
-        const over = [...document.querySelectorAll('main *')].filter((one) => !one.closest('svg, details, .scroll') && one.getBoundingClientRect().right > wide + 1); \
-        const tables = [...document.querySelectorAll('.scroll')].filter((one) => one.scrollWidth > one.clientWidth + 1); \
-        return { wide, over: over.map((one) => one.outerHTML.slice(0, 120)), tables: tables.map((one) => one.closest('.card').id) };";
-    let Some(found) = open_at(&page, steps, Graphics::None, 420) else { return };
-    clean(&found);
-    assert_eq!(found["wide"], 420);
-    assert_eq!(found["over"], serde_json::json!([]));
-    assert_eq!(found["tables"], serde_json::json!([]), "tables that do not fit their frame");
+    let Some(found) = open_at(&page, NARROW, Graphics::None, 420) else { return };
+    check_narrow(&found);
 }

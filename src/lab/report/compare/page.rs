@@ -423,13 +423,17 @@ fn states(comparison: &Comparison) -> Option<Figure> {
         Some(&run.records.get(at)?.state_hash)
     }
     let epochs = (0..longest).map(|at| {
-        let of = |run| hash(run, at);
+        let of = |run: &ComparedRun| hash(run, at).map(str::to_owned);
         let first = comparison.runs.first().and_then(of);
         let cell = |(number, run): (usize, &ComparedRun)| match of(run) {
             None => "<td>–</td>".to_owned(),
             Some(hash) => {
-                let class = if number > 0 && Some(hash) != first { " class=\"wrong\"" } else { "" };
-                format!("<td><code{class}>{}</code></td>", escape(&hash_head(hash)))
+                let class = if number > 0 && Some(&hash) != first.as_ref() {
+                    " class=\"wrong\""
+                } else {
+                    ""
+                };
+                format!("<td><code{class}>{}</code></td>", escape(&hash_head(&hash)))
             }
         };
         let cells: String = comparison.runs.iter().enumerate().map(cell).collect();

@@ -130,7 +130,7 @@ fn rows(number: usize, view: &SweepView<'_>) -> String {
          all columns</label><span id=\"found\" class=\"note\" \
          role=\"status\"></span></div><div class=\"scroll\"><table id=\"table\"><thead></thead><tbody></tbody></table>\
          </div><div class=\"pager\" id=\"pager\"></div><details id=\"meanings\"><summary>What the columns mean\
-         </summary><dl class=\"words\">{}</dl></details></section>\n",
+         </summary><dl class=\"lexicon\">{}</dl></details></section>\n",
         meanings.collect::<String>()
     )
 }
