@@ -19,6 +19,13 @@ use crate::lab::near;
 use crate::lab::run::Machine;
 use out::say;
 
+/// A line on standard error, as `eprintln!`, which would end the program where nobody hears it.
+macro_rules! tell {
+    ($($words:tt)*) => {
+        $crate::cli::note(&format!($($words)*))
+    };
+}
+
 mod bench;
 mod data;
 mod export;
@@ -209,9 +216,25 @@ fn configuration(
     config::load(&sources).map_err(|error| usage(&error.to_string()))
 }
 
+/// Prints a line to standard error; that nobody hears it, or that its disk is full, is no reason to end.
+fn note(line: &str) {
+    use std::io::Write;
+    let _ = writeln!(std::io::stderr(), "{line}");
+}
+
+/// Turns the end of a file's allowed size into an error of the write that met it, which says where and what to do.
+fn hear_file_limits() {
+    #[cfg(unix)]
+    {
+        let heard = std::sync::Arc::default();
+        let _ = signal_hook::flag::register(signal_hook::consts::SIGXFSZ, heard);
+    }
+}
+
 /// Runs the program and gives its exit code.
 #[must_use]
 pub fn main() -> ExitCode {
+    hear_file_limits();
     let cli = match Cli::try_parse() {
         Ok(cli) => cli,
         Err(error) => return unparsed(&error),
@@ -259,7 +282,7 @@ pub fn main() -> ExitCode {
             }
             let red = std::io::stderr().is_terminal();
             let word = if red { "\u{1b}[31merror\u{1b}[0m" } else { "error" };
-            eprintln!("{word}: {message}");
+            note(&format!("{word}: {message}"));
             ExitCode::from(code)
         }
     }
@@ -278,7 +301,7 @@ fn unparsed(error: &clap::Error) -> ExitCode {
     match out::fault() {
         None => ExitCode::SUCCESS,
         Some(message) => {
-            eprintln!("error: {message}");
+            note(&format!("error: {message}"));
             ExitCode::from(1)
         }
     }

@@ -268,28 +268,44 @@ impl Rate {
     /// When the shift before any decay lies outside `0..=SHIFT_MAX`.
     pub fn shifts(self, decay: Decay, updates: u64) -> Result<Vec<(u64, u32)>, OutOfRange> {
         self.shift()?;
-        let exact = self.shift_exact();
-        let mut table: Vec<(u64, u32)> = Vec::new();
-        for update in 0..updates.max(1) {
-            let factor = match decay {
-                Decay::Constant => 1.0,
-                Decay::Cosine => {
-                    #[expect(clippy::cast_precision_loss, reason = "far fewer than 2^53 updates")]
-                    let t = update as f64 / updates as f64;
-                    0.5 * (1.0 + libm::cos(std::f64::consts::PI * t))
+        let mut table = vec![(0, self.shift_at(decay, 0, updates))];
+        if decay == Decay::Constant {
+            return Ok(table);
+        }
+        // k only rises, so where it does is found by halving: a training may be as long as it likes
+        let last = updates.max(1) - 1;
+        let (mut now, mut k) = table[0];
+        while self.shift_at(decay, last, updates) > k {
+            let mut next = last;
+            while next - now > 1 {
+                let middle = now + (next - now) / 2;
+                if self.shift_at(decay, middle, updates) > k {
+                    next = middle;
+                } else {
+                    now = middle;
                 }
-            };
-            let nearest = libm::floor(exact - libm::log2(factor) + 0.5);
-            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0..=30")]
-            let k = nearest.min(f64::from(SHIFT_MAX)) as u32;
-            if table.last().is_none_or(|&(_, last)| last != k) {
-                table.push((update, k));
             }
-            if decay == Decay::Constant {
-                break;
-            }
+            (now, k) = (next, self.shift_at(decay, next, updates));
+            table.push((now, k));
         }
         Ok(table)
+    }
+
+    /// `k` at one update of so many.
+    fn shift_at(self, decay: Decay, update: u64, updates: u64) -> u32 {
+        let factor = match decay {
+            Decay::Constant => 1.0,
+            Decay::Cosine => {
+                #[expect(clippy::cast_precision_loss, reason = "a share of the way")]
+                let t = update as f64 / updates.max(1) as f64;
+                0.5 * (1.0 + libm::cos(std::f64::consts::PI * t))
+            }
+        };
+        let nearest = libm::floor(self.shift_exact() - libm::log2(factor) + 0.5);
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0..=30")]
+        {
+            nearest.min(f64::from(SHIFT_MAX)) as u32
+        }
     }
 }
 
@@ -427,6 +443,28 @@ mod tests {
         // 13.2404 - log2( (1 + cos(pi t / 1000)) / 2 ) passes 13.5, 14.5 and 15.5 there
         assert_eq!(table[..4], [(0, 13), (267, 14), (553, 15), (698, 16)]);
         assert!(table.is_sorted() && table.last().unwrap().1 <= SHIFT_MAX);
+    }
+
+    #[test]
+    fn a_schedule_of_any_length_is_made_at_once_and_is_the_one_counted_update_by_update() {
+        for (start, alpha) in [(20.0, 6.0), (3.7, 4.0), (900.0, 1.0), (0.04, 9.0)] {
+            let rate = rate(start, alpha);
+            for updates in [1, 2, 3, 7, 100, 1_199, 20_000] {
+                let mut wanted: Vec<(u64, u32)> = vec![];
+                for update in 0..updates {
+                    let k = rate.shift_at(Decay::Cosine, update, updates);
+                    if wanted.last().is_none_or(|&(_, last)| last != k) {
+                        wanted.push((update, k));
+                    }
+                }
+                assert_eq!(rate.shifts(Decay::Cosine, updates).unwrap(), wanted, "{updates}");
+            }
+            // it once took an hour and a signal did not end it
+            for updates in [0, u64::from(u32::MAX) * 120, u64::MAX] {
+                let table = rate.shifts(Decay::Cosine, updates).unwrap();
+                assert!(table.is_sorted() && (1..=31).contains(&table.len()), "{updates}");
+            }
+        }
     }
 
     #[test]

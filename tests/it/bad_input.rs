@@ -172,13 +172,13 @@ fn a_full_disk_leaves_the_last_finished_epoch() {
     assert!(size("metrics.jsonl") > (room + 1) * 1024, "the records outgrow the room");
     let root = tempfile::tempdir().unwrap();
     let mut command = std::process::Command::new("bash");
-    let mut line = format!("ulimit -f {room}; trap '' XFSZ; exec");
+    let mut line = format!("ulimit -f {room}; exec");
     line.push_str(" \"$0\" train \"$2\" --json --out \"$1\" --set learning.epochs=16 --set network.hidden=[4]");
     command.arg("-c").arg(line).arg(env!("CARGO_BIN_EXE_dalean")).arg(root.path()).arg(SMALL);
     let ran = run(&mut command);
     refused(&ran, &["cannot write", "metrics.jsonl", "free some space", "--resume"]);
     let folder = root.path().join("optdigits-ed-seed1");
-    assert!(files(&folder).iter().all(|name| !name.starts_with(".part-")), "parts stayed behind");
+    assert!(files(&folder).iter().all(|name| !name.contains("part-")), "parts stayed behind");
     let ran = run(dalean().args(["train", "--json", "--resume"]).arg(&folder));
     assert_eq!(ran.code, Some(0), "{ran:?}");
     assert_eq!(ran.last()["state_hash"], done["state_hash"]);

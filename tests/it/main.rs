@@ -23,6 +23,7 @@ mod report;
 mod rules;
 mod runs;
 mod same_bits;
+mod strangers;
 mod sweep;
 mod tile;
 mod tile_program;

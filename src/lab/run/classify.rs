@@ -56,6 +56,7 @@ impl Classify {
             let hint = "choose the last epoch with learning.select = \"last\"";
             return Err(RunError::Empty { part: "validation", hint });
         }
+        super::weigh(&experiment.network.layers, &experiment.hardware, super::Memory::left())?;
         let seeded = experiment.build(machine.backend(), train.len())?;
         let mut trainer = Trainer::new(experiment, seeded);
         let (threads, engine) = (machine.threads(), trainer.driver_mut().engine_mut());
@@ -97,6 +98,7 @@ impl Task for Classify {
             Adc::Finite { range: AdcRange::Calibrated { every_epoch: true, .. }, .. }
         );
         let Self { trainer, train, .. } = self;
+        let epochs = trainer.experiment().epochs;
         if again && trainer.epoch() > 0 {
             let _ = trainer.calibrate(train);
         }
@@ -107,7 +109,7 @@ impl Task for Classify {
                                                     correct,
                                                 }| {
             let answers = Some(Score { correct, total: samples as u64 });
-            go_on(Progress { epoch, done: samples, total: samples_total, answers })
+            go_on(Progress { epoch, epochs, done: samples, total: samples_total, answers })
         });
         let (correct, total) = (learnt.ok()?, train.len() as u64);
         let seconds = started.elapsed().as_secs_f64();

@@ -25,6 +25,8 @@ use crate::task::classify::Examples;
 pub struct Progress {
     /// Epoch in progress, from 0.
     pub epoch: u32,
+    /// Epochs in all.
+    pub epochs: u32,
     /// Samples learnt from in this epoch.
     pub done: usize,
     /// Samples of an epoch.

@@ -12,7 +12,7 @@ use super::{Machine, Progress, RunError, Session, proof};
 use crate::lab::config::{self, Config, Select, Sources};
 use crate::lab::data::{self, Data, DataRoot, ImageShape};
 use crate::lab::price::Cost;
-use crate::lab::store::folder::{self, FolderError, RunFolder, names};
+use crate::lab::store::folder::{self, FolderError, MetricsLog, RunFolder, names};
 use crate::lab::store::ledger::LedgerRecord;
 use crate::lab::store::record::{
     BestRecord, DataRecord, EpochRecord, Receipt, TestOutcome, TimingRecord,
@@ -265,6 +265,8 @@ struct Run<'a> {
     image: Option<ImageShape>,
     session: Session,
     records: Vec<EpochRecord>,
+    /// The records on disk, once this process has written any.
+    log: Option<MetricsLog>,
     timing: TimingRecord,
     keeping: Keeping,
     /// When files were written last.
@@ -294,6 +296,7 @@ impl<'a> Run<'a> {
             image,
             session,
             records: vec![],
+            log: None,
             timing: TimingRecord {
                 version: env!("CARGO_PKG_VERSION").into(),
                 kernel: machine.backend().name().into(),
@@ -312,6 +315,7 @@ impl<'a> Run<'a> {
     fn start_over(&mut self, session: Session) {
         self.session = session;
         self.records.clear();
+        self.log = None;
         self.timing.epoch_seconds.clear();
         (self.best, self.best_state) = (None, None);
     }
@@ -320,6 +324,14 @@ impl<'a> Run<'a> {
     fn restore(&mut self) -> Result<(), RunError> {
         let path = self.folder.path().to_path_buf();
         if !path.join(names::CHECKPOINT).exists() && !path.join(names::RECEIPT).exists() {
+            // the ledger is written when the last epoch is done: such a run is never begun anew behind its owner's back
+            if path.join(names::LEDGER).exists() {
+                let found = format!(
+                    "is missing, though {} says that the run came to its end",
+                    names::LEDGER
+                );
+                return Err(FolderError::Content { path: path.join(names::RECEIPT), found }.into());
+            }
             return Ok(());
         }
         let receipt = folder::read_receipt(&path)?;
@@ -329,7 +341,13 @@ impl<'a> Run<'a> {
         proof::inputs(&receipt, &self.session, &self.text)?;
         let mut records = proof::records(&path, &receipt)?;
         if !path.join(names::CHECKPOINT).exists() {
-            // killed before the first one was in its place
+            // killed before the first one was in its place; later there is always one
+            if receipt.epoch_hashes.len() > 1 && self.keeping == Keeping::ALL {
+                let found = format!("is missing, though {} speaks of it", names::RECEIPT);
+                return Err(
+                    FolderError::Content { path: path.join(names::CHECKPOINT), found }.into()
+                );
+            }
             return Ok(());
         }
         let bytes = restore(&mut self.session, &path, names::CHECKPOINT)?;
@@ -344,7 +362,8 @@ impl<'a> Run<'a> {
         self.best = self.best_on_disk(&path, &records)?;
         self.records = records;
         if last {
-            let expected = self.receipt("running", None, hash::bytes(&bytes), None);
+            let hashes = [receipt.metrics.clone(), hash::bytes(&bytes)];
+            let expected = self.receipt("running", None, hashes, None);
             let expected = Receipt { states: receipt.states, ..expected };
             proof::same_receipt(&path, &receipt, &expected)?;
         }
@@ -431,25 +450,38 @@ impl<'a> Run<'a> {
         if let (Some(state), Some(best)) = (self.best_state.take(), &self.best) {
             self.folder.write(&RunFolder::best_name(best.epoch), &state)?;
         }
-        self.folder.write_metrics(&self.records)?;
+        let metrics = self.write_records()?;
         self.folder.write_timing(&self.timing)?;
-        self.folder.write_receipt(&self.receipt("running", None, hash::bytes(state), None))?;
+        let hashes = [metrics, hash::bytes(state)];
+        self.folder.write_receipt(&self.receipt("running", None, hashes, None))?;
         self.folder.write(names::CHECKPOINT, state)?;
         self.folder.tidy(self.best.as_ref().map(|best| best.epoch));
         (self.written, self.pending) = (Instant::now(), false);
         Ok(())
     }
 
-    /// What the run can prove so far; `checkpoint` is the hash of the state after the last record.
+    /// Puts the records behind those on disk, and gives the hash of their text.
+    fn write_records(&mut self) -> Result<String, RunError> {
+        let log = match &mut self.log {
+            Some(log) => {
+                log.grow(&self.records)?;
+                log
+            }
+            none => none.insert(self.folder.begin_metrics(&self.records)?),
+        };
+        Ok(log.hash())
+    }
+
+    /// What the run can prove so far; `hashes` are those of the records' text and of the state after the last one.
     fn receipt(
         &self,
         status: &str,
         ledger: Option<&str>,
-        checkpoint: String,
+        hashes: [String; 2],
         test: Option<TestOutcome>,
     ) -> Receipt {
         let Self { session, records, best, text, .. } = self;
-        let receipt = proof::receipt(session, text, records, checkpoint, best.clone());
+        let receipt = proof::receipt(session, text, records, hashes, best.clone());
         Receipt {
             status: status.into(),
             ledger: ledger.map(hash::bytes),
@@ -467,7 +499,7 @@ impl<'a> Run<'a> {
         let checkpoint = hash::bytes(&state);
         let ledger = LedgerRecord::of(&self.session.engines());
         let ledger_text = ledger.to_json();
-        self.folder.write_metrics(&self.records)?;
+        let metrics = self.write_records()?;
         self.folder.write_timing(&self.timing)?;
         self.folder.write(names::LEDGER, ledger_text.as_bytes())?;
         let cost = super::report::cost(self.config, &ledger, &self.records);
@@ -495,7 +527,7 @@ impl<'a> Run<'a> {
         }
         let read = self.session.checkpoint();
         let test = self.session.test();
-        let receipt = self.receipt("finished", Some(&ledger_text), checkpoint, test);
+        let receipt = self.receipt("finished", Some(&ledger_text), [metrics, checkpoint], test);
         let page = super::report::Parts {
             config: self.config,
             text: &self.text,

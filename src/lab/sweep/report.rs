@@ -1,13 +1,13 @@
 //! The page of a sweep and its figures, beside the runs they link to.
 
-use std::fs;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use super::{Results, SweepError, results};
 use crate::lab::report::sweep::{Learning, SweepView, figures, html, png, text, wanted};
-use crate::lab::store::folder::{names, write_whole};
+use crate::lab::store::folder::{names, read_text};
 use crate::lab::store::index::{Store, StoreError, SweepRecord};
+use crate::lab::store::place::{clear_parts, make_folder, write_whole};
 use crate::lab::store::record::Outcome;
 
 /// Files that were written.
@@ -23,6 +23,8 @@ pub struct SweepPage {
     pub points: usize,
     /// Of these, finished.
     pub finished: usize,
+    /// Of these, finished once, but their folders are gone.
+    pub lost: usize,
 }
 
 /// Draws `STORE/NAME.html` and, if `pictures` are wanted, `STORE/figures/NAME-*.svg` and `.png`.
@@ -44,7 +46,8 @@ pub fn report(
     if pictures {
         let folder = store.path().join("figures");
         let fail = |error| StoreError::Io { doing: "make folder", path: folder.clone(), error };
-        fs::create_dir_all(&folder).map_err(fail)?;
+        make_folder(&folder).map_err(fail)?;
+        clear_parts(&folder);
         for figure in figures(&view) {
             let base = format!("{}-{}", record.name, figure.name);
             for (ending, bytes) in
@@ -62,6 +65,7 @@ pub fn report(
         figures: made,
         points: found.table.len(),
         finished: found.finished,
+        lost: found.lost,
     })
 }
 
@@ -84,7 +88,7 @@ fn learning(store: &Store, found: &Results, rows: &[usize]) -> Learning {
     for &row in rows {
         let finished = status.values.text(row).as_deref() == Some("finished");
         let Some(key) = keys.values.text(row).filter(|_| finished) else { continue };
-        let text = fs::read_to_string(store.folder(&key).join(names::METRICS)).unwrap_or_default();
+        let text = read_text(&store.folder(&key), names::METRICS).unwrap_or_default();
         let known = text.lines().map_while(|line| serde_json::from_str::<Known>(line).ok());
         learning.rows[row] = known
             .filter_map(|known| {
