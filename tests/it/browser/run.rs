@@ -77,7 +77,7 @@ fn values_of_a_run_are_told_to_pointer_and_keyboard_and_its_figures_can_be_saved
         const squares = document.querySelector('#confusion svg.chart');
         squares.focus(); press(squares, 'Home'); press(squares, 'ArrowDown'); const square = tip.textContent; squares.blur();
         const term = document.querySelector('#pathways thead a.term'); term.focus(); const word = tip.textContent; term.blur();
-        const heads = [...document.querySelectorAll('thead th')].filter((head) => head.textContent.trim());
+        const heads = [...document.querySelectorAll('thead th')].filter((head) => head.textContent.trim() && !head.querySelector('.ends'));
         const bare = heads.filter((head) => !head.querySelector('a.term') || !document.querySelector(head.querySelector('a.term').getAttribute('href')));
         const sums = [];
         for (const image of document.querySelectorAll('#maps img')) sums.push((await indicesOf(image.src)).out.reduce((sum, one) => sum + one, 0));
