@@ -105,13 +105,13 @@ pub(super) fn train(args: &TrainArgs) -> Done {
     let mut folder = PathBuf::new();
     let mut on_event = |event: RunEvent<'_>| {
         match event {
-            RunEvent::Started { folder: path, data, warnings, epoch, epochs } => {
+            RunEvent::Started { folder: path, data, warnings, rates, epoch, epochs } => {
                 folder = path.into();
                 meter = Meter::new(quiet, epochs);
                 if json {
                     let run = path.display().to_string();
                     say(&json!({"event": "started", "run": run, "data": data, "epoch": epoch,
-                        "epochs": epochs, "warnings": warnings})
+                        "epochs": epochs, "warnings": warnings, "rates": rates})
                     .to_string());
                 } else if !quiet {
                     meter.line(data);
@@ -121,6 +121,9 @@ pub(super) fn train(args: &TrainArgs) -> Done {
                         machine.backend().name(),
                         machine.threads()
                     ));
+                    for rate in rates {
+                        meter.line(&format!("rate of {rate}"));
+                    }
                     if epoch > 0 {
                         meter.line(&format!("continuing after epoch {epoch}"));
                     }
@@ -179,6 +182,7 @@ fn done(run: &str, outcome: &Trained) -> serde_json::Value {
         "event": "done",
         "run": run,
         "test_accuracy": receipt.classified().map(|test| test.score.fraction()),
+        "notes": outcome.notes.iter().map(ToString::to_string).collect::<Vec<_>>(),
         "test_epoch": receipt.test.as_ref().map(TestOutcome::epoch),
         "validation_accuracy": last.and_then(|r| r.validation()).map(|score| score.fraction()),
         "state_hash": last.map(|record| record.state_hash.clone()),
