@@ -6,9 +6,9 @@ use clap::Args;
 use serde_json::json;
 
 use super::{Done, Moved, data_root, say};
-use crate::lab::run;
 use crate::lab::store::index::{INDEX, Store};
 use crate::lab::sweep;
+use crate::lab::{report, run};
 
 #[derive(Debug, Args)]
 pub(super) struct ReportArgs {
@@ -23,6 +23,9 @@ pub(super) struct ReportArgs {
     data_dir: Option<PathBuf>,
     #[command(flatten)]
     moved: Moved,
+    /// Say what the columns of the table mean
+    #[arg(long)]
+    explain: bool,
     /// One JSON object on standard output
     #[arg(long)]
     json: bool,
@@ -68,6 +71,9 @@ fn run(path: &Path, args: &ReportArgs) -> Done {
     }
     if !args.quiet {
         say(&made.summary);
+        if args.explain {
+            say(&report::text::words());
+        }
         made.notes.iter().for_each(|note| say(&format!("left out {note}")));
     }
     say(&format!("report   {page}"));

@@ -117,13 +117,13 @@ pub(super) fn train(args: &TrainArgs) -> Done {
     let mut folder = PathBuf::new();
     let mut on_event = |event: RunEvent<'_>| {
         match event {
-            RunEvent::Started { folder: path, data, said, warnings, epoch, epochs } => {
+            RunEvent::Started { folder: path, data, said, warnings, rates, epoch, epochs } => {
                 folder = path.into();
                 meter = Meter::new(quiet, epochs);
                 if json {
                     let run = path.display().to_string();
                     say(&json!({"event": "started", "run": run, "data": data, "data_read": said, "epoch": epoch,
-                        "epochs": epochs, "warnings": warnings})
+                        "epochs": epochs, "warnings": warnings, "rates": rates})
                     .to_string());
                 } else if !quiet {
                     meter.line(data);
@@ -136,6 +136,9 @@ pub(super) fn train(args: &TrainArgs) -> Done {
                         machine.backend().name(),
                         machine.threads()
                     ));
+                    for rate in rates {
+                        meter.line(&format!("rate of {rate}"));
+                    }
                     if epoch > 0 {
                         meter.line(&format!("continuing after epoch {epoch}"));
                     }
@@ -194,6 +197,7 @@ fn done(run: &str, outcome: &Trained) -> serde_json::Value {
         "event": "done",
         "run": run,
         "test_accuracy": receipt.classified().map(|test| test.score.fraction()),
+        "notes": outcome.notes.iter().map(ToString::to_string).collect::<Vec<_>>(),
         "test_epoch": receipt.test.as_ref().map(TestOutcome::epoch),
         "validation_accuracy": last.and_then(|r| r.validation()).map(|score| score.fraction()),
         "state_hash": last.map(|record| record.state_hash.clone()),

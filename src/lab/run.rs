@@ -4,6 +4,7 @@
 //! one. Neither prints: callers get [`RunEvent`]s.
 
 mod classify;
+mod notes;
 mod profile;
 mod proof;
 mod report;
@@ -14,6 +15,7 @@ mod train;
 mod verify;
 mod weigh;
 
+pub use notes::notes;
 pub use profile::{Act, Profile, profile};
 pub use proof::{records, untouched};
 pub use report::{ReportMade, report};

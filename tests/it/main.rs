@@ -10,6 +10,7 @@ mod bad_input;
 mod bench;
 mod browser;
 mod damage;
+mod defaults;
 mod examples;
 mod facade;
 mod golden_run;

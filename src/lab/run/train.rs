@@ -7,6 +7,7 @@
 use std::path::Path;
 use std::time::{Duration, Instant};
 
+use super::notes::{Watcher, with_calibration};
 use super::session::chosen;
 use super::{Machine, Progress, RunError, Session, proof};
 use crate::lab::config::{self, Config, Select, Sources};
@@ -15,7 +16,7 @@ use crate::lab::price::Cost;
 use crate::lab::store::folder::{self, FolderError, MetricsLog, RunFolder, names};
 use crate::lab::store::ledger::LedgerRecord;
 use crate::lab::store::record::{
-    BestRecord, DataRecord, EpochRecord, Receipt, TestOutcome, TimingRecord,
+    BestRecord, DataRecord, EpochRecord, Note, RateRecord, Receipt, TestOutcome, TimingRecord,
 };
 use crate::lab::store::{address, hash};
 
@@ -35,6 +36,8 @@ pub enum RunEvent<'a> {
         said: &'a [String],
         /// What the user should know.
         warnings: &'a [String],
+        /// The rate of each layer, as it was asked for and as it is.
+        rates: &'a [RateRecord],
         /// Epochs finished before (0 unless continued).
         epoch: u32,
         /// Epochs in all.
@@ -77,6 +80,8 @@ pub struct Trained {
     pub records: Vec<EpochRecord>,
     /// What it took here.
     pub timing: TimingRecord,
+    /// What to know beside the result, as [`notes`](super::notes()) says it.
+    pub notes: Vec<Note>,
     /// The summary table.
     pub summary: String,
     /// What it cost on its chip, the final test aside.
@@ -294,6 +299,8 @@ struct Run<'a> {
     best: Option<BestRecord>,
     /// It, while it is not on disk.
     best_state: Option<Vec<u8>>,
+    /// What the records show.
+    seen: Watcher,
 }
 
 impl<'a> Run<'a> {
@@ -324,6 +331,7 @@ impl<'a> Run<'a> {
             pending: false,
             best: None,
             best_state: None,
+            seen: Watcher::default(),
         }
     }
 
@@ -334,6 +342,7 @@ impl<'a> Run<'a> {
         self.log = None;
         self.timing.epoch_seconds.clear();
         (self.best, self.best_state) = (None, None);
+        self.seen = Watcher::default();
     }
 
     /// Brings the session to the last finished epoch on disk; to none when there is no checkpoint.
@@ -374,6 +383,7 @@ impl<'a> Run<'a> {
         records.truncate(epoch as usize + 1);
         for record in &records {
             let _ = self.session.note(record);
+            let _ = self.seen.look(record);
         }
         self.best = self.best_on_disk(&path, &records)?;
         self.records = records;
@@ -414,11 +424,13 @@ impl<'a> Run<'a> {
             data: &self.about.description,
             said: &self.about.said,
             warnings: &self.session.warnings(),
+            rates: self.session.rates(),
             epoch: self.session.epoch(),
             epochs,
         });
         if self.records.is_empty() {
             let record = self.session.start();
+            let _ = self.seen.look(&record);
             self.keep(record, 0.0)?;
         }
         while self.session.epoch() < epochs {
@@ -427,12 +439,12 @@ impl<'a> Run<'a> {
             let Some((record, seconds)) = learnt else {
                 return Err(RunError::Stopped { epoch, path: path.display().to_string() });
             };
-            let notes: Vec<_> =
-                self.session.note(&record).iter().map(ToString::to_string).collect();
+            let _ = self.session.note(&record);
+            let notes = self.seen.look(&record);
             self.keep(record, seconds)?;
             on_event(RunEvent::Epoch(self.records.last().expect("just kept"), seconds));
             for note in notes {
-                on_event(RunEvent::Warning(&note));
+                on_event(RunEvent::Warning(&note.to_string()));
             }
         }
         self.finish()
@@ -561,7 +573,8 @@ impl<'a> Run<'a> {
         if !self.keeping.states {
             self.folder.forget_states();
         }
+        let notes = with_calibration(&receipt, &self.seen);
         let Self { records, timing, .. } = self;
-        Ok(Trained { receipt, records, timing, summary: page.summary, cost })
+        Ok(Trained { receipt, records, timing, notes, summary: page.summary, cost })
     }
 }
