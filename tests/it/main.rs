@@ -20,6 +20,8 @@ mod keys;
 mod laws;
 mod oracle;
 mod output;
+mod own_data;
+mod own_runs;
 mod program;
 mod report;
 mod rules;
