@@ -5,7 +5,9 @@ use serde_json::json;
 
 use super::{Done, Failure, say, usage};
 use crate::chip::hardware::{Adc, AdcRange, Hardware, PulseCode, Subtract, Timing};
-use crate::lab::config::{self, Config, Constant, CostTable, Sources, builtin_models, load_model};
+use crate::lab::config::{
+    self, Config, Constant, CostTable, Sources, absent_words, builtin_models, load_model,
+};
 use crate::lab::price::{Convention, bounds, figures, peak, prefixed};
 
 /// Error words that `hw show` reckons with: those of ten classes.
@@ -62,8 +64,8 @@ pub(super) fn execute(command: &HwCommand) -> Done {
         }
         HwCommand::Show { model, settings } => show(model, settings)?,
         HwCommand::Peak(args) => show_peak(args)?,
-        HwCommand::Check { model } => {
-            let model = load_model(model).map_err(|e| usage(&e.to_string()))?;
+        HwCommand::Check { model: name } => {
+            let model = load_model(name).map_err(|e| usage(&e.to_string()))?;
             let complaints = model.constants.complaints();
             if !complaints.is_empty() {
                 return Err(Failure { code: 1, message: complaints.join("\n") });
@@ -73,6 +75,9 @@ pub(super) fn execute(command: &HwCommand) -> Done {
                 "{}: valid; every table has a source, {numbers} physical numbers lie where they can",
                 model.name
             ));
+            let config = changed(name, &[])?;
+            say(&format!("on/off {}", on_off(&config.hardware)));
+            say(&format!("{}: dalean hw show {name}", absent_words(&config.absent())));
         }
     }
     Ok(())
@@ -113,11 +118,10 @@ fn show(name: &str, settings: &[String]) -> Done {
             say(&format!("  {:16} {}", constant.quantity.name, constant_text(constant, unit)));
         }
     }
-    if !config.not_simulated.is_empty() {
-        say("\nNot simulated:");
-    }
-    for (what, how) in &config.not_simulated {
-        say(&format!("  {what}: {how}"));
+    let absent = config.absent();
+    say(&format!("\n{}:", absent_words(&absent)));
+    for one in &absent {
+        say(&format!("  {}: {}", one.name(), one.text()));
     }
     say(&format!("\n{}", model.text.trim_end()));
     Ok(())
@@ -196,6 +200,25 @@ fn show_peak(args: &PeakArgs) -> Done {
     Ok(())
 }
 
+/// What the floor of a cell is as a ratio of conductances.
+fn on_off(hardware: &Hardware) -> String {
+    let window = hardware.cell.window;
+    let (floor, ceiling) = (window.floor(), window.ceiling());
+    if floor > 0 {
+        let ratio = f64::from(ceiling) / f64::from(floor);
+        return format!("{ratio:.1} to 1: hw.cell.ceiling over hw.cell.floor");
+    }
+    // the nearest floor of ten to one that a cell can have
+    let tenth = (u32::from(ceiling) + 5) / 10;
+    match tenth {
+        0 => "without end: level 0 conducts nothing".into(),
+        floor => format!(
+            "without end: level 0 conducts nothing; {:.1} to 1 with hw.cell.floor = {floor}",
+            f64::from(ceiling) / f64::from(floor)
+        ),
+    }
+}
+
 fn numbers(hardware: &Hardware) -> Vec<(&'static str, String)> {
     let h = hardware;
     let converter = match h.adc {
@@ -217,6 +240,7 @@ fn numbers(hardware: &Hardware) -> Vec<(&'static str, String)> {
     let window = (h.cell.window.floor(), h.cell.window.ceiling());
     vec![
         ("cell", format!("{} bits, levels {}..={}", h.cell.level_bits.get(), window.0, window.1)),
+        ("on/off", on_off(h)),
         ("tile", format!("{} x {} cells a bank", h.tile.rows, h.tile.columns)),
         (
             "drive",

@@ -6,15 +6,18 @@ use clap::Args;
 use serde_json::json;
 
 use super::{Done, Shared, configuration, say};
-use crate::lab::price::{Bill, Convention, EnergySplit, Group, Images, areas, bounds, prefixed};
-use crate::lab::run::{self, Act, Profile};
+use crate::lab::config::{Config, absent_words};
+use crate::lab::price::{
+    Bill, Convention, EnergySplit, EnergyTotal, Group, Images, areas, bounds, prefixed,
+};
+use crate::lab::run::{self, Act, ModeUse, Profile};
 
 /// Assumed constants named in a table.
 const NAMED: usize = 5;
 /// Share of the total from which memory of digital sums is explained.
 const SHOWN: f64 = 0.05;
 /// What that memory is, and what does without.
-const SUMS: &str = "a product is added to a 32-bit sum, 64 bits out and in; learning.mode = \"online\" or \"replay\" has none";
+const SUMS: &str = "a product is added to a 32-bit sum, 64 bits out and in; learning.mode = \"online\" or \"replay\" does without";
 
 #[derive(Debug, Args)]
 pub(super) struct PriceArgs {
@@ -59,7 +62,7 @@ pub(super) fn price(args: &PriceArgs) -> Done {
             .collect();
         let mut object = json!({"event": "price", "run": args.run.display().to_string(),
             "made_on": run.made_on, "priced_as": run.priced_as, "changes": changes,
-            "cycles": run.ledger.elapsed()});
+            "cycles": run.ledger.elapsed(), "not_simulated": run.absent});
         merge(&mut object, bill.to_json(&run.images));
         say(&object.to_string());
         return Ok(());
@@ -86,6 +89,7 @@ pub(super) fn price(args: &PriceArgs) -> Done {
         show_groups(heading, &groups, bill.total().joules[1]);
     }
     show_missing(&bill);
+    say(&format!("{}: see the page of the run", absent_words(&run.absent)));
     Ok(())
 }
 
@@ -102,9 +106,11 @@ fn show_energy(bill: &Bill<'_>, images: &Images) {
     if let Some(share) = bill.sums_share().filter(|&share| share >= SHOWN) {
         say(&format!("  {:.0} % is memory of the digital sums: {SUMS}", 100.0 * share));
     }
-    for one in bill.per_image(images) {
+    // of a single one, the total is said above
+    for one in bill.per_image(images).into_iter().filter(|one| one.images > 1) {
         let time = one.seconds.map_or_else(String::new, |s| format!(", {}", prefixed(s, "s")));
-        say(&format!("to {}, of {}: {}{time}", one.doing(), one.images, one.total.words()));
+        let (doing, total) = (one.doing(), one.total.words());
+        say(&format!("to {doing}, the mean of {}: {total}{time}", one.images));
         show_split(&one.split, one.total.joules[1]);
     }
     show_groups("by component", &bill.by_component(), total.joules[1]);
@@ -151,9 +157,14 @@ pub(super) fn profile(args: &ProfileArgs) -> Done {
     let config = configuration(args.file.as_ref(), args.hw.as_deref(), &args.settings, args.seed)?;
     let profile = run::profile(&config, &shared.data_root(), shared.machine()?)?;
     if shared.json {
+        say(&plan_json(&config, &profile).to_string());
         for act in &profile.acts {
             say(&act_json(&profile, act).to_string());
         }
+        for mode in &profile.modes {
+            say(&mode_json(&profile, mode).to_string());
+        }
+        say(&json!({"event": "not_simulated", "effects": config.absent()}).to_string());
         return Ok(());
     }
     let tiles = profile.plan.tiles(&profile.hardware);
@@ -168,21 +179,77 @@ pub(super) fn profile(args: &ProfileArgs) -> Done {
         say(&format!("area of {name}: {typical:.3} mm2 ({low:.3} to {high:.3})"));
     }
     if !shared.quiet {
-        // what is not simulated is a list of its own: `hw show`
-        let warnings = profile.warnings.iter().filter(|text| !text.starts_with("not simulated"));
-        for warning in warnings {
+        for warning in &profile.warnings {
             say(&format!("warning: {warning}"));
-        }
-        let effects: Vec<_> =
-            config.not_simulated.keys().map(|key| key.replace('_', " ")).collect();
-        if !effects.is_empty() {
-            say(&format!("not simulated: {} (see dalean hw show)", effects.join(", ")));
         }
     }
     for act in &profile.acts {
         show_act(&profile, act);
     }
+    show_modes(&profile);
+    say(&format!("\n{}: see dalean hw show MODEL", absent_words(&config.absent())));
     Ok(())
+}
+
+/// The same batch in every mode of writing it, an image at a time.
+fn show_modes(profile: &Profile) {
+    let own = profile.modes.iter().find_map(|mode| Some((mode, mode.act.as_ref().ok()?)));
+    let Some((_, first)) = own else { return };
+    let classes: Vec<_> = profile.bill(first).split(None).iter().map(|split| split.class).collect();
+    say("\nTHE SAME BATCH IN EVERY learning.mode, an image of it");
+    let mut head = format!("  {:12}{:>10}{:>12}{:>15}", "", "cycles", "time", "energy");
+    for class in &classes {
+        head += &format!("{:>14}", class.name());
+    }
+    say(&head);
+    for mode in &profile.modes {
+        let act = match &mode.act {
+            Ok(act) => act,
+            Err(why) => {
+                say(&format!("  {:12} cannot be had here: {why}", mode.mode));
+                continue;
+            }
+        };
+        let bill = profile.bill(act);
+        let Some(one) = bill.per_image(&act.images()).into_iter().next() else { continue };
+        let cycles = act.cycles().map(|cycles| cycles.elapsed as f64 / act.samples as f64);
+        let mut line = format!(
+            "  {:12}{:>10}{:>12}{:>15}",
+            mode.mode,
+            cycles.map_or_else(|| "-".into(), |cycles| format!("{cycles:.0}")),
+            one.seconds.map_or_else(|| "-".into(), |seconds| prefixed(seconds, "s")),
+            least(&one.total)
+        );
+        for class in &classes {
+            let part = one.split.iter().find(|split| split.class == *class);
+            line += &format!("{:>14}", part.map_or_else(|| "-".into(), |part| least(&part.total)));
+        }
+        let notes = [mode.own.then_some("this experiment"), mode.also];
+        let notes: Vec<_> = notes.into_iter().flatten().collect();
+        say(format!("{line}  {}", notes.join(", ")).trim_end());
+    }
+}
+
+/// Typical joules in a table: `-` where nothing has a price, a bound where only some has.
+fn least(total: &EnergyTotal) -> String {
+    match (total.priced, total.whole()) {
+        (0, _) => "-".into(),
+        (_, Some(joules)) => prefixed(joules[1], "J"),
+        (_, None) => format!(">= {}", prefixed(total.joules[1], "J")),
+    }
+}
+
+fn mode_json(profile: &Profile, mode: &ModeUse) -> serde_json::Value {
+    let mut object =
+        json!({"event": "mode", "mode": mode.mode, "own": mode.own, "also": mode.also});
+    let more = match &mode.act {
+        Ok(act) => act_json(profile, act),
+        Err(why) => json!({"refused": why}),
+    };
+    let event = object["event"].take();
+    merge(&mut object, more);
+    object["event"] = event;
+    object
 }
 
 /// Operations a second and a joule; a partial sum of joules has no such rate.
@@ -191,6 +258,17 @@ fn rates(act: &Act, bill: &Bill<'_>) -> (Option<f64>, Option<f64>) {
     let rate = bill.seconds_total().filter(|&s| s > 0.0).map(|seconds| operations / seconds);
     let joules = bill.total().whole().map(|joules| joules[1]).filter(|&joules| joules > 0.0);
     (rate, joules.map(|joules| operations / joules))
+}
+
+/// What the network takes of the chip.
+fn plan_json(config: &Config, profile: &Profile) -> serde_json::Value {
+    let Profile { plan, hardware, constants, .. } = profile;
+    let areas = areas(plan, hardware, constants).into_iter();
+    let areas: Vec<_> =
+        areas.map(|(name, area)| json!({"name": name, "square_metres": area})).collect();
+    json!({"event": "plan", "data": config.data_name(), "hardware": config.hardware_name,
+        "cells": plan.cells(), "tiles": plan.tiles(hardware), "areas": areas,
+        "warnings": profile.warnings})
 }
 
 fn act_json(profile: &Profile, act: &Act) -> serde_json::Value {

@@ -13,7 +13,7 @@ mod task;
 mod train;
 mod verify;
 
-pub use profile::{Act, Profile, profile};
+pub use profile::{Act, ModeUse, Profile, profile};
 pub use proof::records;
 pub use report::{ReportMade, report};
 pub use repriced::{Prices, Repriced, reprice, reprice_as};

@@ -16,6 +16,7 @@ mod golden_run;
 mod hardware;
 mod laws;
 mod oracle;
+mod prices;
 mod program;
 mod report;
 mod rules;

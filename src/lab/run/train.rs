@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 
 use super::session::chosen;
 use super::{Machine, Progress, RunError, Session, proof};
-use crate::lab::config::{self, Config, Select, Sources};
+use crate::lab::config::{self, Absent, Config, Select, Sources};
 use crate::lab::data::{self, Data, DataRoot, ImageShape};
 use crate::lab::price::Cost;
 use crate::lab::store::folder::{self, FolderError, RunFolder, names};
@@ -79,6 +79,8 @@ pub struct Trained {
     pub summary: String,
     /// What it cost on its chip, the final test aside.
     pub cost: Cost,
+    /// What real chips do and the run did not.
+    pub absent: Vec<Absent>,
 }
 
 /// Trains a configuration in a new folder below `root`.
@@ -506,6 +508,7 @@ impl<'a> Run<'a> {
             self.folder.forget_states();
         }
         let Self { records, timing, .. } = self;
-        Ok(Trained { receipt, records, timing, summary: page.summary, cost })
+        let absent = self.config.absent();
+        Ok(Trained { receipt, records, timing, summary: page.summary, cost, absent })
     }
 }

@@ -3,6 +3,7 @@
 use super::axis::Value;
 use super::row::{RESULTS, ResultKind, Row};
 use super::{Sweep, SweepError};
+use crate::lab::config::EFFECTS;
 use crate::lab::report::sweep::{Figures, Refused, ShownAxis};
 use crate::lab::store::index::{Store, SweepRecord};
 use crate::lab::table::{Column, ColumnUnit, Role, Table, Values};
@@ -136,10 +137,7 @@ pub fn results(store: &Store, record: &SweepRecord) -> Result<Results, SweepErro
         Some(Refused { point: point.number as usize, what: words(at), why })
     });
     let refused = refused.collect();
-    let mut not_simulated: Vec<String> =
-        rows.iter().flatten().flat_map(|row| row.not_simulated.iter().cloned()).collect();
-    not_simulated.sort();
-    not_simulated.dedup();
+    let not_simulated = left_out(rows.iter().flatten());
     let axes = sweep.axes.iter().zip(&columns[1..]).map(|(axis, column)| ShownAxis {
         name: axis.name.clone(),
         label: axis.label.clone(),
@@ -160,6 +158,19 @@ pub fn results(store: &Store, record: &SweepRecord) -> Result<Results, SweepErro
     let figures = Figures { cost, ..sweep.figures.clone() };
     let finished = rows.iter().flatten().count();
     Ok(Results { sweep, table, axes, figures, refused, not_simulated, finished })
+}
+
+/// What real chips do and the runs did not: the program's own list first, then what the models say of their chips.
+fn left_out<'a>(rows: impl Iterator<Item = &'a Row> + Clone) -> Vec<String> {
+    let has = |key: &str| rows.clone().any(|row| row.absent.iter().any(|absent| absent == key));
+    let effects = EFFECTS.iter().filter(|effect| has(effect.key));
+    let general =
+        effects.map(|effect| format!("{}: {}", effect.key.replace('_', " "), effect.instead));
+    let mut of_models: Vec<String> =
+        rows.clone().flat_map(|row| row.not_simulated.iter().cloned()).collect();
+    of_models.sort();
+    of_models.dedup();
+    general.chain(of_models).collect()
 }
 
 /// Whole numbers if all are, else numbers if all are, else words.

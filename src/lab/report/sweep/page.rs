@@ -246,10 +246,12 @@ fn notices(view: &SweepView<'_>) -> String {
     let mut out = String::new();
     if !view.not_simulated.is_empty() {
         let list = view.not_simulated.iter();
-        let list: String = list
-            .map(|text| format!("<li>Not simulated: <code>{}</code></li>", escape(text)))
-            .collect();
-        out += &format!("<ul class=\"notices\">{list}</ul>\n");
+        let list: String = list.map(|text| format!("<li>{}</li>", escape(text))).collect();
+        out += &format!(
+            "<details class=\"refused\" id=\"absent\"><summary>Not simulated: {} effects of real chips, and figures of \
+             these</summary><ul>{list}</ul></details>\n",
+            tally(view.not_simulated.len())
+        );
     }
     if !view.refused.is_empty() {
         let list = view.refused.iter().map(|one| {
