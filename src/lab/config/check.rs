@@ -4,10 +4,11 @@
 use std::collections::BTreeMap;
 use std::fmt::Display;
 
-use super::file::{DataFile, ExperimentFile, HardwareFile, LearningFile, NetworkFile, PerLayer};
+use super::file::{ChipFile, DataFile, ExperimentFile, LearningFile, NetworkFile, PerLayer};
 use super::quantity::Constants;
 use super::{ConfigError, Sources, chip, data};
 use crate::chip::hardware::Hardware;
+use crate::lab::near;
 use crate::learn::error::Centre;
 use crate::learn::route::Route;
 use crate::learn::rule::{Rule, UpdateMode};
@@ -104,6 +105,8 @@ pub struct Config {
     pub(crate) not_simulated: BTreeMap<String, String>,
     /// Name of the hardware model.
     pub(crate) hardware_name: String,
+    /// The hardware model that it was laid over, while that is known.
+    pub(super) model: Option<toml::Table>,
     pub(super) resolved: ExperimentFile,
 }
 
@@ -124,10 +127,11 @@ pub(super) fn word<T: Copy>(
 ) -> Result<T, ConfigError> {
     let value = value.get_or_insert_with(|| default.into());
     let found = words.iter().find(|(word, _)| word == value);
-    let names = || words.iter().map(|(word, _)| *word).collect::<Vec<_>>().join(", ");
-    found
-        .map(|(_, meaning)| *meaning)
-        .ok_or_else(|| wrong(key, format!("is \"{value}\""), format!("it is one of {}", names())))
+    found.map(|(_, meaning)| *meaning).ok_or_else(|| {
+        let names: Vec<_> = words.iter().map(|(word, _)| *word).collect();
+        let hint = near::hint(value, names.iter().copied());
+        wrong(key, format!("is \"{value}\""), format!("it is one of {}{hint}", names.join(", ")))
+    })
 }
 
 pub(super) fn between(key: &str, found: i64, min: i64, max: i64) -> Result<i64, ConfigError> {
@@ -165,7 +169,7 @@ pub(super) fn positive(key: &str, value: f64) -> Result<Positive, ConfigError> {
 pub(super) fn config(mut file: ExperimentFile) -> Result<Config, ConfigError> {
     word("task", &mut file.task, "classify", &[("classify", ())])?;
     let seed = *file.seed.get_or_insert(1);
-    let hw = file.hw.get_or_insert_with(HardwareFile::default);
+    let ChipFile(hw) = file.hw.get_or_insert_with(ChipFile::default);
     let hardware = chip::resolve(hw, "hw.")?;
     let constants = Constants::new(hw, "hw.")?;
     let hardware_name = hw.name.get_or_insert_with(|| "unnamed".into()).clone();
@@ -217,6 +221,7 @@ pub(super) fn config(mut file: ExperimentFile) -> Result<Config, ConfigError> {
         constants,
         not_simulated,
         hardware_name,
+        model: None,
         resolved: file,
     })
 }

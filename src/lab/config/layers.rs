@@ -1,6 +1,7 @@
 //! Laying texts over one another: built-in defaults, hardware model, experiment file, a sweep's keys, `--set`, `--hw`.
 
 use super::file::{ExperimentFile, HardwareFile};
+use super::wrong::text_error;
 use super::{Config, ConfigError, check, hardware};
 
 /// Where a configuration comes from, weakest first.
@@ -51,16 +52,16 @@ pub fn load(sources: &Sources<'_>) -> Result<Config, ConfigError> {
     let mut table = toml::Table::new();
     if let Some((name, text)) = sources.experiment {
         let _: ExperimentFile = parse(name, text)?;
-        overlay(&mut table, parse(name, text)?);
+        lay(&mut table, parse(name, text)?);
     }
     for Overlay { place, table: over } in sources.overlays {
         let _: ExperimentFile = table_of(place, over)?;
-        overlay(&mut table, (*over).clone());
+        lay(&mut table, (*over).clone());
     }
     for setting in sources.settings {
         match taken_back(setting)? {
             Some(keys) => remove(&mut table, &keys),
-            None => overlay(&mut table, setting_table(setting)?),
+            None => lay(&mut table, setting_table(setting)?),
         }
     }
     if let Some(model) = sources.hardware {
@@ -88,17 +89,27 @@ pub fn load(sources: &Sources<'_>) -> Result<Config, ConfigError> {
         let _: HardwareFile = hardware::model_file(&name, &text)?;
         parse(&name, &text)?
     };
+    let model = own.get("name").is_none().then(|| hw.clone());
     overlay(&mut hw, own);
     hw.remove("model");
     table.insert("hw".into(), toml::Value::Table(hw));
-    check::config(table_of("configuration", &table)?)
+    let mut config = check::config(table_of("configuration", &table)?)?;
+    config.model = model;
+    Ok(config)
+}
+
+/// Lays a text over what weaker ones said: `hw = "reram"` is `hw.model = "reram"`.
+fn lay(under: &mut toml::Table, mut over: toml::Table) {
+    if let Some(hw @ toml::Value::String(_)) = over.get_mut("hw") {
+        let name = hw.clone();
+        *hw = toml::Value::Table(toml::Table::from_iter([("model".to_owned(), name)]));
+    }
+    overlay(under, over);
 }
 
 /// A table as what its keys mean.
 fn table_of(place: &str, table: &toml::Table) -> Result<ExperimentFile, ConfigError> {
-    let error =
-        |e: toml::de::Error| ConfigError::Text { place: place.into(), error: e.to_string() };
-    table.clone().try_into().map_err(error)
+    table.clone().try_into().map_err(|error| text_error(place, &error))
 }
 
 /// One key with its value as a table: `hw.cell.level_bits` and 4 make `{ hw = { cell = { level_bits = 4 } } }`.
@@ -117,8 +128,7 @@ pub(super) fn parse<T: serde::de::DeserializeOwned>(
     place: &str,
     text: &str,
 ) -> Result<T, ConfigError> {
-    toml::from_str(text)
-        .map_err(|e| ConfigError::Text { place: place.into(), error: e.to_string() })
+    toml::from_str(text).map_err(|error| text_error(place, &error))
 }
 
 /// `key=value` as a table: the value as TOML, or as a bare word.
@@ -205,6 +215,30 @@ mod tests {
         assert_eq!((config.seed, config.epochs), (3, 7));
         assert_eq!(config.rule, crate::learn::rule::Rule::Dfa);
         assert_eq!(config.hardware.cell.window.ceiling(), 15);
+    }
+
+    #[test]
+    fn a_chip_is_named_in_a_word_or_in_a_table() {
+        let load = |text: &str, settings: &[&str]| {
+            let settings: Vec<String> = settings.iter().map(ToString::to_string).collect();
+            let experiment = Some(("x.toml", text));
+            load(&Sources { experiment, settings: &settings, ..Sources::default() })
+        };
+        let table = load("[hw]\nmodel = \"reram\"\nadc.bits = 4", &[]).unwrap();
+        for (text, settings) in [
+            ("hw = \"reram\"", &["hw.adc.bits=4"][..]),
+            ("", &["hw=reram", "hw.adc.bits=4"]),
+            ("hw = \"ideal\"", &["hw = reram", "hw.adc.bits=4"]),
+        ] {
+            let word = load(text, settings).unwrap();
+            assert_eq!(word.to_toml(), table.to_toml(), "{text} {settings:?}");
+        }
+        let error = load("hw = 3", &[]).unwrap_err().to_string();
+        assert!(error.contains("the name of a hardware model, or a table"), "{error}");
+        let error = load("hw = \"reramm\"", &[]).unwrap_err().to_string();
+        assert!(error.contains("did you mean \"reram\"?"), "{error}");
+        let error = load("[hw]\nadcs = 3", &[]).unwrap_err().to_string();
+        assert!(error.contains("line 2") && error.contains("did you mean `adc`?"), "{error}");
     }
 
     #[test]

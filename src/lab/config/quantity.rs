@@ -43,8 +43,17 @@ impl CostTable {
         }
     }
 
+    /// Unit of its numbers.
+    const fn unit(self) -> &'static str {
+        match self {
+            Self::Energy => "J",
+            Self::Power => "W",
+            Self::Area => "m2",
+        }
+    }
+
     /// Units of its keys, and what one is in joules, watts or square metres.
-    const fn units(self) -> &'static [(&'static str, f64)] {
+    pub(super) const fn units(self) -> &'static [(&'static str, f64)] {
         match self {
             Self::Energy => {
                 &[("aj", 1e-18), ("fj", 1e-15), ("pj", 1e-12), ("nj", 1e-9), ("uj", 1e-6)]
@@ -87,6 +96,30 @@ pub struct Quantity {
     pub sane: [f64; 2],
     /// Why that interval.
     pub why: &'static str,
+}
+
+impl Quantity {
+    /// What it is and where it can lie, in words.
+    #[must_use]
+    pub fn about(&self) -> String {
+        let (unit, per) = (self.table.unit(), self.per.text());
+        let [least, most] = self.sane;
+        format!("{per}; on any chip it lies in {least:e} to {most:e} {unit}: {}", self.why)
+    }
+}
+
+impl Per {
+    fn text(self) -> String {
+        match self {
+            Self::Event(event) => format!("An event `{}`", event.name()),
+            Self::Chip => "The chip".into(),
+            Self::Tile => "A tile in use".into(),
+            Self::Column => "A column of a bank of a tile in use".into(),
+            Self::Cell => "A cell of the network".into(),
+            Self::Row => "A row driver of a bank of a tile in use".into(),
+            Self::Converter => "A converter of a tile in use".into(),
+        }
+    }
 }
 
 const fn energy(name: &'static str, event: Event, sane: [f64; 2], why: &'static str) -> Quantity {
@@ -241,6 +274,15 @@ pub struct Constant {
 }
 
 impl Constant {
+    /// Which law brought it to this setting, if one did.
+    #[must_use]
+    pub fn scaled(&self) -> Option<&str> {
+        match &self.standing {
+            Standing::Scaled(law) => Some(law),
+            Standing::Stated | Standing::NotHere(_) => None,
+        }
+    }
+
     /// Why it prices nothing here, if it does not.
     #[must_use]
     pub fn not_here(&self) -> Option<&str> {
@@ -248,6 +290,16 @@ impl Constant {
             Standing::NotHere(why) => Some(why),
             Standing::Stated | Standing::Scaled(_) => None,
         }
+    }
+}
+
+impl Constant {
+    /// What one unit of its key is in joules, watts or square metres.
+    #[must_use]
+    pub fn worth(&self) -> f64 {
+        let ends = |unit: &str| self.key.rsplit('_').next() == Some(unit);
+        let unit = self.quantity.table.units().iter().find(|(unit, _)| ends(unit));
+        unit.map_or(1.0, |(_, worth)| *worth)
     }
 }
 
