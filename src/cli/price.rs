@@ -7,10 +7,10 @@ use serde_json::json;
 
 use super::{Done, Shared, configuration, known, say};
 use crate::lab::config::{Config, absent_words};
-use crate::lab::price::{
-    Bill, Convention, EnergySplit, EnergyTotal, Group, Images, areas, bounds, prefixed,
-};
-use crate::lab::run::{self, Act, ModeUse, Profile};
+use crate::lab::price::{Bill, Convention, EnergySplit, Group, Images, areas, bounds, prefixed};
+use crate::lab::run::{self, Act, ModeUse, Profile, Repriced};
+
+mod tables;
 
 /// Assumed constants named in a table.
 const NAMED: usize = 5;
@@ -24,10 +24,10 @@ pub(super) struct PriceArgs {
     /// Folder of a finished run
     #[arg(value_hint = clap::ValueHint::DirPath)]
     run: PathBuf,
-    /// Constants of another hardware model: a built-in name or a file
+    /// Constants of another hardware model: a built-in name or a file (several: side by side)
     #[arg(long, value_name = "FILE", value_parser = known::models(), hide_possible_values = true)]
-    hw: Option<String>,
-    /// One JSON object on standard output
+    hw: Vec<String>,
+    /// One JSON object a model on standard output
     #[arg(long)]
     json: bool,
 }
@@ -50,24 +50,40 @@ pub(super) struct ProfileArgs {
 }
 
 pub(super) fn price(args: &PriceArgs) -> Done {
-    let run = run::reprice(&args.run, args.hw.as_deref())?;
-    let bill = run.bill();
+    let priced = |hw: Option<&String>| run::reprice(&args.run, hw.map(String::as_str));
+    let runs: Vec<Repriced> = match &*args.hw {
+        [] => vec![priced(None)?],
+        models => models.iter().map(|hw| priced(Some(hw))).collect::<Result<_, _>>()?,
+    };
     if args.json {
-        let changes: Vec<_> = run
-            .changes
-            .iter()
-            .map(|change| {
-                let events: Vec<_> = change.events.iter().map(|event| event.name()).collect();
-                json!({"key": change.key, "events": events, "time": change.time})
-            })
-            .collect();
-        let mut object = json!({"event": "price", "run": args.run.display().to_string(),
-            "made_on": run.made_on, "priced_as": run.priced_as, "changes": changes,
-            "cycles": run.ledger.elapsed(), "not_simulated": run.absent});
-        merge(&mut object, bill.to_json(&run.images));
-        say(&object.to_string());
+        for run in &runs {
+            say(&price_json(args, run).to_string());
+        }
         return Ok(());
     }
+    match &*runs {
+        [run] => show_price(run),
+        runs => tables::side_by_side(runs),
+    }
+    say(&format!("{}: see the page of the run", absent_words(&runs[0].absent)));
+    Ok(())
+}
+
+fn price_json(args: &PriceArgs, run: &Repriced) -> serde_json::Value {
+    let changes = run.changes.iter().map(|change| {
+        let events: Vec<_> = change.events.iter().map(|event| event.name()).collect();
+        json!({"key": change.key, "events": events, "time": change.time})
+    });
+    let mut object = json!({"event": "price", "run": args.run.display().to_string(),
+        "made_on": run.made_on, "priced_as": run.priced_as,
+        "changes": changes.collect::<Vec<_>>(), "cycles": run.ledger.elapsed(),
+        "not_simulated": run.absent});
+    merge(&mut object, run.bill().to_json(&run.images));
+    object
+}
+
+fn show_price(run: &Repriced) {
+    let bill = run.bill();
     say(&format!("run on {}, constants of {}", run.made_on, run.priced_as));
     if !run.changes.is_empty() {
         let keys: Vec<_> = run.changes.iter().map(|change| change.key).collect();
@@ -90,8 +106,6 @@ pub(super) fn price(args: &PriceArgs) -> Done {
         show_groups(heading, &groups, bill.total().joules[1]);
     }
     show_missing(&bill);
-    say(&format!("{}: see the page of the run", absent_words(&run.absent)));
-    Ok(())
 }
 
 fn merge(object: &mut serde_json::Value, more: serde_json::Value) {
@@ -147,6 +161,9 @@ fn show_groups(heading: &str, groups: &[Group], total: f64) {
 }
 
 fn show_missing(bill: &Bill<'_>) {
+    for (key, law) in &bill.scaled {
+        say(&format!("by law: {key}: {law}"));
+    }
     for missing in &bill.missing {
         let count = missing.count.map_or_else(String::new, |count| format!(" ({count})"));
         say(&format!("no price: {}{count}: {}", missing.what, missing.why));
@@ -187,57 +204,9 @@ pub(super) fn profile(args: &ProfileArgs) -> Done {
     for act in &profile.acts {
         show_act(&profile, act);
     }
-    show_modes(&profile);
+    tables::modes(&profile);
     say(&format!("\n{}: see dalean hw show MODEL", absent_words(&config.absent())));
     Ok(())
-}
-
-/// The same batch in every mode of writing it, an image at a time.
-fn show_modes(profile: &Profile) {
-    let own = profile.modes.iter().find_map(|mode| Some((mode, mode.act.as_ref().ok()?)));
-    let Some((_, first)) = own else { return };
-    let classes: Vec<_> = profile.bill(first).split(None).iter().map(|split| split.class).collect();
-    say("\nTHE SAME BATCH IN EVERY learning.mode, an image of it");
-    let mut head = format!("  {:12}{:>10}{:>12}{:>15}", "", "cycles", "time", "energy");
-    for class in &classes {
-        head += &format!("{:>14}", class.name());
-    }
-    say(&head);
-    for mode in &profile.modes {
-        let act = match &mode.act {
-            Ok(act) => act,
-            Err(why) => {
-                say(&format!("  {:12} cannot be had here: {why}", mode.mode));
-                continue;
-            }
-        };
-        let bill = profile.bill(act);
-        let Some(one) = bill.per_image(&act.images()).into_iter().next() else { continue };
-        let cycles = act.cycles().map(|cycles| cycles.elapsed as f64 / act.samples as f64);
-        let mut line = format!(
-            "  {:12}{:>10}{:>12}{:>15}",
-            mode.mode,
-            cycles.map_or_else(|| "-".into(), |cycles| format!("{cycles:.0}")),
-            one.seconds.map_or_else(|| "-".into(), |seconds| prefixed(seconds, "s")),
-            least(&one.total)
-        );
-        for class in &classes {
-            let part = one.split.iter().find(|split| split.class == *class);
-            line += &format!("{:>14}", part.map_or_else(|| "-".into(), |part| least(&part.total)));
-        }
-        let notes = [mode.own.then_some("this experiment"), mode.also];
-        let notes: Vec<_> = notes.into_iter().flatten().collect();
-        say(format!("{line}  {}", notes.join(", ")).trim_end());
-    }
-}
-
-/// Typical joules in a table: `-` where nothing has a price, a bound where only some has.
-fn least(total: &EnergyTotal) -> String {
-    match (total.priced, total.whole()) {
-        (0, _) => "-".into(),
-        (_, Some(joules)) => prefixed(joules[1], "J"),
-        (_, None) => format!(">= {}", prefixed(total.joules[1], "J")),
-    }
 }
 
 fn mode_json(profile: &Profile, mode: &ModeUse) -> serde_json::Value {

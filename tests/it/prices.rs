@@ -130,6 +130,16 @@ fn images_of_a_run_are_those_of_its_epochs() {
         (&priced["by_class"], &priced["per_image"]),
         (&done["by_class"], &done["per_image"])
     );
+    // several chips stand side by side
+    let two = ["--hw", "pcm14", "--hw", "reram"];
+    let ran = run(dalean().arg("price").arg(&folder).args(two).arg("--json"));
+    let both = lines(&ran.stdout);
+    assert_eq!(both[1]["joules"], priced["joules"]);
+    assert!(both[0]["joules"].is_null() && both[0]["joules_at_least"].is_array(), "{}", both[0]);
+    let ran = run(dalean().arg("price").arg(&folder).args(two));
+    for words in ["pcm14  ", ">= ", " parts priced", "pcm14 differs in ", "to read an image"] {
+        assert!(ran.stdout.contains(words), "{words} in {}", ran.stdout);
+    }
     // and the row of a sweep says the same
     let (row, _) = dalean::lab::sweep::row(&folder).unwrap();
     let cell = |name: &str| row.results[name].as_f64().unwrap();
