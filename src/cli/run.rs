@@ -1,19 +1,19 @@
 //! `train`, `eval`, `verify`.
 
 use std::path::PathBuf;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex};
 
 use clap::Args;
 use serde_json::json;
 
 use super::progress::Meter;
-use super::{Done, Failure, Shared, configuration, environment, known, say, usage};
+use super::{Done, Failure, Shared, configuration, environment, known, note, say, usage};
 use crate::lab::price::{EnergySplit, PerImage};
 use crate::lab::run::{self, Machine, RunError, RunEvent, Trained, Verdict};
 use crate::lab::store::index::{INDEX, Store};
 use crate::lab::store::record::{TestOutcome, TestRecord};
-use crate::lab::sweep::{self, Sampled};
+use crate::lab::sweep::{self, Finding, Sampled};
 
 #[derive(Debug, Args)]
 pub(super) struct TrainArgs {
@@ -105,13 +105,13 @@ pub(super) fn train(args: &TrainArgs) -> Done {
     let mut folder = PathBuf::new();
     let mut on_event = |event: RunEvent<'_>| {
         match event {
-            RunEvent::Started { folder: path, data, warnings, epoch, epochs } => {
+            RunEvent::Started { folder: path, data, warnings, rates, epoch, epochs } => {
                 folder = path.into();
                 meter = Meter::new(quiet, epochs);
                 if json {
                     let run = path.display().to_string();
                     say(&json!({"event": "started", "run": run, "data": data, "epoch": epoch,
-                        "epochs": epochs, "warnings": warnings})
+                        "epochs": epochs, "warnings": warnings, "rates": rates})
                     .to_string());
                 } else if !quiet {
                     meter.line(data);
@@ -121,6 +121,9 @@ pub(super) fn train(args: &TrainArgs) -> Done {
                         machine.backend().name(),
                         machine.threads()
                     ));
+                    for rate in rates {
+                        meter.line(&format!("rate of {rate}"));
+                    }
                     if epoch > 0 {
                         meter.line(&format!("continuing after epoch {epoch}"));
                     }
@@ -133,7 +136,7 @@ pub(super) fn train(args: &TrainArgs) -> Done {
             RunEvent::Warning(warning) if json => {
                 say(&json!({"event": "warning", "message": warning}).to_string());
             }
-            RunEvent::Warning(warning) if quiet => eprintln!("warning: {warning}"),
+            RunEvent::Warning(warning) if quiet => note(&format!("warning: {warning}")),
             RunEvent::Warning(warning) => meter.line(&format!("warning: {warning}")),
             RunEvent::Epoch(record, seconds) => {
                 meter.epoch(record, seconds);
@@ -179,6 +182,7 @@ fn done(run: &str, outcome: &Trained) -> serde_json::Value {
         "event": "done",
         "run": run,
         "test_accuracy": receipt.classified().map(|test| test.score.fraction()),
+        "notes": outcome.notes.iter().map(ToString::to_string).collect::<Vec<_>>(),
         "test_epoch": receipt.test.as_ref().map(TestOutcome::epoch),
         "validation_accuracy": last.and_then(|r| r.validation()).map(|score| score.fraction()),
         "state_hash": last.map(|record| record.state_hash.clone()),
@@ -237,8 +241,7 @@ pub(super) fn verify(args: &VerifyArgs) -> Done {
             "{store} is a store; say with --sample N how many of its runs are done again"
         )));
     }
-    let total = args.epochs.unwrap_or(0);
-    let mut meter = Meter::new(shared.quiet || shared.json, total);
+    let mut meter = Meter::new(shared.quiet || shared.json, 0);
     let verdict =
         run::verify(&args.run, &shared.data_root(), machine, args.epochs, &mut |progress| {
             meter.batch(progress);
@@ -262,7 +265,7 @@ pub(super) fn verify(args: &VerifyArgs) -> Done {
         }
         Verdict::Different { what, wanted, found } => Err(Failure {
             code: 4,
-            message: format!("{what} differs: the run says {wanted}, this machine finds {found}"),
+            message: format!("{what} differs: the run says {wanted}, doing it again gives {found}"),
         }),
     }
 }
@@ -273,38 +276,62 @@ fn sample(args: &VerifyArgs, count: usize, machine: Machine, stop: &AtomicBool) 
     let store = Store::existing(&args.run)?;
     // whoever made the store shall not know which runs will be looked at
     let seed = args.sample_seed.unwrap_or_else(super::progress::moment);
-    let mut same = 0;
-    let mut different = None;
-    let mut on_run = |number: usize, sampled: &Sampled| match &sampled.verdict {
-        Verdict::Same { epochs, state_hash, .. } => {
-            same += 1;
-            if shared.json {
-                say(&json!({"event": "run", "key": sampled.key, "verified": true, "state_hash": state_hash})
-                    .to_string());
-            } else if !shared.quiet {
-                say(&format!(
-                    "{number:>4}/{count}  {}  {epochs} state hashes are the same",
-                    sampled.key
-                ));
+    let quiet = shared.quiet || shared.json;
+    let meter = Mutex::new(Meter::new(quiet, 0));
+    let meter = || meter.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+    let (mut same, mut busy) = (0, 0);
+    let mut wrong = Vec::new();
+    let mut on_run = |number: usize, sampled: &Sampled| {
+        std::mem::replace(&mut *meter(), Meter::new(quiet, 0)).finish();
+        let key = &sampled.key;
+        let (text, code) = match &sampled.finding {
+            Finding::Done(Verdict::Same { epochs, state_hash, .. }) => {
+                same += 1;
+                if shared.json {
+                    say(&json!({"event": "run", "key": key, "verified": true, "state_hash": state_hash})
+                        .to_string());
+                } else if !shared.quiet {
+                    say(&format!("{number:>4}/{count}  {key}  {epochs} records are the same"));
+                }
+                return;
             }
-        }
-        Verdict::Different { what, wanted, found } => {
-            let text = format!(
-                "run {}: {what} differs: the store says {wanted}, this machine finds {found}",
-                sampled.key
-            );
-            if shared.json {
-                say(&json!({"event": "run", "key": sampled.key, "verified": false, "message": text}).to_string());
+            Finding::Busy => {
+                busy += 1;
+                return;
             }
-            eprintln!("{text}");
-            different.get_or_insert(text);
+            Finding::Done(Verdict::Different { what, wanted, found }) => (
+                format!("{what} differs: its folder says {wanted}, doing it again gives {found}"),
+                4,
+            ),
+            Finding::Index { column, index, folder } => (
+                format!("`{column}` differs: the index says {index}, its folder gives {folder}"),
+                4,
+            ),
+            Finding::Address { found } => {
+                (format!("the folder of that name holds the run {found}"), 4)
+            }
+            Finding::Broken(why) => (format!("it cannot be done again: {why}"), 1),
+        };
+        let text = format!("run {key}: {text}");
+        if shared.json {
+            say(&json!({"event": "run", "key": key, "verified": false, "message": text})
+                .to_string());
         }
+        note(&text);
+        wrong.push(code);
     };
-    let mut go_on = |_| !stop.load(Ordering::SeqCst);
+    let mut go_on = |progress| {
+        meter().batch(progress);
+        !stop.load(Ordering::SeqCst)
+    };
     let root = shared.data_root();
     let runs = sweep::sample(&store, count, seed, &root, machine, &mut on_run, &mut go_on)?;
-    if let Some(message) = different {
-        return Err(Failure { code: 4, message });
+    if let Some(code) = wrong.iter().max() {
+        let message = format!("{} of {runs} runs do not hold, as said above", wrong.len());
+        return Err(Failure { code: *code, message });
+    }
+    if busy > 0 {
+        note(&format!("warning: {busy} runs were left out: other processes are at them"));
     }
     let again = format!("--sample {count} --sample-seed {seed}");
     if shared.json {

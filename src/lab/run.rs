@@ -4,6 +4,7 @@
 //! one. Neither prints: callers get [`RunEvent`]s.
 
 mod classify;
+mod notes;
 mod profile;
 mod proof;
 mod report;
@@ -12,7 +13,9 @@ mod session;
 mod task;
 mod train;
 mod verify;
+mod weigh;
 
+pub use notes::notes;
 pub use profile::{Act, ModeUse, Profile, profile};
 pub use proof::{records, untouched};
 pub use report::{ReportMade, report};
@@ -23,6 +26,8 @@ pub use train::{
     Keeping, RunEvent, Trained, address_of, carry_on, configuration, evaluate, resume, train,
 };
 pub use verify::{Verdict, verify};
+pub use weigh::Memory;
+pub(crate) use weigh::weigh;
 
 use crate::chip::crossbar::kernel::Backend;
 use crate::lab::config::ConfigError;
@@ -87,6 +92,17 @@ pub enum RunError {
         found: usize,
         /// Most.
         max: usize,
+    },
+    /// Memory that the system does not have.
+    #[error(
+        "the cells of the network and a copy of its state take {wanted} of memory, and {left} are left; make \
+         network.hidden smaller, or use a machine with more memory"
+    )]
+    Memory {
+        /// What they take.
+        wanted: Memory,
+        /// What is left.
+        left: Memory,
     },
     /// Threads that the system does not give.
     #[error("the system gives no {threads} threads ({error}); use fewer")]

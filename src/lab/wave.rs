@@ -73,7 +73,7 @@ pub fn record(
 
     let engine = before.engines()[0];
     let mut network = Network::new(&config.hardware, config.seed, engine.layers(), samples);
-    network.set_learning(engine.mantissa(), engine.potentiation_only());
+    network.set_learning(engine.mantissas(), engine.potentiation_only());
     network.set_error_unit(engine.error_unit());
     network.set_unlooked(engine.unlooked());
     let place = look.tile;

@@ -87,10 +87,16 @@ fn a_corrected_source_finds_the_run_again() {
     let work = tempfile::tempdir().unwrap();
     let store = work.path().join("store");
     let sweep = |source: &str, typical: &str| {
+        // a corrected file is another sweep of that name, which has to be said
         let file = work.path().join("sweep.toml");
         let text = SWEEP.replace("SOURCE", source).replace("TYPICAL", typical);
         fs::write(&file, text).unwrap();
-        let ran = run(dalean().arg("sweep").arg(&file).arg("--store").arg(&store).arg("--json"));
+        let ran = run(dalean()
+            .arg("sweep")
+            .arg(&file)
+            .arg("--store")
+            .arg(&store)
+            .args(["--json", "--replace"]));
         assert_eq!(ran.code, Some(0), "{ran:?}");
         ran
     };

@@ -84,7 +84,7 @@ impl Config {
             centre: self.centre,
             route: self.route,
             batch: self.batch,
-            mantissa: self.mantissa,
+            mantissas: self.mantissas.clone(),
             rates: self.rates.clone(),
             decay: self.decay,
         }

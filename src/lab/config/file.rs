@@ -18,6 +18,18 @@ pub enum PerLayer<T> {
     Each(Vec<T>),
 }
 
+/// `rate_mantissa = 3`, `[3, 5]` or `"auto"`.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(untagged, expecting = "a whole number, a list with one a layer, or \"auto\"")]
+pub enum MantissaFile {
+    /// By name.
+    Named(String),
+    /// The same in every layer.
+    All(i64),
+    /// Input to output.
+    Each(Vec<i64>),
+}
+
 /// Structures of optional keys that refuse unknown ones. What stands above a key is its meaning, for `dalean keys` too.
 macro_rules! keys {
     ($($(#[doc = $doc:literal])* $name:ident {
@@ -123,8 +135,8 @@ keys! {
         rate: f64,
         /// Factor of the rate of each layer.
         rate_multipliers: PerLayer<f64>,
-        /// Small factor beside the shift.
-        rate_mantissa: i64,
+        /// Small factor beside the shift of each layer.
+        rate_mantissa: MantissaFile,
         /// How the rate falls over the run.
         decay: String,
         /// What is subtracted from errors.

@@ -80,6 +80,7 @@ pub fn load(sources: &Sources<'_>) -> Result<Config, ConfigError> {
         Some(toml::Value::Table(hw)) => hw,
         _ => toml::Table::new(),
     };
+    named(&own)?;
     let name = own.get("model").and_then(toml::Value::as_str).unwrap_or("ideal").to_owned();
     // a resolved configuration holds its model's numbers itself
     let mut hw = if own.contains_key("name") {
@@ -105,6 +106,27 @@ fn lay(under: &mut toml::Table, mut over: toml::Table) {
         *hw = toml::Value::Table(toml::Table::from_iter([("model".to_owned(), name)]));
     }
     overlay(under, over);
+}
+
+/// Whether `hw.name` stands where it means something: in a chip that is written out, as resolved configurations have it.
+/// Elsewhere it would switch the model off, which nobody asked for.
+fn named(hw: &toml::Table) -> Result<(), ConfigError> {
+    let Some(name) = hw.get("name") else { return Ok(()) };
+    let model = hw.get("model");
+    let missing =
+        ["cell", "tile", "drive", "adc", "write"].iter().find(|table| !hw.contains_key(**table));
+    let allowed = match (model, missing) {
+        (None, None) => return Ok(()),
+        (Some(model), _) => format!(
+            "it names a chip that is written out, and would switch the model {model} off: take one of the two out \
+             (--set hw.name=default), or give the model file that name"
+        ),
+        (None, Some(table)) => format!(
+            "it names a chip that is written out, but there is no [hw.{table}]: take the key out, or write a model file and \
+             use it with --hw FILE"
+        ),
+    };
+    Err(ConfigError::Value { key: "hw.name".into(), found: format!("is {name}"), allowed })
 }
 
 /// A table as what its keys mean.

@@ -65,6 +65,24 @@ pub fn summary(view: &RunView<'_>) -> String {
     out
 }
 
+/// Lines beside a result, one a text, cut between words at 100 columns.
+#[must_use]
+pub fn beside(name: &str, texts: &[String]) -> String {
+    let mut out = String::new();
+    for text in texts {
+        let mut line = format!("{name:<11}");
+        for word in text.split(' ') {
+            if line.len() + 1 + word.len() > 100 && line.len() > 11 {
+                let _ = writeln!(out, "{line}");
+                line = " ".repeat(11);
+            }
+            let _ = write!(line, " {word}");
+        }
+        let _ = writeln!(out, "{line}");
+    }
+    out
+}
+
 fn line(out: &mut String, name: &str, cells: [String; COLUMNS.len()]) {
     let mut text = format!("{name:<6}");
     for (cell, (_, width)) in cells.iter().zip(COLUMNS) {

@@ -1,13 +1,12 @@
 //! The page of a sweep and its figures, beside the runs they link to.
 
-use std::fs;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use super::{Results, SweepError, results};
 use crate::lab::report::sweep::{SweepView, figures, html, png, text};
-use crate::lab::store::folder::write_whole;
 use crate::lab::store::index::{Store, StoreError, SweepRecord};
+use crate::lab::store::place::{clear_parts, make_folder, write_whole};
 
 /// Files that were written.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -22,6 +21,8 @@ pub struct SweepPage {
     pub points: usize,
     /// Of these, finished.
     pub finished: usize,
+    /// Of these, finished once, but their folders are gone.
+    pub lost: usize,
 }
 
 /// Draws `STORE/NAME.html` and, if `pictures` are wanted, `STORE/figures/NAME-*.svg` and `.png`.
@@ -41,7 +42,8 @@ pub fn report(
     if pictures {
         let folder = store.path().join("figures");
         let fail = |error| StoreError::Io { doing: "make folder", path: folder.clone(), error };
-        fs::create_dir_all(&folder).map_err(fail)?;
+        make_folder(&folder).map_err(fail)?;
+        clear_parts(&folder);
         for figure in figures(&view) {
             let base = format!("{}-{}", record.name, figure.name);
             for (ending, bytes) in
@@ -59,6 +61,7 @@ pub fn report(
         figures: made,
         points: found.table.len(),
         finished: found.finished,
+        lost: found.lost,
     })
 }
 

@@ -187,7 +187,29 @@ impl Row {
             let both = self.results.get(column.name).zip(other.results.get(column.name));
             both.is_some_and(|(mine, theirs)| mine != theirs)
         };
-        RESULTS.iter().filter(counts).find(differs).map(|column| column.name)
+        // two programs may know different columns, but no folder gives what its row has and it has not
+        let made_up = |column: &&ResultColumn| {
+            one_folder
+                && self.results.contains_key(column.name)
+                && !other.results.contains_key(column.name)
+        };
+        let wrong = |column: &&ResultColumn| differs(column) || made_up(column);
+        let column = RESULTS.iter().filter(counts).find(wrong).map(|column| column.name);
+        let said = one_folder && self.priced_with == other.priced_with;
+        column.or_else(|| (said && self.hardware != other.hardware).then_some("hardware")).or_else(
+            || (said && self.not_simulated != other.not_simulated).then_some("not_simulated"),
+        )
+    }
+
+    /// What it says of a column, for people.
+    pub(super) fn word(&self, column: &str) -> String {
+        match column {
+            "state_hash" => self.state_hash.clone(),
+            "data_hash" => self.data_hash.clone(),
+            "hardware" => self.hardware.clone(),
+            "not_simulated" => self.not_simulated.join(", "),
+            _ => self.results.get(column).map_or_else(|| "nothing".into(), Value::to_string),
+        }
     }
 
     /// As an index keeps it.

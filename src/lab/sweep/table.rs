@@ -8,6 +8,10 @@ use crate::lab::report::sweep::{Figures, Refused, ShownAxis};
 use crate::lab::store::index::{Store, SweepRecord};
 use crate::lab::table::{Column, ColumnUnit, Role, Table, Values};
 
+/// Names of columns that are neither axes nor results.
+pub(super) const NAMES: [&str; 9] =
+    ["point", "seed", "status", "hardware", "state_hash", "data_hash", "key", "run", "report"];
+
 /// What a store knows of a sweep.
 #[derive(Debug)]
 pub struct Results {
@@ -25,6 +29,8 @@ pub struct Results {
     pub not_simulated: Vec<String>,
     /// Points whose run is finished.
     pub finished: usize,
+    /// Points whose run was finished, but whose folder is gone.
+    pub lost: usize,
 }
 
 /// The sweep of that name; without a name, the only one.
@@ -66,7 +72,12 @@ pub fn results(store: &Store, record: &SweepRecord) -> Result<Results, SweepErro
     let mut values: Vec<Vec<Value>> = Vec::new();
     let mut rows: Vec<Option<Row>> = Vec::new();
     let mut points = Vec::new();
+    let mut lost = Vec::new();
     for (point, row) in store.points(name)? {
+        // a row whose folder is gone can be checked by nobody
+        let gone = |key: &String| row.is_some() && !store.has_folder(key);
+        lost.push(point.key.as_ref().is_some_and(gone));
+        let row = row.filter(|_| lost.last() == Some(&false));
         let axes: Vec<Value> = serde_json::from_str(&point.axes)
             .map_err(|error| damaged(format!("point {}: {error}", point.number)))?;
         if axes.len() != sweep.axes.len() {
@@ -110,9 +121,10 @@ pub fn results(store: &Store, record: &SweepRecord) -> Result<Results, SweepErro
         let (name, label, values) = (name.to_owned(), label.to_owned(), Values::Text(values));
         Column { name, label, unit: ColumnUnit::Plain, role: Role::Name, values }
     };
-    let status = points.iter().zip(&rows).map(|(point, row)| {
+    let status = points.iter().zip(&rows).zip(&lost).map(|((point, row), lost)| {
         let status = match (row, &point.refused) {
             (Some(_), _) => "finished",
+            (None, _) if *lost => "lost",
             (None, Some(_)) => "refused",
             (None, None) => "planned",
         };
@@ -157,7 +169,8 @@ pub fn results(store: &Store, record: &SweepRecord) -> Result<Results, SweepErro
     let cost = sweep.figures.cost.clone().or_else(|| costs.map(str::to_owned));
     let figures = Figures { cost, ..sweep.figures.clone() };
     let finished = rows.iter().flatten().count();
-    Ok(Results { sweep, table, axes, figures, refused, not_simulated, finished })
+    let lost = lost.into_iter().filter(|lost| *lost).count();
+    Ok(Results { sweep, table, axes, figures, refused, not_simulated, finished, lost })
 }
 
 /// What real chips do and the runs did not: the program's own list first, then what the models say of their chips.

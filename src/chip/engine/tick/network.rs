@@ -77,10 +77,12 @@ impl Network {
         }
     }
 
-    /// Sets the small factor of the rate and whether writes only potentiate.
-    pub fn set_learning(&mut self, mantissa: u32, potentiation_only: bool) {
-        let tiles = self.layers.iter_mut().flat_map(|layer| &mut layer.tiles);
-        tiles.for_each(|tile| tile.set_learning(mantissa.into(), potentiation_only));
+    /// Sets the small factor of the rate of each layer and whether writes only potentiate.
+    pub fn set_learning(&mut self, mantissas: &[u32], potentiation_only: bool) {
+        for (layer, &mantissa) in self.layers.iter_mut().zip(mantissas) {
+            let tiles = layer.tiles.iter_mut();
+            tiles.for_each(|tile| tile.set_learning(mantissa.into(), potentiation_only));
+        }
     }
 
     /// Takes over converter shifts.

@@ -116,10 +116,14 @@ const NETWORK: &[KeyEntry] = &[
         ],
     )
     .default("\"sigmoid\""),
-    real("alpha", 1e-6, 1e6).layers().default("6.0").otherwise("1 with rule = \"ed_seed\""),
+    real("alpha", 1e-6, 1e6)
+        .layers()
+        .default("4.0")
+        .otherwise("6.0 with other data than the built-in digits; 1.0 with rule = \"ed_seed\""),
     key("weight_max", KeyValues::Lawful(1.0 / 256.0, 256.0, "a power of two"))
         .layers()
-        .default("4.0"),
+        .default("2.0")
+        .otherwise("4.0 with other data than the built-in digits"),
     words("bias", &[("none", "no bias"), ("rows", "a constant row in each array")])
         .default("\"none\""),
     words("readout", &[("p", "outputs are the p stream's activities")]).default("\"p\""),
@@ -141,8 +145,14 @@ const LEARNING: &[KeyEntry] = &[
         ],
     )
     .default("\"ed\""),
-    whole("epochs", 0, 4_294_967_295).unit("epochs").default("20"),
-    whole("batch", 1, 4096).unit("samples").default("32"),
+    whole("epochs", 0, 4_294_967_295)
+        .unit("epochs")
+        .default("40")
+        .otherwise("20 with other data than the built-in digits"),
+    whole("batch", 1, 4096)
+        .unit("samples")
+        .default("16")
+        .otherwise("32 with other data than the built-in digits"),
     words(
         "mode",
         &[
@@ -152,9 +162,17 @@ const LEARNING: &[KeyEntry] = &[
         ],
     )
     .default("\"accumulate\""),
-    real("rate", 1e-6, 1e6).default("20.0"),
-    real("rate_multipliers", 1e-6, 1e6).layers().default("1.0"),
-    whole("rate_mantissa", 1, 15).default("1"),
+    real("rate", 1e-6, 1e6).default("18.0").otherwise(
+        "20.0 with other data than the built-in digits; with a batch below the default one less, in proportion",
+    ),
+    real("rate_multipliers", 1e-6, 1e6).layers().default("[1.0, 0.25]").otherwise(
+        "1 in every layer, 0.25 in the last one of the built-in digits (1.0 with other data); behind more than 256 \
+         hidden units times 256 / units",
+    ),
+    whole("rate_mantissa", 1, 15)
+        .layers()
+        .default("1")
+        .law("or `auto`: in each layer the one whose rate comes nearest"),
     words(
         "decay",
         &[("cosine", "falls to 0 over the run as half a cosine"), ("constant", "stays")],
@@ -169,7 +187,9 @@ const LEARNING: &[KeyEntry] = &[
         ],
     )
     .default("\"batch\"")
-    .otherwise("\"none\" with rule = \"kaneko\" or \"ed_seed\""),
+    .otherwise(
+        "\"running\" with a batch of one or mode = \"online\"; \"none\" with rule = \"kaneko\" or \"ed_seed\"",
+    ),
     words(
         "route",
         &[
@@ -184,7 +204,8 @@ const LEARNING: &[KeyEntry] = &[
     whole("taps", 1, 4)
         .law("at most the number of outputs")
         .unit("words")
-        .default("1")
+        .default("3")
+        .otherwise("1 with other data than the built-in digits")
         .only("with route = \"modulo\"", &["learning.route=modulo"]),
     whole("tap_shift", 0, 16)
         .unit("bits")
@@ -212,8 +233,8 @@ const LEARNING: &[KeyEntry] = &[
             ("last", "the last one"),
         ],
     )
-    .default("\"best_validation\"")
-    .otherwise("\"last\" with train_on = \"all\""),
+    .default("\"last\"")
+    .otherwise("\"best_validation\" with other data than the built-in digits, unless train_on = \"all\""),
     #[cfg(feature = "grown")]
     whole("grown", i64::MIN, i64::MAX).default("0"),
 ];
