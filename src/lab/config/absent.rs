@@ -95,11 +95,12 @@ impl Absent {
     }
 }
 
-/// `22 effects of real chips, 5 of them with figures of this chip`.
+/// `19 effects of real chips are not simulated, 5 with figures of this one`.
 #[must_use]
 pub fn absent_words(absent: &[Absent]) -> String {
     let figures = absent.iter().filter(|one| one.chip.is_some()).count();
-    let mut text = format!("{} effects of real chips are not simulated", absent.len());
+    let (noun, verb) = if absent.len() == 1 { ("effect", "is") } else { ("effects", "are") };
+    let mut text = format!("{} {noun} of real chips {verb} not simulated", absent.len());
     if figures > 0 {
         text += &format!(", {figures} with figures of this one");
     }
