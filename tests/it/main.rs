@@ -19,6 +19,8 @@ mod keys;
 mod laws;
 mod oracle;
 mod output;
+mod own_data;
+mod own_runs;
 mod prices;
 mod program;
 mod report;

@@ -173,17 +173,24 @@ pub fn results(store: &Store, record: &SweepRecord) -> Result<Results, SweepErro
     Ok(Results { sweep, table, axes, figures, refused, not_simulated, finished, lost })
 }
 
-/// What real chips do and the runs did not: the program's own list first, then what the models say of their chips.
+/// What real chips do and the runs did not, `key = text`: each effect of the program's list, and after it what models say
+/// of theirs; then what only models name.
 fn left_out<'a>(rows: impl Iterator<Item = &'a Row> + Clone) -> Vec<String> {
-    let has = |key: &str| rows.clone().any(|row| row.absent.iter().any(|absent| absent == key));
-    let effects = EFFECTS.iter().filter(|effect| has(effect.key));
-    let general =
-        effects.map(|effect| format!("{}: {}", effect.key.replace('_', " "), effect.instead));
-    let mut of_models: Vec<String> =
-        rows.clone().flat_map(|row| row.not_simulated.iter().cloned()).collect();
+    let mut of_models: Vec<&String> = rows.clone().flat_map(|row| &row.not_simulated).collect();
     of_models.sort();
     of_models.dedup();
-    general.chain(of_models).collect()
+    let has = |key: &str| rows.clone().any(|row| row.absent.iter().any(|absent| absent == key));
+    let mut all = Vec::new();
+    for effect in EFFECTS.iter().filter(|effect| has(effect.key)) {
+        all.push(format!("{} = {}", effect.key, effect.instead));
+        let of_effect = format!("{} = ", effect.key);
+        let (mine, others): (Vec<_>, Vec<_>) =
+            of_models.into_iter().partition(|text| text.starts_with(&of_effect));
+        all.extend(mine.into_iter().cloned());
+        of_models = others;
+    }
+    all.extend(of_models.into_iter().cloned());
+    all
 }
 
 /// Whole numbers if all are, else numbers if all are, else words.
