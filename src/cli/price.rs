@@ -30,6 +30,9 @@ pub(super) struct PriceArgs {
     /// One JSON object a model on standard output
     #[arg(long)]
     json: bool,
+    /// Print only totals
+    #[arg(long, short)]
+    quiet: bool,
 }
 
 #[derive(Debug, Args)]
@@ -62,10 +65,12 @@ pub(super) fn price(args: &PriceArgs) -> Done {
         return Ok(());
     }
     match &*runs {
-        [run] => show_price(run),
+        [run] => show_price(run, args.quiet),
         runs => tables::side_by_side(runs),
     }
-    say(&format!("{}: see the page of the run", absent_words(&runs[0].absent)));
+    if !args.quiet {
+        say(&format!("{}: see the page of the run", absent_words(&runs[0].absent)));
+    }
     Ok(())
 }
 
@@ -82,10 +87,12 @@ fn price_json(args: &PriceArgs, run: &Repriced) -> serde_json::Value {
     object
 }
 
-fn show_price(run: &Repriced) {
+fn show_price(run: &Repriced, quiet: bool) {
     let bill = run.bill();
-    say(&format!("run on {}, constants of {}", run.made_on, run.priced_as));
-    if !run.changes.is_empty() {
+    if !quiet {
+        say(&format!("run on {}, constants of {}", run.made_on, run.priced_as));
+    }
+    if !run.changes.is_empty() && !quiet {
         let keys: Vec<_> = run.changes.iter().map(|change| change.key).collect();
         say(&format!(
             "the chips differ in {}: what that touches is left out below; to count it, train on {}",
@@ -95,6 +102,10 @@ fn show_price(run: &Repriced) {
     }
     if let (Some(cycles), Some(seconds)) = (run.ledger.elapsed(), bill.seconds_total()) {
         say(&format!("time     {cycles} cycles, {}", prefixed(seconds, "s")));
+    }
+    if quiet {
+        say(&format!("energy   {}", bill.total().words()));
+        return;
     }
     show_energy(&bill, &run.images);
     for (heading, groups) in [

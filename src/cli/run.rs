@@ -1,6 +1,6 @@
 //! `train`, `eval`, `verify`.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
 
@@ -177,12 +177,24 @@ pub(super) fn train(args: &TrainArgs) -> Done {
     let outcome = outcome?;
     if json {
         say(&done(&folder.display().to_string(), &outcome).to_string());
+    } else if quiet {
+        say(&result(&folder, &outcome));
     } else {
         say(&outcome.summary);
         say(&format!("report   {}", folder.join("report.html").display()));
         say(&format!("verify   dalean verify {}", folder.display()));
     }
     Ok(())
+}
+
+/// The result alone: the score of the test, or of the last validation, and where the run is.
+fn result(folder: &Path, outcome: &Trained) -> String {
+    let test = outcome.receipt.classified().map(|test| ("test", test.score));
+    let validation = || Some(("validation", outcome.records.last()?.validation()?));
+    let score = test.or_else(validation).map_or_else(String::new, |(of, score)| {
+        format!("{of} {:.2} % ({} of {})  ", 100.0 * score.fraction(), score.correct, score.total)
+    });
+    format!("{score}{}", folder.display())
 }
 
 fn done(run: &str, outcome: &Trained) -> serde_json::Value {

@@ -12,6 +12,7 @@ mod browser;
 mod damage;
 mod defaults;
 mod examples;
+mod extending;
 mod facade;
 mod golden_run;
 mod hardware;
