@@ -289,6 +289,7 @@ fn notices(view: &SweepView<'_>) -> String {
         out += &format!(
             "<ul class=\"notices\"><li><details><summary>{} effects of real chips are not simulated: {}</summary><ul>{list}</ul></details>\
              </li></ul>\n",
+            names.len(),
             names.join(", ")
         );
     }
