@@ -222,6 +222,7 @@ fn done(run: &str, outcome: &Trained) -> serde_json::Value {
         "parts": cost.energy.map(|energy| energy.parts),
         "by_class": split,
         "per_image": each,
+        "not_simulated": outcome.absent,
         "joules_assumed_share": cost.energy.map(|_| cost.assumed_share),
         "train_seconds": seconds,
         "images_per_second": images as f64 / seconds.max(1e-9),

@@ -24,7 +24,7 @@ pub fn template(name: &str) -> String {
         text += "kind = \"assumed\"                  # measured, fitted or assumed\n";
     }
     text += &numbers();
-    text += "\n# What the chip does and this program does not simulate, in words: printed with every report.\n\
+    text += "\n# Figures of this chip for what this program does not simulate (dalean hw show lists it): they stand beside every result.\n\
              [not_simulated]\n# drift = \"levels lose 2 % a day\"\n";
     text
 }
