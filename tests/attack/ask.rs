@@ -31,11 +31,11 @@ fn words(text: &str) -> Vec<OsString> {
 
 /// Lays out what is damaged and says what the program is asked for.
 pub(crate) fn asked(world: &World, chance: &mut Chance, here: &Path) -> (&'static str, Ask) {
-    let put = |name: &str, bytes: &[u8]| drop(fs::write(here.join(name), bytes));
+    let write = |name: &str, bytes: &[u8]| put(&here.join(name), bytes);
     let read = |name: &str| fs::read_to_string(world.made(name)).unwrap();
     match chance.below(10) {
         0 => {
-            put("experiment.toml", &chance.text(&read("experiment.toml")));
+            write("experiment.toml", &chance.text(&read("experiment.toml")));
             let (line, event) = [
                 ("train experiment.toml --json --out runs", "done"),
                 ("train experiment.toml --json --out runs --hw reram", "done"),
@@ -76,7 +76,7 @@ pub(crate) fn asked(world: &World, chance: &mut Chance, here: &Path) -> (&'stati
                 "learning.route",
                 "more.than.there.is",
             ];
-            put("experiment.toml", world::EXPERIMENT.as_bytes());
+            write("experiment.toml", world::EXPERIMENT.as_bytes());
             let mut arguments = words("train experiment.toml --json --out runs");
             for _ in 0..=chance.below(2) {
                 let value = match chance.below(4) {
@@ -93,7 +93,7 @@ pub(crate) fn asked(world: &World, chance: &mut Chance, here: &Path) -> (&'stati
             let models = concat!(env!("CARGO_MANIFEST_DIR"), "/hw_models");
             let name = chance.of(&["ideal", "reram", "neurram", "hermes", "mrr", "sram"]);
             let text = fs::read_to_string(format!("{models}/{name}.toml")).unwrap();
-            put("chip.toml", &chance.text(&text));
+            write("chip.toml", &chance.text(&text));
             put(
                 "experiment.toml",
                 world::EXPERIMENT.split("[hw.").next().unwrap_or_default().as_bytes(),
@@ -111,10 +111,10 @@ pub(crate) fn asked(world: &World, chance: &mut Chance, here: &Path) -> (&'stati
         }
         3 => {
             let table = read("table.csv");
-            put("table.csv", &chance.text(&table));
+            write("table.csv", &chance.text(&table));
             let own = read("own.toml");
             let own = if chance.one_in(4) { chance.text(&own) } else { own.into_bytes() };
-            put("own.toml", &own);
+            write("own.toml", &own);
             if chance.one_in(6) {
                 let _ = fs::remove_file(here.join("table.csv"));
                 link_or_pipe(chance, &here.join("table.csv"), &world.made("table.csv"));
@@ -139,7 +139,7 @@ pub(crate) fn asked(world: &World, chance: &mut Chance, here: &Path) -> (&'stati
         }
         6 | 7 => {
             copy(&world.made("store"), &here.join("store"));
-            put("sweep.toml", world::SWEEP.as_bytes());
+            write("sweep.toml", world::SWEEP.as_bytes());
             damage_store(world, chance, &here.join("store"));
             let (line, answer) = match chance.below(9) {
                 0 => ("report store --json", Answer::Event("report")),
@@ -166,13 +166,13 @@ pub(crate) fn asked(world: &World, chance: &mut Chance, here: &Path) -> (&'stati
             } else {
                 filtered(chance, &text).into_bytes()
             };
-            put("sweep.toml", &text);
+            write("sweep.toml", &text);
             let line = if chance.one_in(3) { " --dry-run" } else { "" };
             let line = format!("sweep sweep.toml --store store --json --threads 2{line}");
             ("sweep", Ask { arguments: words(&line), answer: Answer::Event("done") })
         }
         _ => {
-            put("experiment.toml", world::EXPERIMENT.as_bytes());
+            write("experiment.toml", world::EXPERIMENT.as_bytes());
             let commands = [
                 "train",
                 "eval",
@@ -280,6 +280,24 @@ fn filtered(chance: &mut Chance, text: &str) -> String {
     }
 }
 
+/// Writes a file of the folder, in place of what lies there: damage never leaves it through a link.
+fn put(place: &Path, bytes: impl AsRef<[u8]>) {
+    if fs::symlink_metadata(place).is_ok_and(|found| !found.is_file()) {
+        let _ = fs::remove_file(place).or_else(|_| fs::remove_dir_all(place));
+    }
+    let _ = fs::write(place, bytes);
+}
+
+/// Whether a folder lies there, and no link to one.
+fn is_folder(place: &Path) -> bool {
+    fs::symlink_metadata(place).is_ok_and(|found| found.is_dir())
+}
+
+/// What lies in a plain file there.
+fn plain(place: &Path) -> Option<Vec<u8>> {
+    fs::symlink_metadata(place).is_ok_and(|found| found.is_file()).then(|| fs::read(place).ok())?
+}
+
 /// A link out of the folder, or a pipe.
 fn link_or_pipe(chance: &mut Chance, place: &Path, far: &Path) {
     match chance.below(3) {
@@ -309,24 +327,22 @@ fn damage_run(world: &World, chance: &mut Chance, folder: &Path) {
                 ]));
                 link_or_pipe(chance, &place, &far);
             }
-            2 => drop(fs::write(
-                folder.join(chance.of(&[".part-abcdef", ".dalean-part-abcdef", "more", "lock"])),
-                "?",
-            )),
+            2 => {
+                let names = [".part-abcdef", ".dalean-part-abcdef", "more", "lock"];
+                put(&folder.join(chance.of(&names)), "?");
+            }
             3 => {
-                let receipt = fs::read_to_string(folder.join("receipt.json")).unwrap_or_default();
-                drop(fs::write(
-                    folder.join("receipt.json"),
-                    receipt.replace("finished", "running"),
-                ));
+                let receipt = plain(&folder.join("receipt.json")).unwrap_or_default();
+                let receipt = String::from_utf8_lossy(&receipt).replace("finished", "running");
+                put(&folder.join("receipt.json"), receipt);
             }
             _ => {
-                let Ok(bytes) = fs::read(&place) else { continue };
+                let Some(bytes) = plain(&place) else { continue };
                 let bytes = match String::from_utf8(bytes) {
                     Ok(text) => chance.text(&text),
                     Err(error) => chance.bytes(error.as_bytes()),
                 };
-                drop(fs::write(&place, bytes));
+                put(&place, bytes);
             }
         }
     }
@@ -338,6 +354,9 @@ fn damage_store(world: &World, chance: &mut Chance, store: &Path) {
     for _ in 0..=chance.below(2) {
         match chance.below(7) {
             0 | 1 => {
+                if plain(&store.join("index.sqlite")).is_none() {
+                    continue;
+                }
                 let Ok(index) = rusqlite::Connection::open(store.join("index.sqlite")) else {
                     continue;
                 };
@@ -373,8 +392,8 @@ fn damage_store(world: &World, chance: &mut Chance, store: &Path) {
             2 => {
                 let place = store.join("index.sqlite");
                 if chance.one_in(2) {
-                    let bytes = chance.bytes(&fs::read(&place).unwrap_or_default());
-                    let _ = fs::write(&place, bytes);
+                    let bytes = chance.bytes(&plain(&place).unwrap_or_default());
+                    put(&place, bytes);
                 } else {
                     let _ = fs::remove_file(&place);
                     if chance.one_in(2) {
@@ -385,6 +404,9 @@ fn damage_store(world: &World, chance: &mut Chance, store: &Path) {
             3 => {
                 let name = chance.of(&["figures", "runs", "small.html"]);
                 let place = store.join(name);
+                if fs::symlink_metadata(&place).is_ok_and(|found| found.is_symlink()) {
+                    let _ = fs::remove_file(&place);
+                }
                 let _ = fs::remove_dir_all(&place).or_else(|_| fs::remove_file(&place));
                 let far = outside.join(chance.of(&["figures", "precious"]));
                 link_or_pipe(chance, &place, &far);
@@ -395,12 +417,14 @@ fn damage_store(world: &World, chance: &mut Chance, store: &Path) {
                     continue;
                 };
                 match chance.below(4) {
-                    0 => drop(fs::remove_dir_all(&run)),
+                    0 if is_folder(&run) => drop(fs::remove_dir_all(&run)),
                     1 => {
-                        let _ = fs::remove_dir_all(&run);
+                        if is_folder(&run) {
+                            let _ = fs::remove_dir_all(&run);
+                        }
                         let _ = symlink(&outside, &run);
                     }
-                    _ if run.is_dir() => damage_run(world, chance, &run),
+                    _ if is_folder(&run) => damage_run(world, chance, &run),
                     _ => {}
                 }
             }
