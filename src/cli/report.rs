@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use serde_json::json;
 
-use super::{Done, data_root, say};
+use super::{Done, Moved, data_root, say};
 use crate::lab::store::index::{INDEX, Store};
 use crate::lab::sweep;
 use crate::lab::{report, run};
@@ -21,6 +21,8 @@ pub(super) struct ReportArgs {
     /// Folder of data sets, for pictures of wrong answers [default: data, or DALEAN_DATA]
     #[arg(long, value_name = "DIR")]
     data_dir: Option<PathBuf>,
+    #[command(flatten)]
+    moved: Moved,
     /// Say what the columns of the table mean
     #[arg(long)]
     explain: bool,
@@ -60,7 +62,7 @@ fn sweep(path: &Path, args: &ReportArgs) -> Done {
 
 /// Draws the page of one run again.
 fn run(path: &Path, args: &ReportArgs) -> Done {
-    let made = run::report(path, Some(&data_root(args.data_dir.clone())))?;
+    let made = run::report(path, Some(&args.moved.root(data_root(args.data_dir.clone()))))?;
     let page = made.path.display().to_string();
     if args.json {
         let run = path.display().to_string();
