@@ -176,6 +176,24 @@ impl Shared {
     }
 }
 
+/// Where the files of a run lie now.
+#[derive(Debug, Clone, Args)]
+struct Moved {
+    /// Where the run's own data are now: its file, or the folder that holds its files under their names. What is there
+    /// has to be what the run was made with
+    #[arg(long, value_name = "PATH")]
+    data: Option<PathBuf>,
+}
+
+impl Moved {
+    fn root(&self, root: DataRoot) -> DataRoot {
+        match &self.data {
+            Some(place) => root.with_files(place),
+            None => root,
+        }
+    }
+}
+
 /// The back end of a name.
 fn kernel(name: &str) -> Result<Backend, Failure> {
     Backend::named(name)
@@ -191,27 +209,25 @@ fn usage(message: &str) -> Failure {
     Failure { code: 2, message: message.into() }
 }
 
-/// Reads the configuration a command names.
+/// Reads the configuration a command names: without a file, what users get by saying nothing, the built-in digits.
 fn configuration(
     file: Option<&PathBuf>,
     hw: Option<&str>,
     settings: &[String],
     seed: Option<u64>,
 ) -> Result<Config, Failure> {
-    let (name, text) = match file {
-        None => {
-            ("the built-in example".to_owned(), include_str!("../examples/digits.toml").to_owned())
-        }
+    let read = match file {
+        None => None,
         Some(path) => {
             #[expect(clippy::disallowed_methods, reason = "the file the user named")]
             let text = std::fs::read_to_string(path).map_err(|error| {
                 let hint = "name an experiment file, such as examples/mnist.toml";
                 usage(&format!("cannot read {}: {error}; {hint}", path.display()))
             })?;
-            (path.display().to_string(), text)
+            Some((path.display().to_string(), text))
         }
     };
-    let experiment = Some((&*name, &*text));
+    let experiment = read.as_ref().map(|(name, text)| (&**name, &**text));
     let sources = Sources { experiment, hardware: hw, settings, seed, ..Sources::default() };
     config::load(&sources).map_err(|error| usage(&error.to_string()))
 }
@@ -317,7 +333,7 @@ mod tests {
     }
 
     #[test]
-    fn the_built_in_example_is_valid() {
+    fn saying_nothing_is_valid() {
         configuration(None, None, &[], None).unwrap();
     }
 }

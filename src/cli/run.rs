@@ -1,6 +1,6 @@
 //! `train`, `eval`, `verify`.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, OnceLock};
 
@@ -8,7 +8,8 @@ use clap::Args;
 use serde_json::json;
 
 use super::progress::Meter;
-use super::{Done, Failure, Shared, configuration, environment, known, note, say, usage};
+use super::{Done, Failure, Moved, Shared, configuration, environment, known, note, say, usage};
+use crate::lab::config::absent_words;
 use crate::lab::price::{EnergySplit, PerImage};
 use crate::lab::run::{self, Machine, RunError, RunEvent, Trained, Verdict};
 use crate::lab::store::index::{INDEX, Store};
@@ -36,6 +37,8 @@ pub(super) struct TrainArgs {
     #[arg(long, value_name = "RUN", value_hint = clap::ValueHint::DirPath, conflicts_with_all = ["file", "hw", "settings", "seed", "out"])]
     resume: Option<PathBuf>,
     #[command(flatten)]
+    moved: Moved,
+    #[command(flatten)]
     shared: Shared,
 }
 
@@ -44,6 +47,8 @@ pub(super) struct EvalArgs {
     /// Folder of a run
     #[arg(value_hint = clap::ValueHint::DirPath)]
     run: PathBuf,
+    #[command(flatten)]
+    moved: Moved,
     #[command(flatten)]
     shared: Shared,
 }
@@ -62,6 +67,8 @@ pub(super) struct VerifyArgs {
     /// Which runs are drawn [default: from the clock, and printed]
     #[arg(long, value_name = "N", requires = "sample")]
     sample_seed: Option<u64>,
+    #[command(flatten)]
+    moved: Moved,
     #[command(flatten)]
     shared: Shared,
 }
@@ -104,6 +111,12 @@ impl Stop {
 pub(super) fn train(args: &TrainArgs) -> Done {
     let shared = &args.shared;
     let machine = shared.machine()?;
+    if args.resume.is_none() && args.moved.data.is_some() {
+        return Err(usage(
+            "--data says where the data of a run are that is continued (--resume); of a new run, say it with --set \
+             data.train=FILE or in its file",
+        ));
+    }
     let stop = Stop::default();
     let config = match &args.resume {
         Some(_) => None,
@@ -116,22 +129,28 @@ pub(super) fn train(args: &TrainArgs) -> Done {
     let mut folder = PathBuf::new();
     let mut on_event = |event: RunEvent<'_>| {
         match event {
-            RunEvent::Started { folder: path, data, warnings, epoch, epochs } => {
+            RunEvent::Started { folder: path, data, said, warnings, rates, epoch, epochs } => {
                 folder = path.into();
                 meter = Meter::new(quiet, epochs);
                 if json {
                     let run = path.display().to_string();
-                    say(&json!({"event": "started", "run": run, "data": data, "epoch": epoch,
-                        "epochs": epochs, "warnings": warnings})
+                    say(&json!({"event": "started", "run": run, "data": data, "data_read": said, "epoch": epoch,
+                        "epochs": epochs, "warnings": warnings, "rates": rates})
                     .to_string());
                 } else if !quiet {
                     meter.line(data);
+                    for line in said {
+                        meter.line(&format!("data: {line}"));
+                    }
                     meter.line(&format!(
                         "run {}  kernel {}  threads {}",
                         path.display(),
                         machine.backend().name(),
                         machine.threads()
                     ));
+                    for rate in rates {
+                        meter.line(&format!("rate of {rate}"));
+                    }
                     if epoch > 0 {
                         meter.line(&format!("continuing after epoch {epoch}"));
                     }
@@ -156,7 +175,7 @@ pub(super) fn train(args: &TrainArgs) -> Done {
         }
         !stop.asked()
     };
-    let data = shared.data_root();
+    let data = args.moved.root(shared.data_root());
     let outcome = match (&args.resume, &config) {
         (Some(path), _) => run::resume(path, &data, machine, &mut on_event),
         (None, Some(config)) => {
@@ -170,12 +189,24 @@ pub(super) fn train(args: &TrainArgs) -> Done {
     let outcome = outcome?;
     if json {
         say(&done(&folder.display().to_string(), &outcome).to_string());
+    } else if quiet {
+        say(&result(&folder, &outcome));
     } else {
         say(&outcome.summary);
         say(&format!("report   {}", folder.join("report.html").display()));
         say(&format!("verify   dalean verify {}", folder.display()));
     }
     Ok(())
+}
+
+/// The result alone: the score of the test, or of the last validation, and where the run is.
+fn result(folder: &Path, outcome: &Trained) -> String {
+    let test = outcome.receipt.classified().map(|test| ("test", test.score));
+    let validation = || Some(("validation", outcome.records.last()?.validation()?));
+    let score = test.or_else(validation).map_or_else(String::new, |(of, score)| {
+        format!("{of} {:.2} % ({} of {})  ", 100.0 * score.fraction(), score.correct, score.total)
+    });
+    format!("{score}{}", folder.display())
 }
 
 fn done(run: &str, outcome: &Trained) -> serde_json::Value {
@@ -190,6 +221,7 @@ fn done(run: &str, outcome: &Trained) -> serde_json::Value {
         "event": "done",
         "run": run,
         "test_accuracy": receipt.classified().map(|test| test.score.fraction()),
+        "notes": outcome.notes.iter().map(ToString::to_string).collect::<Vec<_>>(),
         "test_epoch": receipt.test.as_ref().map(TestOutcome::epoch),
         "validation_accuracy": last.and_then(|r| r.validation()).map(|score| score.fraction()),
         "state_hash": last.map(|record| record.state_hash.clone()),
@@ -202,6 +234,7 @@ fn done(run: &str, outcome: &Trained) -> serde_json::Value {
         "parts": cost.energy.map(|energy| energy.parts),
         "by_class": split,
         "per_image": each,
+        "not_simulated": outcome.absent,
         "joules_assumed_share": cost.energy.map(|_| cost.assumed_share),
         "train_seconds": seconds,
         "images_per_second": images as f64 / seconds.max(1e-9),
@@ -210,8 +243,10 @@ fn done(run: &str, outcome: &Trained) -> serde_json::Value {
 
 pub(super) fn eval(args: &EvalArgs) -> Done {
     let shared = &args.shared;
-    let (test, state_hash) = run::evaluate(&args.run, &shared.data_root(), shared.machine()?)?;
+    let (test, state_hash) =
+        run::evaluate(&args.run, &args.moved.root(shared.data_root()), shared.machine()?)?;
     let TestOutcome::Classify(TestRecord { epoch, ref select, score, .. }) = test;
+    let absent = run::absent(&args.run)?;
     if shared.json {
         say(&json!({
             "event": "done",
@@ -221,6 +256,7 @@ pub(super) fn eval(args: &EvalArgs) -> Done {
             "epochs": epoch,
             "train_seconds": 0.0,
             "images_per_second": null,
+            "not_simulated": absent,
         })
         .to_string());
     } else {
@@ -230,6 +266,9 @@ pub(super) fn eval(args: &EvalArgs) -> Done {
             score.correct,
             score.total,
         ));
+        if !shared.quiet {
+            say(&format!("beside this {}: see the page of the run", absent_words(&absent)));
+        }
     }
     Ok(())
 }
@@ -248,11 +287,16 @@ pub(super) fn verify(args: &VerifyArgs) -> Done {
         )));
     }
     let mut meter = Meter::new(shared.quiet || shared.json, 0);
-    let verdict =
-        run::verify(&args.run, &shared.data_root(), machine, args.epochs, &mut |progress| {
+    let verdict = run::verify(
+        &args.run,
+        &args.moved.root(shared.data_root()),
+        machine,
+        args.epochs,
+        &mut |progress| {
             meter.batch(progress);
             !stop.asked()
-        });
+        },
+    );
     meter.finish();
     match verdict? {
         Verdict::Same { epochs, state_hash, test, unchecked } => {
@@ -330,7 +374,7 @@ fn sample(args: &VerifyArgs, count: usize, machine: Machine, stop: &Stop) -> Don
         meter().batch(progress);
         !stop.asked()
     };
-    let root = shared.data_root();
+    let root = args.moved.root(shared.data_root());
     let runs = sweep::sample(&store, count, seed, &root, machine, &mut on_run, &mut go_on)?;
     if let Some(code) = wrong.iter().max() {
         let message = format!("{} of {runs} runs do not hold, as said above", wrong.len());

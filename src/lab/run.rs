@@ -4,6 +4,7 @@
 //! one. Neither prints: callers get [`RunEvent`]s.
 
 mod classify;
+mod notes;
 mod profile;
 mod proof;
 mod report;
@@ -14,10 +15,11 @@ mod train;
 mod verify;
 mod weigh;
 
-pub use profile::{Act, Profile, profile};
+pub use notes::notes;
+pub use profile::{Act, ModeUse, Profile, profile};
 pub use proof::{records, untouched};
 pub use report::{ReportMade, report};
-pub use repriced::{Prices, Repriced, reprice, reprice_as};
+pub use repriced::{Prices, Repriced, absent, reprice, reprice_as};
 pub use session::Session;
 pub use task::Progress;
 pub use train::{
@@ -132,7 +134,8 @@ pub enum RunError {
     },
     /// The data is not what the run was made with.
     #[error(
-        "the data has the hash {found}, but the run was made with {wanted}; get the same data again (`dalean data list`)"
+        "the data has the hash {found}, but the run was made with {wanted}; get the same data again (`dalean data list`), \
+         or say with --data where the files are that it was made with"
     )]
     DataChanged {
         /// Hash now.

@@ -243,6 +243,23 @@ impl Rate {
         k.ok_or(OutOfRange { name: "k", found, min: 0, max: SHIFT_MAX.into() })
     }
 
+    /// This rate with the mantissa whose effective rate comes nearest to it, by ratio: the least one on ties. Its own
+    /// where no shift stands for the rate with any.
+    #[must_use]
+    pub fn with_nearest_mantissa(self) -> Self {
+        let all = (RateMantissa::MIN..=RateMantissa::MAX)
+            .map(|m| Self { mantissa: RateMantissa::new(m.into()).expect("in range"), ..self });
+        let off = |rate: &Self| {
+            let off = (rate.shift_exact() - f64::from(rate.shift().ok()?)).abs();
+            // one in a million is nothing: 2 and 4 stand for the same rates as 1
+            #[expect(clippy::cast_possible_truncation, reason = "at most half a million")]
+            let millionths = libm::floor(off * 1e6 + 0.5) as i64;
+            Some(millionths)
+        };
+        let found = all.filter_map(|rate| Some((off(&rate)?, rate)));
+        found.min_by_key(|(off, _)| *off).map_or(self, |(_, rate)| rate)
+    }
+
     /// The rate that `k` and the mantissa really give: within a factor of `sqrt(2)` of the one asked for.
     ///
     /// # Errors
@@ -426,6 +443,30 @@ mod tests {
         let effective = rate(20.0, 6.0).effective().unwrap().get();
         assert_eq!(effective, 255.0 * 127.0 * 255.0 * 12.0 * 32.0 * 4.0 / 65536.0 / 8192.0);
         assert!((23.62..23.63).contains(&effective), "{effective}");
+    }
+
+    /// Rates 14 to 22 once were one rate, and nobody said so.
+    #[test]
+    fn the_nearest_mantissa_comes_within_seven_percent() {
+        let mut shifts = vec![];
+        for asked in 14..=22 {
+            let asked = rate(f64::from(asked), 6.0);
+            let near = asked.with_nearest_mantissa();
+            let ratio = near.effective().unwrap().get() / asked.rate.get();
+            assert!((0.94..1.07).contains(&ratio), "{asked:?}: {ratio}");
+            shifts.push((near.mantissa.get(), near.shift().unwrap()));
+        }
+        shifts.dedup();
+        assert!(shifts.len() >= 5, "{shifts:?}");
+        // 20 is 13.2404 with 1: 2^0.2404 too much; with 7 it is 16.0478
+        assert_eq!((shifts.contains(&(1, 13)), shifts.contains(&(7, 16))), (false, true));
+        // an exact power of two keeps the least mantissa
+        let exact = Rate { rate: rate(20.0, 6.0).effective().unwrap(), ..rate(20.0, 6.0) };
+        assert_eq!(exact.with_nearest_mantissa().mantissa.get(), 1);
+        // where 1 would need a shift below 0, more than 1 does not
+        let great = Rate { rate: Positive::new(20.0 * 32768.0).unwrap(), ..rate(20.0, 6.0) };
+        let near = great.with_nearest_mantissa();
+        assert_eq!((great.shift().is_err(), near.shift().is_ok()), (true, true));
     }
 
     #[test]

@@ -68,21 +68,19 @@ impl Classify {
     }
 
     fn told(&mut self, train: Option<Score>, seconds: f64) -> Told {
-        let (validation, currents) = self.validate();
-        Told {
-            outcome: Outcome::Classify(ClassifyOutcome { train, validation }),
-            currents,
-            seconds,
-        }
+        let (validation, currents, mute) = self.validate();
+        let outcome = Outcome::Classify(ClassifyOutcome { train, validation });
+        Told { outcome, currents, mute, seconds }
     }
 
-    fn validate(&mut self) -> (Option<Score>, Vec<Currents>) {
+    fn validate(&mut self) -> (Option<Score>, Vec<Currents>, Vec<bool>) {
         let Self { trainer, validation, .. } = self;
         if validation.is_empty() {
-            return (None, vec![[[0; 2]; 2]; trainer.driver().engine().layers().len()]);
+            let layers = trainer.driver().engine().layers().len();
+            return (None, vec![[[0; 2]; 2]; layers], vec![false; layers]);
         }
-        let Evaluation { correct, currents, .. } = trainer.evaluate(validation);
-        (Some(Score { correct, total: validation.len() as u64 }), currents)
+        let Evaluation { correct, currents, mute, .. } = trainer.evaluate(validation);
+        (Some(Score { correct, total: validation.len() as u64 }), currents, mute)
     }
 }
 
@@ -92,6 +90,9 @@ impl Task for Classify {
     }
 
     fn advance(&mut self, go_on: GoOn<'_>) -> Option<Told> {
+        if self.trainer.epoch() >= self.trainer.experiment().epochs {
+            return None;
+        }
         let started = Instant::now();
         let again = matches!(
             self.trainer.experiment().hardware.adc,

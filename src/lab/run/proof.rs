@@ -35,6 +35,7 @@ pub(super) fn receipt(
         epoch_hashes: records.iter().map(|record| record.state_hash.clone()).collect(),
         test: None,
         notes: session.notes().to_vec(),
+        rates: session.rates().to_vec(),
     }
 }
 
