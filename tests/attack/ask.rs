@@ -94,7 +94,7 @@ pub(crate) fn asked(world: &World, chance: &mut Chance, here: &Path) -> (&'stati
             let name = chance.of(&["ideal", "reram", "neurram", "hermes", "mrr", "sram"]);
             let text = fs::read_to_string(format!("{models}/{name}.toml")).unwrap();
             write("chip.toml", &chance.text(&text));
-            put(
+            write(
                 "experiment.toml",
                 world::EXPERIMENT.split("[hw.").next().unwrap_or_default().as_bytes(),
             );
