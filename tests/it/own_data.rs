@@ -133,7 +133,7 @@ fn tables_that_cannot_be_right_are_refused_with_a_cure() {
         (
             "two columns of text",
             at(""),
-            "a,kind,colour\n1,cat,red\n2,dog,blue\n".repeat(1),
+            "a,kind,colour\n1,cat,red\n2,dog,blue\n".into(),
             &["`kind`, `colour` may each be the label", "data.label_column = \"kind\""],
         ),
         (
@@ -362,7 +362,7 @@ fn arrays_that_cannot_be_right_are_refused_with_a_cure() {
     let twelve: Vec<u8> = (0..12).collect();
     let (x, y) = (floats(&[0.5, 0.25, 1.0, 0.0].repeat(3)), whole(&[0, 1].repeat(6)));
     let bad = |x: f32| floats(&[&[x, 0.5][..], &[0.25; 10]].concat());
-    let cases: Vec<(&str, Vec<u8>, Vec<u8>, &[&str])> = vec![
+    let cases: [(&str, Vec<u8>, Vec<u8>, &[&str]); 14] = [
         ("NaN", bad(f32::NAN), y.clone(), &["hold NaN", "a missing value", "nan_to_num"]),
         ("infinity", bad(f32::INFINITY), y.clone(), &["hold inf", "fill the gap"]),
         ("standardised values", bad(-1.5), y.clone(), &["reach from -1.5 to 0.5", "(x - least)"]),
