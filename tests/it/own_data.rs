@@ -281,6 +281,11 @@ fn tables_that_cannot_be_right_are_refused_with_a_cure() {
         std::fs::write(folder.path().join("own.csv"), &text).unwrap();
         refused(what, load(folder.path(), &keys), words);
     }
+    let folder = tempfile::tempdir().unwrap();
+    let latin = b"a,label\n1,caf\xe9\n2,caf\xe8\n".repeat(12);
+    std::fs::write(folder.path().join("own.csv"), latin).unwrap();
+    let words: &[&str] = &["line 2 is not UTF-8", "save the file as UTF-8"];
+    refused("Latin-1, whose words could become one", load(folder.path(), own), words);
 }
 
 /// An error that holds all these words.
