@@ -90,7 +90,8 @@ const DATA: &[KeyEntry] = &[
             ("csv", "a table of text"),
         ],
     )
-    .otherwise("a set is named"),
+    .otherwise("a set is named")
+    .only("without data.set", &["data.train=a"]),
     other("train", "a path").only("with data.format", CSV),
     other("train_labels", "a path")
         .only("with data.format = \"idx\" or \"npz\"", IDX)
