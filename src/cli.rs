@@ -176,6 +176,24 @@ impl Shared {
     }
 }
 
+/// Where the files of a run lie now.
+#[derive(Debug, Clone, Args)]
+struct Moved {
+    /// Where the run's own data are now: its file, or the folder that holds its files under their names. What is there
+    /// has to be what the run was made with
+    #[arg(long, value_name = "PATH")]
+    data: Option<PathBuf>,
+}
+
+impl Moved {
+    fn root(&self, root: DataRoot) -> DataRoot {
+        match &self.data {
+            Some(place) => root.with_files(place),
+            None => root,
+        }
+    }
+}
+
 /// The back end of a name.
 fn kernel(name: &str) -> Result<Backend, Failure> {
     Backend::named(name)

@@ -350,9 +350,16 @@ impl Engine {
         }
     }
 
-    /// Starts recording operations, or stops and gives what was executed since drives were last loaded.
+    /// Starts recording operations, or stops and gives what was executed since the last [`Engine::begin_update`].
     pub fn record(&mut self, on: bool) -> Vec<Recorded> {
         std::mem::replace(&mut self.tape, on.then(Vec::new)).unwrap_or_default()
+    }
+
+    /// What was recorded before belongs to another update.
+    pub fn begin_update(&mut self) {
+        if let Some(tape) = &mut self.tape {
+            tape.clear();
+        }
     }
 
     /// The chip.
@@ -456,9 +463,6 @@ impl Engine {
     /// When the numbers do not have the shape the operation says: tasks and rules are our own code.
     pub fn execute(&mut self, operation: &Operation<'_>) {
         if let Some(tape) = &mut self.tape {
-            if matches!(operation, Operation::LoadDrives { .. }) {
-                tape.clear();
-            }
             tape.push(Recorded::new(operation));
         }
         match *operation {

@@ -27,6 +27,9 @@ pub(super) struct PriceArgs {
     /// One JSON object on standard output
     #[arg(long)]
     json: bool,
+    /// Print only totals
+    #[arg(long, short)]
+    quiet: bool,
 }
 
 #[derive(Debug, Args)]
@@ -65,8 +68,10 @@ pub(super) fn price(args: &PriceArgs) -> Done {
         say(&object.to_string());
         return Ok(());
     }
-    say(&format!("run on {}, constants of {}", run.made_on, run.priced_as));
-    if !run.changes.is_empty() {
+    if !args.quiet {
+        say(&format!("run on {}, constants of {}", run.made_on, run.priced_as));
+    }
+    if !run.changes.is_empty() && !args.quiet {
         let keys: Vec<_> = run.changes.iter().map(|change| change.key).collect();
         say(&format!(
             "the chips differ in {}: what that touches is left out below; to count it, train on {}",
@@ -76,6 +81,10 @@ pub(super) fn price(args: &PriceArgs) -> Done {
     }
     if let (Some(cycles), Some(seconds)) = (run.ledger.elapsed(), bill.seconds_total()) {
         say(&format!("time     {cycles} cycles, {}", prefixed(seconds, "s")));
+    }
+    if args.quiet {
+        say(&format!("energy   {}", bill.total().words()));
+        return Ok(());
     }
     show_energy(&bill, &run.images);
     for (heading, groups) in [

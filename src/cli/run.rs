@@ -1,6 +1,6 @@
 //! `train`, `eval`, `verify`.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
 
@@ -8,7 +8,7 @@ use clap::Args;
 use serde_json::json;
 
 use super::progress::Meter;
-use super::{Done, Failure, Shared, configuration, environment, known, note, say, usage};
+use super::{Done, Failure, Moved, Shared, configuration, environment, known, note, say, usage};
 use crate::lab::price::{EnergySplit, PerImage};
 use crate::lab::run::{self, Machine, RunError, RunEvent, Trained, Verdict};
 use crate::lab::store::index::{INDEX, Store};
@@ -36,6 +36,8 @@ pub(super) struct TrainArgs {
     #[arg(long, value_name = "RUN", value_hint = clap::ValueHint::DirPath, conflicts_with_all = ["file", "hw", "settings", "seed", "out"])]
     resume: Option<PathBuf>,
     #[command(flatten)]
+    moved: Moved,
+    #[command(flatten)]
     shared: Shared,
 }
 
@@ -44,6 +46,8 @@ pub(super) struct EvalArgs {
     /// Folder of a run
     #[arg(value_hint = clap::ValueHint::DirPath)]
     run: PathBuf,
+    #[command(flatten)]
+    moved: Moved,
     #[command(flatten)]
     shared: Shared,
 }
@@ -62,6 +66,8 @@ pub(super) struct VerifyArgs {
     /// Which runs are drawn [default: from the clock, and printed]
     #[arg(long, value_name = "N", requires = "sample")]
     sample_seed: Option<u64>,
+    #[command(flatten)]
+    moved: Moved,
     #[command(flatten)]
     shared: Shared,
 }
@@ -93,6 +99,12 @@ pub(super) fn stop_flag() -> Arc<AtomicBool> {
 pub(super) fn train(args: &TrainArgs) -> Done {
     let shared = &args.shared;
     let machine = shared.machine()?;
+    if args.resume.is_none() && args.moved.data.is_some() {
+        return Err(usage(
+            "--data says where the data of a run are that is continued (--resume); of a new run, say it with --set \
+             data.train=FILE or in its file",
+        ));
+    }
     let stop = stop_flag();
     let config = match &args.resume {
         Some(_) => None,
@@ -105,16 +117,19 @@ pub(super) fn train(args: &TrainArgs) -> Done {
     let mut folder = PathBuf::new();
     let mut on_event = |event: RunEvent<'_>| {
         match event {
-            RunEvent::Started { folder: path, data, warnings, rates, epoch, epochs } => {
+            RunEvent::Started { folder: path, data, said, warnings, rates, epoch, epochs } => {
                 folder = path.into();
                 meter = Meter::new(quiet, epochs);
                 if json {
                     let run = path.display().to_string();
-                    say(&json!({"event": "started", "run": run, "data": data, "epoch": epoch,
+                    say(&json!({"event": "started", "run": run, "data": data, "data_read": said, "epoch": epoch,
                         "epochs": epochs, "warnings": warnings, "rates": rates})
                     .to_string());
                 } else if !quiet {
                     meter.line(data);
+                    for line in said {
+                        meter.line(&format!("data: {line}"));
+                    }
                     meter.line(&format!(
                         "run {}  kernel {}  threads {}",
                         path.display(),
@@ -148,7 +163,7 @@ pub(super) fn train(args: &TrainArgs) -> Done {
         }
         !stop.load(Ordering::SeqCst)
     };
-    let data = shared.data_root();
+    let data = args.moved.root(shared.data_root());
     let outcome = match (&args.resume, &config) {
         (Some(path), _) => run::resume(path, &data, machine, &mut on_event),
         (None, Some(config)) => {
@@ -162,12 +177,24 @@ pub(super) fn train(args: &TrainArgs) -> Done {
     let outcome = outcome?;
     if json {
         say(&done(&folder.display().to_string(), &outcome).to_string());
+    } else if quiet {
+        say(&result(&folder, &outcome));
     } else {
         say(&outcome.summary);
         say(&format!("report   {}", folder.join("report.html").display()));
         say(&format!("verify   dalean verify {}", folder.display()));
     }
     Ok(())
+}
+
+/// The result alone: the score of the test, or of the last validation, and where the run is.
+fn result(folder: &Path, outcome: &Trained) -> String {
+    let test = outcome.receipt.classified().map(|test| ("test", test.score));
+    let validation = || Some(("validation", outcome.records.last()?.validation()?));
+    let score = test.or_else(validation).map_or_else(String::new, |(of, score)| {
+        format!("{of} {:.2} % ({} of {})  ", 100.0 * score.fraction(), score.correct, score.total)
+    });
+    format!("{score}{}", folder.display())
 }
 
 fn done(run: &str, outcome: &Trained) -> serde_json::Value {
@@ -203,7 +230,8 @@ fn done(run: &str, outcome: &Trained) -> serde_json::Value {
 
 pub(super) fn eval(args: &EvalArgs) -> Done {
     let shared = &args.shared;
-    let (test, state_hash) = run::evaluate(&args.run, &shared.data_root(), shared.machine()?)?;
+    let (test, state_hash) =
+        run::evaluate(&args.run, &args.moved.root(shared.data_root()), shared.machine()?)?;
     let TestOutcome::Classify(TestRecord { epoch, ref select, score, .. }) = test;
     if shared.json {
         say(&json!({
@@ -241,11 +269,16 @@ pub(super) fn verify(args: &VerifyArgs) -> Done {
         )));
     }
     let mut meter = Meter::new(shared.quiet || shared.json, 0);
-    let verdict =
-        run::verify(&args.run, &shared.data_root(), machine, args.epochs, &mut |progress| {
+    let verdict = run::verify(
+        &args.run,
+        &args.moved.root(shared.data_root()),
+        machine,
+        args.epochs,
+        &mut |progress| {
             meter.batch(progress);
             !stop.load(Ordering::SeqCst)
-        });
+        },
+    );
     meter.finish();
     match verdict? {
         Verdict::Same { epochs, state_hash, test, unchecked } => {
@@ -323,7 +356,7 @@ fn sample(args: &VerifyArgs, count: usize, machine: Machine, stop: &AtomicBool) 
         meter().batch(progress);
         !stop.load(Ordering::SeqCst)
     };
-    let root = shared.data_root();
+    let root = args.moved.root(shared.data_root());
     let runs = sweep::sample(&store, count, seed, &root, machine, &mut on_run, &mut go_on)?;
     if let Some(code) = wrong.iter().max() {
         let message = format!("{} of {runs} runs do not hold, as said above", wrong.len());

@@ -144,6 +144,7 @@ fn announce(shared: &Shared, plan: &SweepPlan, path: &std::path::Path) {
         tell!("{}", describe(plan));
         for data in &plan.data {
             tell!("{}", data.description);
+            data.said.iter().for_each(|line| tell!("data: {line}"));
         }
         let first = plan.points.iter().position(|planned| planned.key.is_err());
         if let Some(first) = first

@@ -78,7 +78,8 @@ pub(super) fn execute(args: &TraceArgs) -> Done {
     Ok(())
 }
 
-fn write(path: &Path, bytes: &[u8]) -> Done {
+/// Writes a file that the user named.
+pub(super) fn write(path: &Path, bytes: &[u8]) -> Done {
     crate::lab::store::place::write_out(path, bytes).map_err(|error| Failure {
         code: 1,
         message: format!("cannot write {}: {error}", path.display()),

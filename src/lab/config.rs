@@ -27,7 +27,7 @@ pub use defaults::{SET_DEFAULTS, SetDefaults};
 pub use differs::{Difference, flat};
 pub use file::{ExperimentFile, HardwareFile};
 pub use hardware::{Model, builtin_models, load_model, model_names};
-pub use layers::{Overlay, Sources, load, overlay, setting, setting_table};
+pub use layers::{Overlay, Sources, anchor, load, overlay, setting, setting_table};
 pub use quantity::{
     Constant, Constants, CostClass, CostTable, Kind, Per, QUANTITIES, Quantity, Standing,
 };

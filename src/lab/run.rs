@@ -134,7 +134,8 @@ pub enum RunError {
     },
     /// The data is not what the run was made with.
     #[error(
-        "the data has the hash {found}, but the run was made with {wanted}; get the same data again (`dalean data list`)"
+        "the data has the hash {found}, but the run was made with {wanted}; get the same data again (`dalean data list`), \
+         or say with --data where the files are that it was made with"
     )]
     DataChanged {
         /// Hash now.

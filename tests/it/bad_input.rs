@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::program::{Ran, SMALL, dalean, run, train, train_plain, trained};
+use super::program::{Ran, SMALL, dalean, only_run, run, train, train_plain, trained};
 
 /// An error of the program itself: code 1 or 2, one message, no panic.
 fn refused(ran: &Ran, words: &[&str]) {
@@ -180,7 +180,7 @@ fn a_full_disk_leaves_the_last_finished_epoch() {
     command.arg("-c").arg(line).arg(env!("CARGO_BIN_EXE_dalean")).arg(root.path()).arg(SMALL);
     let ran = run(&mut command);
     refused(&ran, &["cannot write", "metrics.jsonl", "free some space", "--resume"]);
-    let folder = root.path().join("optdigits-ed-seed1");
+    let folder = only_run(root.path());
     assert!(files(&folder).iter().all(|name| !name.contains("part-")), "parts stayed behind");
     let ran = run(dalean().args(["train", "--json", "--resume"]).arg(&folder));
     assert_eq!(ran.code, Some(0), "{ran:?}");

@@ -18,7 +18,7 @@ use safetensors::SafeTensors;
 use serde_json::Value;
 
 use super::golden_run::EVERYTHING;
-use super::program::{dalean, run as run_program};
+use super::program::{dalean, only_run, run as run_program};
 
 fn machine() -> Machine {
     Machine::new(Backend::best(), 1).unwrap()
@@ -55,7 +55,7 @@ fn made(finished: bool) -> Files {
         Ok(_) => assert!(finished),
         Err(error) => assert!(matches!(error, RunError::Stopped { .. }) && !finished, "{error}"),
     }
-    files(&work.path().join("xor-ed-seed1"))
+    files(&only_run(work.path()))
 }
 
 /// Places of everything that is no list or table, as JSON pointers, and of lists and tables that are empty.

@@ -12,7 +12,7 @@ use dalean::lab::data::DataRoot;
 use dalean::lab::run::{self, Machine, Verdict};
 use dalean::lab::store::folder;
 
-use super::program::{dalean, run};
+use super::program::{dalean, only_run, run};
 
 /// Exclusive or, on a chip with everything that has state.
 pub(crate) const EVERYTHING: &str = "
@@ -52,7 +52,7 @@ fn additions_move_no_hash_no_address_and_no_verdict() {
     let root = DataRoot::new("no such folder");
     let fresh = load(&Sources { experiment: Some(("it", EVERYTHING)), ..Sources::default() });
     let outcome = run::train(&fresh.unwrap(), &root, work.path(), machine(), &mut |_| true);
-    let made = work.path().join("xor-ed-seed1");
+    let made = only_run(work.path());
     if std::env::var_os("UPDATE_EXPECT").is_some() && cfg!(not(feature = "grown")) {
         for name in ["lock", "report.html", "timing.json"] {
             fs::remove_file(made.join(name)).unwrap();

@@ -95,7 +95,7 @@ impl Config {
 
     /// Keys whose value is another than by saying nothing but data, rule and chip; the seed aside.
     #[must_use]
-    pub fn differences(&self) -> Vec<Difference> {
+    pub(crate) fn differences(&self) -> Vec<Difference> {
         let mut silent = self.silent().map(|file| lines_of(&file)).unwrap_or_default();
         if let Some(file) = self.following() {
             let follows = |key: &str| FOLLOWING.contains(&key);
@@ -114,7 +114,7 @@ impl Config {
 
     /// Name of the folder of its runs: says data, rule, what differs from saying nothing, and the seed.
     #[must_use]
-    pub fn run_name(&self) -> String {
+    pub(crate) fn run_name(&self) -> String {
         let mut parts = vec![clean(&self.data_name(), WORD_MAX), clean(self.rule_name(), WORD_MAX)];
         if self.hardware_name != "ideal" {
             parts.push(clean(&self.hardware_name, WORD_MAX));
@@ -138,7 +138,7 @@ impl Config {
 
     /// What differs from saying nothing, for headings: `level_bits 4, rate 5, seed 2`; empty when nothing does.
     #[must_use]
-    pub fn differences_text(&self) -> String {
+    pub(crate) fn differences_text(&self) -> String {
         let differences = self.differences();
         let mut words: Vec<String> = differences.iter().map(Difference::text).collect();
         let more = words.len().saturating_sub(SHOWN_MAX);
@@ -174,7 +174,7 @@ impl Difference {
 
     /// `level-bits4`, `hidden64x32`, `overlap`, `no-overlap`.
     fn word(&self) -> String {
-        let key = clean(&self.key_short(), usize::MAX);
+        let key = clean(&self.key_short().replace('.', "-"), usize::MAX);
         match &*self.value {
             "true" => key,
             "false" => format!("no-{key}"),

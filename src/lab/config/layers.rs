@@ -1,8 +1,10 @@
 //! Laying texts over one another: built-in defaults, hardware model, experiment file, a sweep's keys, `--set`, `--hw`.
 
+use std::path::Path;
+
 use super::file::{ExperimentFile, HardwareFile};
 use super::wrong::text_error;
-use super::{Config, ConfigError, check, hardware};
+use super::{Config, ConfigError, check, data, hardware};
 
 /// Where a configuration comes from, weakest first.
 ///
@@ -23,7 +25,7 @@ use super::{Config, ConfigError, check, hardware};
 /// ```
 #[derive(Debug, Clone, Default)]
 pub struct Sources<'a> {
-    /// Name and text of the experiment file.
+    /// Name and text of the experiment file; paths in it are relative to the folder of that name.
     pub experiment: Option<(&'a str, &'a str)>,
     /// What a sweep sets, weakest first.
     pub overlays: &'a [Overlay<'a>],
@@ -52,7 +54,9 @@ pub fn load(sources: &Sources<'_>) -> Result<Config, ConfigError> {
     let mut table = toml::Table::new();
     if let Some((name, text)) = sources.experiment {
         let _: ExperimentFile = parse(name, text)?;
-        lay(&mut table, parse(name, text)?);
+        let mut file = parse(name, text)?;
+        anchor(&mut file, Path::new(name).parent().unwrap_or(Path::new("")));
+        lay(&mut table, file);
     }
     for Overlay { place, table: over } in sources.overlays {
         let _: ExperimentFile = table_of(place, over)?;
@@ -106,6 +110,20 @@ fn lay(under: &mut toml::Table, mut over: toml::Table) {
         *hw = toml::Value::Table(toml::Table::from_iter([("model".to_owned(), name)]));
     }
     overlay(under, over);
+}
+
+/// Makes paths that a file in `folder` names relative to where the program runs: those of data and of a hardware model.
+pub fn anchor(table: &mut toml::Table, folder: &Path) {
+    data::anchor(table, folder);
+    let model = match table.get_mut("hw") {
+        Some(toml::Value::Table(hw)) => hw.get_mut("model"),
+        model => model,
+    };
+    if let Some(toml::Value::String(model)) = model
+        && !hardware::model_names().contains(&&**model)
+    {
+        *model = folder.join(&*model).display().to_string();
+    }
 }
 
 /// Whether `hw.name` stands where it means something: in a chip that is written out, as resolved configurations have it.
@@ -293,7 +311,10 @@ mod tests {
             (&["hw.write.dither_bits=0", "hw.write.dither=per_cell"], "hw.write.dither"),
             (&["data.label_column=last"], "data.label_column"),
             (&["data.format=csv", "data.train=a", "data.train_labels=b"], "data.train_labels"),
-            (&["data.format=idx", "data.test_labels=b"], "data.test_labels"),
+            (
+                &["data.format=idx", "data.train=a", "data.train_labels=b", "data.test_labels=b"],
+                "data.test_labels",
+            ),
             (&["data.format=idx", "data.labels_array=b"], "data.labels_array"),
         ] {
             let error = with(settings).unwrap_err().to_string();

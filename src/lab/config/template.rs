@@ -105,7 +105,7 @@ impl Config {
     /// # Panics
     /// Never: every key has a TOML form.
     #[must_use]
-    pub fn hardware_toml(&self, name: &str) -> String {
+    pub(crate) fn hardware_toml(&self, name: &str) -> String {
         let ChipFile(mut hw) = self.resolved.hw.clone().unwrap_or_default();
         hw.name = Some(name.to_owned());
         complete(&mut hw);

@@ -171,6 +171,7 @@ fn receipt(records: &[EpochRecord], classes: usize) -> Receipt {
             full_scale: 16,
             classes,
             image: None,
+            names: vec![],
         },
         tables: "e0".into(),
         metrics: "f0".into(),

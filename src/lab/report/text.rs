@@ -24,6 +24,28 @@ const COLUMNS: [(&str, usize); 11] = [
     ("gate", 6),
 ];
 
+/// What the columns mean, in their order.
+const MEANINGS: [&str; COLUMNS.len()] = [
+    "devices, each with an unsigned level",
+    "cells at the lower end of the programming window, of the cells",
+    "cells that store 0, of the cells (connection sparsity)",
+    "sum of excitatory over sum of inhibitory levels of the layer",
+    "pulses given over the whole training, after the bound",
+    "pulses that moved their cell",
+    "increments that the bound cut, of those that were not 0",
+    "conversions while learning beyond the range of the converter",
+    "look-ups at an end of the table",
+    "error words cut by their width",
+    "gates cut by their width",
+];
+
+/// What the columns of [`summary`] mean, a line each.
+#[must_use]
+pub fn words() -> String {
+    let line = |((head, _), meaning): (&(&str, usize), &str)| format!("{head:<10} {meaning}\n");
+    COLUMNS.iter().zip(MEANINGS).map(line).collect()
+}
+
 /// Events of the last four columns.
 const SATURATED: [&str; 4] =
     ["saturated_conversions", "saturated_look_ups", "saturated_errors", "saturated_gates"];

@@ -165,7 +165,7 @@ impl Parts<'_> {
             level_max: self.config.hardware.cell.level_bits.level_max(),
             heats: &heats,
             pictures: &pictures,
-            class_names: &[],
+            class_names: &self.receipt.data.names,
             ledger: self.counted.map(|(ledger, _)| ledger),
             cost: self.counted.map(|(_, cost)| cost),
         };

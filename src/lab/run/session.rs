@@ -84,14 +84,14 @@ impl Session {
         self.task.infer();
     }
 
-    /// Starts recording operations; what was read before the last samples were loaded is forgotten.
+    /// Starts recording operations; what was executed before the last update is forgotten.
     pub(crate) fn keep_tape(&mut self) {
         for network in self.task.networks_mut() {
             let _ = network.engine_mut().record(true);
         }
     }
 
-    /// What the first network executed since its last samples were loaded.
+    /// What the first network executed in its last update.
     pub(crate) fn take_tape(&mut self) -> Vec<Recorded> {
         let mut networks = self.task.networks_mut().into_iter();
         networks.next().map_or_else(Vec::new, |network| network.engine_mut().record(false))

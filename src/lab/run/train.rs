@@ -11,7 +11,7 @@ use super::notes::{Watcher, with_calibration};
 use super::session::chosen;
 use super::{Machine, Progress, RunError, Session, proof};
 use crate::lab::config::{self, Config, Select, Sources};
-use crate::lab::data::{self, Data, DataRoot, ImageShape};
+use crate::lab::data::{self, Data, DataRoot, ImageShape, Told};
 use crate::lab::price::Cost;
 use crate::lab::store::folder::{self, FolderError, MetricsLog, RunFolder, names};
 use crate::lab::store::ledger::LedgerRecord;
@@ -32,6 +32,8 @@ pub enum RunEvent<'a> {
         folder: &'a Path,
         /// The data, in one line.
         data: &'a str,
+        /// How files of one's own were read, as far as nobody had said it.
+        said: &'a [String],
         /// What the user should know.
         warnings: &'a [String],
         /// The rate of each layer, as it was asked for and as it is.
@@ -132,10 +134,10 @@ pub fn train(
     on_event: &mut (dyn FnMut(RunEvent<'_>) -> bool + Send),
 ) -> Result<Trained, RunError> {
     let loaded = data::load(&config.source()?, data_root)?;
-    let about = (loaded.description.clone(), loaded.image);
+    let about = About::of(&loaded);
     let session = Session::new(config, loaded, machine)?;
     let folder = RunFolder::create(root, &config.run_name())?;
-    let text = config.to_toml();
+    let text = config.settled(&about.told, folder.path());
     folder.write(names::CONFIG, text.as_bytes())?;
     Run::new(config, text, folder, machine, about, session).carry_out(on_event)
 }
@@ -155,7 +157,7 @@ pub fn resume(
     let folder = RunFolder::open(path)?;
     let (config, text) = read_config(path)?;
     let loaded = data::load(&config.source()?, data_root)?;
-    let about = (loaded.description.clone(), loaded.image);
+    let about = About::of(&loaded);
     let session = Session::new(&config, loaded, machine)?;
     let mut run = Run::new(&config, text, folder, machine, about, session);
     run.restore()?;
@@ -174,9 +176,9 @@ pub fn carry_on(
     keeping: Keeping,
     on_event: &mut (dyn FnMut(RunEvent<'_>) -> bool + Send),
 ) -> Result<Trained, RunError> {
-    let about = (loaded.description.clone(), loaded.image);
+    let about = About::of(loaded);
     let session = || Session::new(config, loaded.clone(), machine);
-    let text = config.to_toml();
+    let text = config.settled(&about.told, folder.path());
     let begun = folder::read_text(folder.path(), names::CONFIG).is_ok_and(|found| found == text);
     let mut run = Run::new(config, text, folder, machine, about, session()?);
     run.keeping = keeping;
@@ -261,13 +263,28 @@ pub fn evaluate(
     Ok((test, state))
 }
 
+/// What is told of data beside their examples.
+struct About {
+    description: String,
+    image: Option<ImageShape>,
+    said: Vec<String>,
+    told: Told,
+}
+
+impl About {
+    fn of(data: &Data) -> Self {
+        let Data { description, image, said, told, .. } = data;
+        let (description, said, told) = (description.clone(), said.clone(), told.clone());
+        Self { description, image: *image, said, told }
+    }
+}
+
 struct Run<'a> {
     config: &'a Config,
     /// `config.toml`, as it lies in the folder.
     text: String,
     folder: RunFolder,
-    description: String,
-    image: Option<ImageShape>,
+    about: About,
     session: Session,
     records: Vec<EpochRecord>,
     /// The records on disk, once this process has written any.
@@ -292,15 +309,14 @@ impl<'a> Run<'a> {
         text: String,
         folder: RunFolder,
         machine: Machine,
-        (description, image): (String, Option<ImageShape>),
+        about: About,
         session: Session,
     ) -> Self {
         Self {
             config,
             text,
             folder,
-            description,
-            image,
+            about,
             session,
             records: vec![],
             log: None,
@@ -405,7 +421,8 @@ impl<'a> Run<'a> {
         let epochs = self.config.epochs;
         on_event(RunEvent::Started {
             folder: &path,
-            data: &self.description,
+            data: &self.about.description,
+            said: &self.about.said,
             warnings: &self.session.warnings(),
             rates: self.session.rates(),
             epoch: self.session.epoch(),
@@ -548,7 +565,7 @@ impl<'a> Run<'a> {
             records: &self.records,
             counted: Some((&ledger, &cost)),
             state: self.keeping.states.then_some(&read),
-            examples: self.session.examples().zip(self.image),
+            examples: self.session.examples().zip(self.about.image),
         };
         let page = page.draw();
         self.folder.write(names::REPORT, page.html.as_bytes())?;

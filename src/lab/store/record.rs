@@ -234,6 +234,9 @@ pub struct DataRecord {
     /// Height, width and channels, where examples are pictures.
     #[serde(deserialize_with = "Option::deserialize")]
     pub image: Option<[usize; 3]>,
+    /// What the classes are called, where it is not by their numbers.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub names: Vec<String>,
 }
 
 impl DataRecord {
@@ -248,6 +251,7 @@ impl DataRecord {
             full_scale: train.full_scale(),
             classes: train.classes(),
             image: data.image.map(|shape| [shape.height, shape.width, shape.channels]),
+            names: data.names.clone(),
         }
     }
 }

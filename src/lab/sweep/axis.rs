@@ -1,12 +1,13 @@
 //! One axis of a sweep: a list of values, or a range to draw from.
 
+use std::path::Path;
 use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 
 use super::SweepError;
 use crate::lab::config::sweep::{AxisFile, CaseFile, KeyFile, ScalarFile};
-use crate::lab::config::{overlay, setting};
+use crate::lab::config::{anchor, overlay, setting};
 
 /// Most values of one axis.
 const VALUES_MAX: usize = 100_000;
@@ -100,6 +101,13 @@ pub struct Axis {
 }
 
 impl Axis {
+    /// Makes paths that it sets, which are relative to `folder`, relative to where the program runs.
+    pub(super) fn anchor(&mut self, folder: &Path) {
+        if let Source::List(choices) = &mut self.source {
+            choices.iter_mut().for_each(|choice| anchor(Arc::make_mut(&mut choice.keys), folder));
+        }
+    }
+
     /// Checks an axis. `sampled`: points are drawn, so a range needs no steps.
     pub(super) fn new(file: AxisFile, sampled: bool) -> Result<Self, SweepError> {
         let AxisFile { name, label, key, values, from, to, scale, steps, case } = file;

@@ -6,8 +6,8 @@ use std::path::Path;
 use super::filter::Filter;
 use super::row::RESULTS;
 use super::{Axis, SweepError};
-use crate::lab::config::ConfigError;
 use crate::lab::config::sweep::{ReportFile, SampleFile, SeedsFile, SweepFile};
+use crate::lab::config::{ConfigError, anchor};
 use crate::lab::report::sweep::Figures;
 use crate::lab::store::address;
 
@@ -100,7 +100,7 @@ impl Sweep {
         }
         let sample = file.sample.map(sampled).transpose()?;
         let axes = file.axis.unwrap_or_default().into_iter();
-        let axes: Vec<Axis> =
+        let mut axes: Vec<Axis> =
             axes.map(|axis| Axis::new(axis, sample.is_some())).collect::<Result<_, _>>()?;
         if axes.is_empty() {
             return Err(SweepError::key(
@@ -126,7 +126,11 @@ impl Sweep {
         names.push("seed");
         let filter = Filter::new(&file.filter.unwrap_or_default(), &names)?;
         let figures = figures(file.report.unwrap_or_default(), &axes)?;
-        let base = super::table(&file.base.unwrap_or_default());
+        let mut base = super::table(&file.base.unwrap_or_default());
+        // paths in a file are relative to that file
+        let folder = Path::new(place).parent().unwrap_or(Path::new(""));
+        anchor(&mut base, folder);
+        axes.iter_mut().for_each(|axis| axis.anchor(folder));
         let title = file.title.unwrap_or_else(|| name.clone());
         let about = file.about.unwrap_or_default();
         Ok(Self {

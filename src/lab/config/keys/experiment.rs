@@ -1,7 +1,7 @@
 //! Keys of experiment files.
 
 use super::KeyFileKind::Experiment;
-use super::{KeyEntry, KeyTable, key, other, real, whole, words};
+use super::{KeyEntry, KeyTable, flag, key, other, real, whole, words};
 use crate::lab::config::file::{DataFile, ExperimentFile, LearningFile, NetworkFile};
 use crate::lab::config::keys::KeyValues;
 
@@ -53,6 +53,15 @@ const IDX_TEST: &[&str] =
 const NPZ: &[&str] = &["data.format=npz", "data.train=a"];
 const CSV: &[&str] = &["data.format=csv", "data.train=a"];
 
+const NPZ_VALIDATION: &[&str] = &["data.format=npz", "data.train=a", "data.validation_array=b"];
+const NPZ_TEST: &[&str] = &["data.format=npz", "data.train=a", "data.test_array=b"];
+
+const fn array(name: &'static str, beside: &'static [&'static str]) -> KeyEntry {
+    other(name, "the name of an array")
+        .only("with data.format = \"npz\"", beside)
+        .otherwise("known names")
+}
+
 const DATA: &[KeyEntry] = &[
     words(
         "set",
@@ -81,24 +90,42 @@ const DATA: &[KeyEntry] = &[
             ("csv", "a table of text"),
         ],
     )
-    .otherwise("a set is named"),
+    .otherwise("a set is named")
+    .only("without data.set", &["data.train=a"]),
     other("train", "a path").only("with data.format", CSV),
-    other("train_labels", "a path").only("with data.format = \"idx\"", IDX),
+    other("train_labels", "a path")
+        .only("with data.format = \"idx\" or \"npz\"", IDX)
+        .otherwise("in NPZ, the archive of the examples"),
     other("validation", "a path")
         .only("with data.format", CSV)
         .otherwise("cut from the training part"),
     other("validation_labels", "a path")
-        .only("with data.format = \"idx\" and data.validation", IDX_VALIDATION),
+        .only("with data.format = \"idx\" or \"npz\", and data.validation", IDX_VALIDATION),
     other("test", "a path").only("with data.format", CSV).otherwise("cut from the training part"),
-    other("test_labels", "a path").only("with data.format = \"idx\" and data.test", IDX_TEST),
+    other("test_labels", "a path")
+        .only("with data.format = \"idx\" or \"npz\", and data.test", IDX_TEST),
     whole("full_scale", 1, 255)
         .only("with data.format", CSV)
         .otherwise("follows from the training values"),
     whole("classes", 2, 256).only("with data.format", CSV).otherwise("follows from the labels"),
     other("label_column", "`first`, `last`, a number from 0, or a header")
-        .only("with data.format = \"csv\"", CSV),
-    other("examples_array", "the name of an array").only("with data.format = \"npz\"", NPZ),
-    other("labels_array", "the name of an array").only("with data.format = \"npz\"", NPZ),
+        .only("with data.format = \"csv\"", CSV)
+        .otherwise("told from the table, and said"),
+    other("ignore_columns", "a list of columns, each a number from 0 or a header, in quotes")
+        .only("with data.format = \"csv\"", CSV)
+        .otherwise("columns without a name that number the rows"),
+    flag("header").only("with data.format = \"csv\"", CSV).otherwise("told from the table"),
+    words("separator", &[(",", "commas"), (";", "semicolons"), ("tab", "tabs"), ("|", "bars")])
+        .only("with data.format = \"csv\"", CSV)
+        .otherwise("what cuts the first lines into equally many fields"),
+    array("examples_array", NPZ),
+    array("labels_array", NPZ),
+    array("train_array", NPZ),
+    array("train_labels_array", NPZ),
+    array("validation_array", NPZ),
+    array("validation_labels_array", NPZ_VALIDATION),
+    array("test_array", NPZ),
+    array("test_labels_array", NPZ_TEST),
 ];
 
 const NETWORK: &[KeyEntry] = &[
