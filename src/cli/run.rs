@@ -9,6 +9,7 @@ use serde_json::json;
 
 use super::progress::Meter;
 use super::{Done, Failure, Moved, Shared, configuration, environment, known, note, say, usage};
+use crate::lab::config::absent_words;
 use crate::lab::price::{EnergySplit, PerImage};
 use crate::lab::run::{self, Machine, RunError, RunEvent, Trained, Verdict};
 use crate::lab::store::index::{INDEX, Store};
@@ -222,6 +223,7 @@ fn done(run: &str, outcome: &Trained) -> serde_json::Value {
         "parts": cost.energy.map(|energy| energy.parts),
         "by_class": split,
         "per_image": each,
+        "not_simulated": outcome.absent,
         "joules_assumed_share": cost.energy.map(|_| cost.assumed_share),
         "train_seconds": seconds,
         "images_per_second": images as f64 / seconds.max(1e-9),
@@ -233,6 +235,7 @@ pub(super) fn eval(args: &EvalArgs) -> Done {
     let (test, state_hash) =
         run::evaluate(&args.run, &args.moved.root(shared.data_root()), shared.machine()?)?;
     let TestOutcome::Classify(TestRecord { epoch, ref select, score, .. }) = test;
+    let absent = run::absent(&args.run)?;
     if shared.json {
         say(&json!({
             "event": "done",
@@ -242,6 +245,7 @@ pub(super) fn eval(args: &EvalArgs) -> Done {
             "epochs": epoch,
             "train_seconds": 0.0,
             "images_per_second": null,
+            "not_simulated": absent,
         })
         .to_string());
     } else {
@@ -251,6 +255,9 @@ pub(super) fn eval(args: &EvalArgs) -> Done {
             score.correct,
             score.total,
         ));
+        if !shared.quiet {
+            say(&format!("beside this {}: see the page of the run", absent_words(&absent)));
+        }
     }
     Ok(())
 }

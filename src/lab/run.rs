@@ -16,10 +16,10 @@ mod verify;
 mod weigh;
 
 pub use notes::notes;
-pub use profile::{Act, Profile, profile};
+pub use profile::{Act, ModeUse, Profile, profile};
 pub use proof::{records, untouched};
 pub use report::{ReportMade, report};
-pub use repriced::{Prices, Repriced, reprice, reprice_as};
+pub use repriced::{Prices, Repriced, absent, reprice, reprice_as};
 pub use session::Session;
 pub use task::Progress;
 pub use train::{

@@ -37,8 +37,7 @@ fn flatten(prefix: &str, table: &toml::Table, into: &mut Vec<(String, String)>) 
     for (key, value) in table {
         let full = if prefix.is_empty() { key.clone() } else { format!("{prefix}.{key}") };
         match value {
-            _ if matches!(&**key, "source" | "summary" | "not_simulated") => {}
-            _ if key == "kind" && !full.starts_with("hw.adc") => {}
+            _ if matches!(&**key, "source" | "kind" | "summary" | "not_simulated") => {}
             toml::Value::Table(table) => flatten(&full, table, into),
             value => into.push((full, value.to_string())),
         }

@@ -96,6 +96,12 @@ impl Config {
         self.resolved.learning.as_ref().and_then(|l| l.rule.as_deref()).unwrap_or("ed")
     }
 
+    /// The mode of writing a batch as it was written.
+    #[must_use]
+    pub(crate) fn mode_name(&self) -> &str {
+        self.resolved.learning.as_ref().and_then(|l| l.mode.as_deref()).unwrap_or("accumulate")
+    }
+
     /// What may go wrong with these numbers, before anything runs.
     #[must_use]
     pub fn warnings(&self) -> Vec<String> {

@@ -205,7 +205,7 @@ keys! {
         power: BTreeMap<PowerKey, NumberFile>,
         /// Sizes of parts.
         area: BTreeMap<AreaKey, NumberFile>,
-        /// What the chip does and this program does not simulate: printed with every report.
+        /// What the chip has of what this program does not simulate, by the names that `dalean hw show` lists.
         not_simulated: BTreeMap<String, String>,
     }
     /// `[cell]`.

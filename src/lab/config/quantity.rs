@@ -274,6 +274,15 @@ pub struct Constant {
 }
 
 impl Constant {
+    /// Which law brought it to this setting, if one did.
+    #[must_use]
+    pub fn scaled(&self) -> Option<&str> {
+        match &self.standing {
+            Standing::Scaled(law) => Some(law),
+            Standing::Stated | Standing::NotHere(_) => None,
+        }
+    }
+
     /// Why it prices nothing here, if it does not.
     #[must_use]
     pub fn not_here(&self) -> Option<&str> {

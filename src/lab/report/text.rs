@@ -50,6 +50,9 @@ pub fn words() -> String {
 const SATURATED: [&str; 4] =
     ["saturated_conversions", "saturated_look_ups", "saturated_errors", "saturated_gates"];
 
+/// Share of the energy from which the memory of digital sums is named.
+const SHOWN: f64 = 0.05;
+
 /// Cells, writes and saturations of every pathway in the final state, then accuracies and the state hash.
 /// Pulses, bounds and saturations are those of the whole training; `-` stands where there is nothing to divide by.
 #[must_use]
@@ -168,6 +171,12 @@ fn chip(out: &mut String, cost: &Cost) {
         });
         let assumed = format!("{:.0} % assumed", 100.0 * cost.assumed_share);
         lines.push(split.chain([assumed]).collect::<Vec<_>>().join(", "));
+    }
+    if let Some(share) = cost.sums_share.filter(|&share| share >= SHOWN) {
+        lines.push(format!(
+            "{:.0} % is memory of digital sums, 64 bits a product; mode online or replay does without",
+            100.0 * share
+        ));
     }
     let images: Vec<_> = cost.per_image.iter().map(image).filter(|one| !one.is_empty()).collect();
     lines.push(images.join("; "));

@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 use super::notes::{Watcher, with_calibration};
 use super::session::chosen;
 use super::{Machine, Progress, RunError, Session, proof};
-use crate::lab::config::{self, Config, Select, Sources};
+use crate::lab::config::{self, Absent, Config, Select, Sources};
 use crate::lab::data::{self, Data, DataRoot, ImageShape, Told};
 use crate::lab::price::Cost;
 use crate::lab::store::folder::{self, FolderError, MetricsLog, RunFolder, names};
@@ -86,6 +86,8 @@ pub struct Trained {
     pub summary: String,
     /// What it cost on its chip, the final test aside.
     pub cost: Cost,
+    /// What real chips do and the run did not.
+    pub absent: Vec<Absent>,
 }
 
 /// Trains a configuration in a new folder below `root`.
@@ -575,6 +577,7 @@ impl<'a> Run<'a> {
         }
         let notes = with_calibration(&receipt, &self.seen);
         let Self { records, timing, .. } = self;
-        Ok(Trained { receipt, records, timing, notes, summary: page.summary, cost })
+        let absent = self.config.absent();
+        Ok(Trained { receipt, records, timing, notes, summary: page.summary, cost, absent })
     }
 }

@@ -3,6 +3,7 @@
 use super::axis::Value;
 use super::row::{RESULTS, ResultKind, Row};
 use super::{Sweep, SweepError};
+use crate::lab::config::EFFECTS;
 use crate::lab::report::sweep::{Figures, Refused, ShownAxis};
 use crate::lab::store::index::{Store, SweepRecord};
 use crate::lab::table::{Column, ColumnUnit, Role, Table, Values};
@@ -148,10 +149,7 @@ pub fn results(store: &Store, record: &SweepRecord) -> Result<Results, SweepErro
         Some(Refused { point: point.number as usize, what: words(at), why })
     });
     let refused = refused.collect();
-    let mut not_simulated: Vec<String> =
-        rows.iter().flatten().flat_map(|row| row.not_simulated.iter().cloned()).collect();
-    not_simulated.sort();
-    not_simulated.dedup();
+    let not_simulated = left_out(rows.iter().flatten());
     let axes = sweep.axes.iter().zip(&columns[1..]).map(|(axis, column)| ShownAxis {
         name: axis.name.clone(),
         label: axis.label.clone(),
@@ -173,6 +171,26 @@ pub fn results(store: &Store, record: &SweepRecord) -> Result<Results, SweepErro
     let finished = rows.iter().flatten().count();
     let lost = lost.into_iter().filter(|lost| *lost).count();
     Ok(Results { sweep, table, axes, figures, refused, not_simulated, finished, lost })
+}
+
+/// What real chips do and the runs did not, `key = text`: each effect of the program's list, and after it what models say
+/// of theirs; then what only models name.
+fn left_out<'a>(rows: impl Iterator<Item = &'a Row> + Clone) -> Vec<String> {
+    let mut of_models: Vec<&String> = rows.clone().flat_map(|row| &row.not_simulated).collect();
+    of_models.sort();
+    of_models.dedup();
+    let has = |key: &str| rows.clone().any(|row| row.absent.iter().any(|absent| absent == key));
+    let mut all = Vec::new();
+    for effect in EFFECTS.iter().filter(|effect| has(effect.key)) {
+        all.push(format!("{} = {}", effect.key, effect.instead));
+        let of_effect = format!("{} = ", effect.key);
+        let (mine, others): (Vec<_>, Vec<_>) =
+            of_models.into_iter().partition(|text| text.starts_with(&of_effect));
+        all.extend(mine.into_iter().cloned());
+        of_models = others;
+    }
+    all.extend(of_models.into_iter().cloned());
+    all
 }
 
 /// Whole numbers if all are, else numbers if all are, else words.

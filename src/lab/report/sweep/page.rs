@@ -287,8 +287,9 @@ fn notices(view: &SweepView<'_>) -> String {
         let list: String =
             list.map(|text| format!("<li><code>{}</code></li>", escape(text))).collect();
         out += &format!(
-            "<ul class=\"notices\"><li><details><summary>Not simulated on these chips: {}</summary><ul>{list}</ul></details>\
+            "<ul class=\"notices\"><li><details><summary>{} effects of real chips are not simulated: {}</summary><ul>{list}</ul></details>\
              </li></ul>\n",
+            names.len(),
             names.join(", ")
         );
     }
