@@ -11,6 +11,7 @@ mod experiment;
 pub mod file;
 mod given;
 mod hardware;
+mod law;
 mod layers;
 mod quantity;
 pub mod sweep;
@@ -18,6 +19,7 @@ pub mod sweep;
 pub use check::{Config, DataConfig, Select, TrainOn};
 pub use file::{ExperimentFile, HardwareFile};
 pub use hardware::{Model, builtin_models, load_model, model_names};
+pub use law::{Law, Setting, SettingValue, Standing};
 pub use layers::{Overlay, Sources, load, overlay, setting, setting_table};
 pub use quantity::{Constant, Constants, CostTable, Kind, Per, QUANTITIES, Quantity};
 

@@ -1,7 +1,7 @@
 //! Hardware models: the built-in ones, and files.
 
 use super::file::HardwareFile;
-use super::quantity::Constants;
+use super::quantity::{Constants, constants_of};
 use super::{ConfigError, chip};
 use crate::chip::hardware::Hardware;
 
@@ -28,6 +28,10 @@ pub struct Model {
     pub hardware: Hardware,
     /// What its events, its parts and its idling cost.
     pub constants: Constants,
+    /// Nanometres of the node that its numbers are of.
+    pub node_nm: Option<f64>,
+    /// Ways to use it: name and settings.
+    pub modes: Vec<(String, Vec<String>)>,
     /// What is not simulated.
     pub not_simulated: Vec<(String, String)>,
 }
@@ -123,8 +127,10 @@ pub fn load_model(name: &str) -> Result<Model, ConfigError> {
     let file = model_file(name, &text)?;
     let mut resolved = file.clone();
     let hardware = chip::resolve(&mut resolved, "")?;
-    let constants = Constants::new(&file, "")?;
+    let constants = constants_of(&resolved, &hardware, "")?;
     Ok(Model {
+        node_nm: file.node_nm,
+        modes: file.modes.clone().unwrap_or_default().into_iter().collect(),
         name: file.name.clone().unwrap_or_default(),
         summary: file.summary.clone().unwrap_or_default(),
         hardware,

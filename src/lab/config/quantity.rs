@@ -7,7 +7,10 @@
 //!
 //! A key is the name of a quantity of [`QUANTITIES`] and a unit. The list is the only place that joins events of the
 //! ledger to keys. Beside each quantity stands the interval in which a number of this kind can lie on any chip: it is
-//! wide, and what lies outside is a slip of the unit, not an exotic device. See docs/MODEL.md, 4.6.
+//! wide, and what lies outside is a slip of the unit, not an exotic device; and the settings that the number belongs to
+//! ([`super::law`]). See docs/MODEL.md, 4.6.
+
+use std::collections::BTreeMap;
 
 use serde::de::{self, Deserializer};
 use serde::{Deserialize, Serialize};
@@ -15,6 +18,10 @@ use serde::{Deserialize, Serialize};
 use super::ConfigError;
 use super::check::wrong;
 use super::file::{HardwareFile, NumberFile};
+use super::law::{
+    Law, Place, ScalesFile, Setting, Settings, Standing, kind_of, settings,
+};
+use crate::chip::hardware::Hardware;
 use crate::chip::ledger::Event;
 
 /// A table of a hardware model.
@@ -83,18 +90,27 @@ pub struct Quantity {
     pub sane: [f64; 2],
     /// Why that interval.
     pub why: &'static str,
+    /// Settings it belongs to, the first one first in importance: at another one the number is another.
+    pub belongs: &'static [Setting],
 }
 
 const fn energy(name: &'static str, event: Event, sane: [f64; 2], why: &'static str) -> Quantity {
-    Quantity { table: CostTable::Energy, name, per: Per::Event(event), sane, why }
+    Quantity { table: CostTable::Energy, name, per: Per::Event(event), sane, why, belongs: &[] }
 }
 
 const fn power(name: &'static str, per: Per, sane: [f64; 2], why: &'static str) -> Quantity {
-    Quantity { table: CostTable::Power, name, per, sane, why }
+    Quantity { table: CostTable::Power, name, per, sane, why, belongs: &[] }
 }
 
 const fn area(name: &'static str, per: Per, sane: [f64; 2], why: &'static str) -> Quantity {
-    Quantity { table: CostTable::Area, name, per, sane, why }
+    Quantity { table: CostTable::Area, name, per, sane, why, belongs: &[] }
+}
+
+impl Quantity {
+    /// The same, of these settings.
+    const fn of(self, belongs: &'static [Setting]) -> Self {
+        Self { belongs, ..self }
+    }
 }
 
 /// Every quantity a model can give. An event without a line here costs nothing by itself: it says what came of
@@ -105,70 +121,83 @@ pub const QUANTITIES: [Quantity; 24] = [
         Event::DacSlices,
         [1e-17, 1e-10],
         "a 1-bit driver takes 0.4 pJ in 100 ns, an 8-bit one at 14 GS/s 3.6 pJ; a public table has 0.5 nJ by a missing 1e-3",
-    ),
+    )
+    .of(&[Setting::DacBits, Setting::ReadNs, Setting::Columns]),
     energy(
         "cell_read",
         Event::CellReads,
         [1e-18, 1e-10],
         "V^2 G t lies between 0.1 V, 10 nS, 1 ns and 0.5 V, 0.2 mS, 1 us",
-    ),
-    energy("hold", Event::Holds, [1e-18, 1e-12], "C V^2 of some femtofarads"),
+    )
+    .of(&[Setting::ReadNs, Setting::DacBits]),
+    energy("hold", Event::Holds, [1e-18, 1e-12], "C V^2 of some femtofarads")
+    .of(&[Setting::AdcBits]),
     energy(
         "conversion",
         Event::Conversions,
         [1e-14, 1e-10],
         "published converters of 4 to 9 bits lie between 0.05 and 20 pJ",
-    ),
+    )
+    .of(&[Setting::AdcBits, Setting::Converter]),
     energy(
         "shift_add",
         Event::ShiftAdds,
         [1e-16, 1e-11],
         "an adder of 8 to 32 bits takes 1 fJ to 1 pJ",
     ),
-    energy("look_up", Event::LookUps, [1e-16, 1e-10], "a read of a small memory"),
-    energy("multiply", Event::Multiplies, [1e-16, 1e-11], "8 x 8 bits take 10 fJ to 0.4 pJ"),
+    energy("look_up", Event::LookUps, [1e-16, 1e-10], "a read of a small memory")
+    .of(&[Setting::LutBits]),
+    energy("multiply", Event::Multiplies, [1e-16, 1e-11], "8 x 8 bits take 10 fJ to 0.4 pJ")
+    .of(&[Setting::ErrorBits]),
     energy(
         "bus_word",
         Event::BusWords,
         [1e-16, 1e-10],
         "8 wires over up to centimetres, 0.1 pJ a bit and millimetre",
-    ),
+    )
+    .of(&[Setting::ErrorBits]),
     energy(
         "accumulate",
         Event::Accumulates,
         [1e-16, 1e-11],
         "a multiplication and an addition, without the memory",
-    ),
+    )
+    .of(&[Setting::DriveBits]),
     energy(
         "delta",
         Event::DeltaComputations,
         [1e-16, 1e-11],
         "a shift, an addition of a random word and a clamp",
-    ),
+    )
+    .of(&[Setting::DitherBits]),
     energy(
         "cell_load",
         Event::CellLoads,
         [1e-18, 1e-6],
         "one gate charge, or a hundred verified pulses of phase change",
-    ),
+    )
+    .of(&[Setting::PulseNs, Setting::Levels]),
     energy(
         "cell_pulse",
         Event::PulsesAttempted,
         [1e-18, 1e-7],
         "from a FeFET's gate charge (35 aJ) to a phase-change pulse (29 nJ)",
-    ),
+    )
+    .of(&[Setting::PulseNs, Setting::Levels]),
     energy(
         "row_pulse",
         Event::RowPulses,
         [1e-16, 1e-8],
         "C V^2 of a row line and of the columns it crosses",
-    ),
+    )
+    .of(&[Setting::Rows, Setting::Columns]),
     energy(
         "verify_read",
         Event::VerifyReads,
         [1e-18, 1e-9],
         "a read of one cell with its conversion",
-    ),
+    )
+    .of(&[Setting::AdcBits, Setting::Converter, Setting::ReadNs]),
     energy(
         "sram_bit",
         Event::SramBits,
@@ -176,8 +205,10 @@ pub const QUANTITIES: [Quantity; 24] = [
         "7 fJ (2 Mb at 7 nm) to 160 fJ (8 KB at 45 nm) a bit",
     ),
     power("static", Per::Chip, [1e-9, 1e3], "leakage, clocks and references of a chip"),
-    power("tile_static", Per::Tile, [1e-12, 1e2], "leakage and bias of a tile"),
-    power("laser", Per::Tile, [1e-6, 1e2], "light for a tile, at the wall plug"),
+    power("tile_static", Per::Tile, [1e-12, 1e2], "leakage and bias of a tile")
+    .of(&[Setting::Rows, Setting::Columns]),
+    power("laser", Per::Tile, [1e-6, 1e2], "light for a tile, at the wall plug")
+    .of(&[Setting::Rows, Setting::Columns]),
     power(
         "heater",
         Per::Cell,
@@ -191,9 +222,12 @@ pub const QUANTITIES: [Quantity; 24] = [
         "a photodiode and its amplifier take some milliwatts",
     ),
     area("cell", Per::Cell, [1e-16, 1e-7], "from 10 nm squared to an interferometer"),
-    area("adc", Per::Converter, [1e-12, 1e-6], "published converters take 500 to 10000 um2"),
-    area("dac", Per::Row, [1e-13, 1e-6], "a driver of one bit up to a fast 8-bit converter"),
-    area("tile", Per::Tile, [1e-12, 1e-4], "what a tile has beside cells and converters"),
+    area("adc", Per::Converter, [1e-12, 1e-6], "published converters take 500 to 10000 um2")
+    .of(&[Setting::AdcBits, Setting::Converter]),
+    area("dac", Per::Row, [1e-13, 1e-6], "a driver of one bit up to a fast 8-bit converter")
+    .of(&[Setting::DacBits]),
+    area("tile", Per::Tile, [1e-12, 1e-4], "what a tile has beside cells and converters")
+    .of(&[Setting::Rows, Setting::Columns]),
 ];
 
 /// Where a number comes from.
@@ -215,12 +249,38 @@ pub struct Constant {
     pub quantity: &'static Quantity,
     /// Its key, with the unit.
     pub key: String,
-    /// Low, typical and high, in joules, watts or square metres.
+    /// Low, typical and high on the chip, in joules, watts or square metres.
     pub value: [f64; 3],
     /// Where it comes from.
     pub source: String,
-    /// How far to trust it.
+    /// How far to trust it. A number that was scaled is assumed, whatever it was.
     pub kind: Kind,
+    /// The node it is of, in nanometres, where it says one.
+    pub node_nm: Option<f64>,
+    /// Whether it is the chip's, and how.
+    pub standing: Standing,
+    /// As it was given.
+    given: [f64; 3],
+}
+
+impl Constant {
+    /// Its value, if it is the chip's.
+    #[must_use]
+    pub const fn known(&self) -> Option<[f64; 3]> {
+        match self.standing {
+            Standing::Given | Standing::Scaled(_) => Some(self.value),
+            Standing::Other(_) => None,
+        }
+    }
+
+    /// Why it is not the chip's.
+    #[must_use]
+    pub fn unknown(&self) -> Option<String> {
+        match &self.standing {
+            Standing::Other(why) => Some(format!("{} {why}", self.key)),
+            Standing::Given | Standing::Scaled(_) => None,
+        }
+    }
 }
 
 /// The physical numbers of a model, in the order of [`QUANTITIES`].
@@ -232,7 +292,11 @@ impl Constants {
     ///
     /// # Errors
     /// When a number is incomplete, given twice, or its bounds are in the wrong order.
-    pub(super) fn new(file: &HardwareFile, prefix: &str) -> Result<Self, ConfigError> {
+    pub(super) fn new(
+        file: &HardwareFile,
+        place: &Place<'_>,
+        prefix: &str,
+    ) -> Result<Self, ConfigError> {
         let mut all = Vec::new();
         for (table, name, number) in numbers(file) {
             let (quantity, unit) =
@@ -265,12 +329,21 @@ impl Constants {
                 }
                 None => return Err(missing("kind")),
             };
+            let none = Settings::new();
+            let at = number.at.as_ref().unwrap_or(&none);
+            let scales = scales(quantity, number.scales.as_ref(), at, &key)?;
+            let (factor, standing) = place.standing(quantity.belongs, at, &scales);
+            let given = [low, typical, high].map(|number| number * unit);
+            let scaled = matches!(standing, Standing::Scaled(_));
             all.push(Constant {
                 quantity,
                 key: format!("{}.{name}", table.name()),
-                value: [low, typical, high].map(|number| number * unit),
+                value: given.map(|number| number * factor),
                 source: source.into(),
-                kind,
+                kind: if scaled { Kind::Assumed } else { kind },
+                node_nm: number.node_nm.or(file.node_nm),
+                standing,
+                given,
             });
         }
         let place = |c: &Constant| QUANTITIES.iter().position(|q| q == c.quantity);
@@ -305,7 +378,7 @@ impl Constants {
     pub fn complaints(&self) -> Vec<String> {
         let outside = self.0.iter().filter(|c| {
             let [least, most] = c.quantity.sane;
-            c.value.iter().any(|&value| value != 0.0 && !(least..=most).contains(&value))
+            c.given.iter().any(|&value| value != 0.0 && !(least..=most).contains(&value))
         });
         let say = |c: &Constant| {
             let unit = c
@@ -315,7 +388,7 @@ impl Constants {
                 .iter()
                 .find(|(unit, _)| c.key.ends_with(&format!("_{unit}")));
             let (unit, worth) = unit.expect("a key ends in a unit");
-            let [low, typical, high] = c.value.map(|value| value / worth);
+            let [low, typical, high] = c.given.map(|value| value / worth);
             let [least, most] = c.quantity.sane.map(|value| value / worth);
             format!(
                 "`{}` has low {low:.3e}, typical {typical:.3e}, high {high:.3e}; on any chip it lies in {least:.3e} to \
@@ -325,6 +398,58 @@ impl Constants {
         };
         outside.map(say).collect()
     }
+}
+
+/// The numbers of a file on its chip.
+///
+/// # Errors
+/// As [`Constants::new`].
+pub(super) fn constants_of(
+    file: &HardwareFile,
+    hardware: &Hardware,
+    prefix: &str,
+) -> Result<Constants, ConfigError> {
+    let kind = kind_of(file);
+    let (chip, none) = (settings(hardware, kind), Settings::new());
+    let model = file.constants_for.as_ref().unwrap_or(&none);
+    Constants::new(file, &Place { chip: &chip, model, kind }, prefix)
+}
+
+/// Laws by setting. One of a setting that the quantity does not belong to would mean nothing.
+fn scales(
+    quantity: &Quantity,
+    given: Option<&ScalesFile>,
+    at: &Settings,
+    key: &str,
+) -> Result<BTreeMap<Setting, Law>, ConfigError> {
+    let names = || {
+        let names: Vec<_> = quantity.belongs.iter().map(|setting| setting.name()).collect();
+        if names.is_empty() {
+            return "no setting: remove the key".into();
+        }
+        names.join(", ")
+    };
+    let laws = match given {
+        None => BTreeMap::new(),
+        Some(ScalesFile::Each(laws)) => laws.clone(),
+        Some(ScalesFile::First(law)) => match quantity.belongs.first() {
+            Some(first) => [(*first, *law)].into(),
+            None => {
+                let allowed = "its quantity belongs to no setting: remove the key";
+                return Err(wrong(&format!("{key}.scales"), format!("is \"{}\"", law.name()), allowed));
+            }
+        },
+    };
+    let (scaled, stood): (Vec<_>, Vec<_>) = (laws.keys().collect(), at.keys().collect());
+    for (part, settings) in [("scales", scaled), ("at", stood)] {
+        let other = settings.into_iter().find(|setting| !quantity.belongs.contains(setting));
+        if let Some(other) = other {
+            let found = format!("speaks of {}", other.name());
+            let allowed = format!("`{}` belongs to {}", quantity.name, names());
+            return Err(wrong(&format!("{key}.{part}"), found, allowed));
+        }
+    }
+    Ok(laws)
 }
 
 /// Every number of a file with its table and key.
@@ -384,7 +509,8 @@ mod tests {
 
     fn constants(text: &str) -> Result<Constants, String> {
         let file: HardwareFile = toml::from_str(text).map_err(|e| e.to_string())?;
-        Constants::new(&file, "").map_err(|e| e.to_string())
+        let hardware = super::super::chip::resolve(&mut file.clone(), "").map_err(|e| e.to_string())?;
+        constants_of(&file, &hardware, "").map_err(|e| e.to_string())
     }
 
     const SOURCE: &str = "source = \"s\", kind = \"measured\"";

@@ -1,8 +1,8 @@
 //! What a model says before anything runs: times of a full tile, peak rates of the whole chip, areas.
 //!
 //! ```text
-//! alone        1 + read(NS, C, 0) cycles                     one read after the other
-//! back to back 1 + read_again(NS, C) cycles                   the front end never waits
+//! alone        1 + read(C, 0) cycles                          one read after the other
+//! back to back 1 + again(C) cycles                            the front end never waits
 //! TOPS         2 x tiles x (2 R C / cells a weight) / time
 //! ```
 //!
@@ -10,7 +10,7 @@
 
 use super::Range;
 use super::plan::Footprint;
-use crate::chip::hardware::{Hardware, Timing};
+use crate::chip::hardware::{Hardware, ReadTime, Timing};
 use crate::lab::config::{Constants, CostTable};
 
 /// A duration on a full tile.
@@ -34,12 +34,12 @@ fn seconds(timing: &Timing, cycles: u64) -> f64 {
 pub fn figures(hardware: &Hardware, words: u64) -> Vec<Figure> {
     let Some(timing) = hardware.timing else { return vec![] };
     let (rows, columns) = (hardware.tile.rows as u64, hardware.tile.columns as u64);
-    let slices = u64::from(hardware.slices());
+    let reads = ReadTime::new(hardware, timing);
     let accept = timing.accept();
     let figure = |name, cycles| Figure { name, cycles, seconds: seconds(&timing, cycles) };
     vec![
-        figure("read", accept + timing.read(slices, columns, 0)),
-        figure("next read after", accept + timing.read_again(slices, columns)),
+        figure("read", accept + reads.read(1, columns, 0)),
+        figure("next read after", accept + reads.again(1, columns)),
         figure("error words", accept + timing.error(words, columns)),
         figure("accumulate", accept + timing.accumulate(rows, columns)),
         figure("write, row without pulses", timing.rows(1, 0)),
@@ -61,10 +61,12 @@ pub struct Peak {
     pub back_to_back: (Figure, f64),
 }
 
-/// Peak rate of reading with `tiles` full tiles, in `slices` slices or phases, when `cells` cells make a weight.
+/// Peak rate of reading with `tiles` full tiles, in `slices` slices or phases (other than the
+/// chip's own: all as its first), when `cells` cells make a weight.
 #[must_use]
 pub fn peak(hardware: &Hardware, tiles: u64, slices: u64, cells: u64) -> Option<Peak> {
     let timing = hardware.timing?;
+    let reads = ReadTime::of(timing, slices);
     let (rows, columns) = (hardware.tile.rows as u64, hardware.tile.columns as u64);
     let macs = (2 * tiles * rows * columns) as f64 / cells as f64;
     let rate = |name, cycles| {
@@ -75,8 +77,8 @@ pub fn peak(hardware: &Hardware, tiles: u64, slices: u64, cells: u64) -> Option<
     Some(Peak {
         tiles,
         macs,
-        alone: rate("alone", timing.accept() + timing.read(slices, columns, 0)),
-        back_to_back: rate("back to back", timing.accept() + timing.read_again(slices, columns)),
+        alone: rate("alone", timing.accept() + reads.read(1, columns, 0)),
+        back_to_back: rate("back to back", timing.accept() + reads.again(1, columns)),
     })
 }
 
