@@ -5,8 +5,12 @@ use serde_json::json;
 
 use super::{Done, Failure, say, usage};
 use crate::chip::hardware::{Adc, AdcRange, Hardware, PulseCode, Subtract, Timing};
-use crate::lab::config::{self, Config, Constant, CostTable, Sources, builtin_models, load_model};
-use crate::lab::price::{bounds, figures, peak, prefixed};
+use crate::lab::config::{
+    self, Config, Constant, CostTable, Sources, Standing, builtin_models, load_model,
+};
+use crate::lab::price::{Convention, bounds, figures, peak, prefixed};
+
+mod modes;
 
 /// Error words that `hw show` reckons with: those of ten classes.
 const WORDS: u64 = 10;
@@ -48,9 +52,22 @@ pub(super) struct PeakArgs {
     /// Cells of a weight: 2 of a pair, 8 where a design joins eight
     #[arg(long, value_name = "N", default_value_t = 2)]
     cells: u64,
+    /// Every way to use the chip that its model lists under [modes]
+    #[arg(long, conflicts_with = "slices")]
+    modes: bool,
+    /// With --modes, widths of its converters: 8, or 3..10
+    #[arg(long, value_name = "BITS", requires = "modes", value_parser = widths)]
+    adc_bits: Option<Widths>,
     /// One JSON object on standard output
     #[arg(long)]
     json: bool,
+}
+
+/// Widths of a converter.
+type Widths = Vec<i64>;
+
+fn widths(text: &str) -> Result<Widths, String> {
+    modes::widths(text)
 }
 
 pub(super) fn execute(command: &HwCommand) -> Done {
@@ -61,6 +78,7 @@ pub(super) fn execute(command: &HwCommand) -> Done {
             }
         }
         HwCommand::Show { model, settings } => show(model, settings)?,
+        HwCommand::Peak(args) if args.modes => modes::show(args)?,
         HwCommand::Peak(args) => show_peak(args)?,
         HwCommand::Check { model } => {
             let model = load_model(model).map_err(|e| usage(&e.to_string()))?;
@@ -92,6 +110,7 @@ fn show(name: &str, settings: &[String]) -> Done {
         say(&format!("  {name:16} {value}"));
     }
     if let Some(timing) = config.hardware.timing {
+        say(&format!("  {:16} {}", "conversion", conversion_text(&config, &timing)));
         say(&format!("  {:16} {}", "timing", timing_text(&timing)));
         say("\nOn a full tile, ten error words:");
         for figure in figures(&config.hardware, WORDS) {
@@ -133,7 +152,33 @@ fn constant_text(constant: &Constant, unit: &str) -> String {
         }
         _ => bounds(constant.value, unit),
     };
-    format!("{value:36} {kind}")
+    let node = constant.node_nm.map_or_else(String::new, |node| format!(", {node} nm"));
+    let standing = match &constant.standing {
+        Standing::Stated => String::new(),
+        Standing::Scaled(law) => format!(", scaled by {law}"),
+        Standing::NotHere(why) => return format!("not of this chip: {why}"),
+    };
+    format!("{value:36} {kind}{node}{standing}")
+}
+
+/// What a conversion takes, and why.
+fn conversion_text(config: &Config, timing: &Timing) -> String {
+    let kind = config.converter_kind();
+    let steps = match config.hardware.adc {
+        Adc::Finite { bits, .. } => kind.steps(bits.get()),
+        Adc::Ideal => None,
+    };
+    let steps = steps.map_or_else(String::new, |steps| {
+        format!(", {steps} steps of {}", timing.convert / steps.max(1))
+    });
+    let slices = timing.slices.iter().flat_map(|own| own.iter());
+    let slices = slices.map(|slice| format!("{} + {}", slice.settle, slice.convert));
+    let slices: Vec<_> = slices.collect();
+    let slices = match slices.is_empty() {
+        true => String::new(),
+        false => format!("; by phase, settle + convert: {}", slices.join(", ")),
+    };
+    format!("{}: {} cycles{steps}{slices}", kind.name(), timing.convert)
 }
 
 fn timing_text(timing: &Timing) -> String {
@@ -164,21 +209,24 @@ fn show_peak(args: &PeakArgs) -> Done {
             return Err(usage(&format!("{name} is {value}, but must lie in 1..={}", 1 << 30)));
         }
     }
-    let Some(peak) = peak(hardware, tiles, slices, args.cells) else {
+    let convention = Convention::with_cells(args.cells);
+    let Some(peak) = peak(hardware, tiles, slices, convention) else {
         let message = "the model has no [timing]: give it at least hw.timing.clock_mhz";
         return Err(usage(message));
     };
     if args.json {
         let rate = |(figure, rate): &(crate::lab::price::Figure, f64)| json!({"cycles": figure.cycles, "seconds": figure.seconds, "operations_per_second": rate});
         say(&json!({"event": "peak", "model": config.hardware_name, "tiles": tiles,
-            "slices": slices, "cells_per_weight": args.cells, "macs": peak.macs,
+            "slices": slices, "convention": convention.to_json(), "macs": peak.macs,
             "alone": rate(&peak.alone), "back_to_back": rate(&peak.back_to_back)})
         .to_string());
         return Ok(());
     }
     say(&format!(
-        "{}: {tiles} tiles, {slices} slices, {} cells a weight, {} MACs a read",
-        config.hardware_name, args.cells, peak.macs
+        "{}: {tiles} tiles, {slices} slices, {} MACs a read ({})",
+        config.hardware_name,
+        peak.macs,
+        convention.words()
     ));
     for (name, (figure, rate)) in
         [("one read after the other", &peak.alone), ("back to back", &peak.back_to_back)]

@@ -6,11 +6,15 @@ use clap::Args;
 use serde_json::json;
 
 use super::{Done, Shared, configuration, say};
-use crate::lab::price::{Bill, Group, areas, bounds, prefixed};
+use crate::lab::price::{Bill, Convention, EnergySplit, Group, Images, areas, bounds, prefixed};
 use crate::lab::run::{self, Act, Profile};
 
 /// Assumed constants named in a table.
 const NAMED: usize = 5;
+/// Share of the total from which memory of digital sums is explained.
+const SHOWN: f64 = 0.05;
+/// What that memory is, and what does without.
+const SUMS: &str = "a product is added to a 32-bit sum, 64 bits out and in; learning.mode = \"online\" or \"replay\" has none";
 
 #[derive(Debug, Args)]
 pub(super) struct PriceArgs {
@@ -56,7 +60,7 @@ pub(super) fn price(args: &PriceArgs) -> Done {
         let mut object = json!({"event": "price", "run": args.run.display().to_string(),
             "made_on": run.made_on, "priced_as": run.priced_as, "changes": changes,
             "cycles": run.ledger.elapsed()});
-        merge(&mut object, bill.to_json());
+        merge(&mut object, bill.to_json(&run.images));
         say(&object.to_string());
         return Ok(());
     }
@@ -72,14 +76,14 @@ pub(super) fn price(args: &PriceArgs) -> Done {
     if let (Some(cycles), Some(seconds)) = (run.ledger.elapsed(), bill.seconds_total()) {
         say(&format!("time     {cycles} cycles, {}", prefixed(seconds, "s")));
     }
-    show_energy(&bill);
+    show_energy(&bill, &run.images);
     for (heading, groups) in [
         ("by phase", bill.by_phase()),
         ("by operation", bill.by_operation()),
         ("by layer", bill.by_layer()),
         ("by pathway", bill.by_pathway()),
     ] {
-        show_groups(heading, &groups, bill.total()[1]);
+        show_groups(heading, &groups, bill.total().joules[1]);
     }
     show_missing(&bill);
     Ok(())
@@ -91,9 +95,19 @@ fn merge(object: &mut serde_json::Value, more: serde_json::Value) {
     }
 }
 
-fn show_energy(bill: &Bill<'_>) {
-    say(&format!("energy   {}", bounds(bill.total(), "J")));
-    show_groups("by component", &bill.by_component(), bill.total()[1]);
+fn show_energy(bill: &Bill<'_>, images: &Images) {
+    let total = bill.total();
+    say(&format!("energy   {}", total.words()));
+    show_split(&bill.split(None), total.joules[1]);
+    if let Some(share) = bill.sums_share().filter(|&share| share >= SHOWN) {
+        say(&format!("  {:.0} % is memory of the digital sums: {SUMS}", 100.0 * share));
+    }
+    for one in bill.per_image(images) {
+        let time = one.seconds.map_or_else(String::new, |s| format!(", {}", prefixed(s, "s")));
+        say(&format!("to {}, of {}: {}{time}", one.doing(), one.images, one.total.words()));
+        show_split(&one.split, one.total.joules[1]);
+    }
+    show_groups("by component", &bill.by_component(), total.joules[1]);
     let (share, assumed) = bill.assumed();
     let named: Vec<_> = assumed
         .iter()
@@ -102,6 +116,14 @@ fn show_energy(bill: &Bill<'_>) {
         .collect();
     if !named.is_empty() {
         say(&format!("{:.1} % leans on assumed constants: {}", 100.0 * share, named.join(", ")));
+    }
+}
+
+/// Device, converter, digital, static.
+fn show_split(split: &[EnergySplit], total: f64) {
+    for EnergySplit { class, total: part } in split {
+        let share = if total > 0.0 { 100.0 * part.joules[1] / total } else { 0.0 };
+        say(&format!("  {:16} {share:>5.1} %  {}", class.name(), part.words()));
     }
 }
 
@@ -163,17 +185,18 @@ pub(super) fn profile(args: &ProfileArgs) -> Done {
     Ok(())
 }
 
-/// Operations a second and a joule: a multiplication and an addition a product.
+/// Operations a second and a joule; a partial sum of joules has no such rate.
 fn rates(act: &Act, bill: &Bill<'_>) -> (Option<f64>, Option<f64>) {
-    let operations = 2.0 * act.macs.iter().sum::<u64>() as f64;
-    let joules = bill.total()[1];
+    let operations = act.operations(Convention::PAIRS);
     let rate = bill.seconds_total().filter(|&s| s > 0.0).map(|seconds| operations / seconds);
-    (rate, (joules > 0.0).then(|| operations / joules))
+    let joules = bill.total().whole().map(|joules| joules[1]).filter(|&joules| joules > 0.0);
+    (rate, joules.map(|joules| operations / joules))
 }
 
 fn act_json(profile: &Profile, act: &Act) -> serde_json::Value {
     let bill = profile.bill(act);
     let (rate, efficiency) = rates(act, &bill);
+    let macs = act.products.map(|products| Convention::PAIRS.macs(products));
     let stages: Vec<_> = act
         .stages()
         .into_iter()
@@ -185,10 +208,10 @@ fn act_json(profile: &Profile, act: &Act) -> serde_json::Value {
         })
         .collect();
     let mut object = json!({"event": "profile", "act": act.name, "samples": act.samples,
-        "macs_read": act.macs[0], "macs_accumulated": act.macs[1],
+        "convention": Convention::PAIRS.to_json(), "macs_read": macs[0], "macs_accumulated": macs[1],
         "operations_per_second": rate, "operations_per_joule": efficiency,
         "cycles": act.cycles(), "stages": stages});
-    merge(&mut object, bill.to_json());
+    merge(&mut object, bill.to_json(&act.images()));
     object
 }
 
@@ -219,14 +242,15 @@ fn show_act(profile: &Profile, act: &Act) {
             say(&format!("  layer {layer:<10} {}", used.collect::<Vec<_>>().join(", ")));
         }
     }
-    show_energy(&bill);
+    show_energy(&bill, &act.images());
     let (rate, efficiency) = rates(act, &bill);
-    let mut line = format!("MACs     {} of reads, {} of accumulation", act.macs[0], act.macs[1]);
+    let [read, added] = act.products.map(|products| Convention::PAIRS.macs(products));
+    let mut line = format!("MACs     {read} of reads, {added} of accumulation");
     for (value, unit) in [(rate, "TOPS"), (efficiency, "TOPS/W")] {
         if let Some(value) = value {
             line += &format!(", {:.4} {unit}", value / 1e12);
         }
     }
-    say(&line);
+    say(&format!("{line} ({})", Convention::PAIRS.words()));
     show_missing(&bill);
 }

@@ -9,6 +9,7 @@ use serde_json::json;
 
 use super::progress::Meter;
 use super::{Done, Failure, Shared, configuration, environment, say, usage};
+use crate::lab::price::{EnergySplit, PerImage};
 use crate::lab::run::{self, Machine, RunError, RunEvent, Trained, Verdict};
 use crate::lab::store::index::{INDEX, Store};
 use crate::lab::store::record::{TestOutcome, TestRecord};
@@ -168,6 +169,9 @@ fn done(run: &str, outcome: &Trained) -> serde_json::Value {
     let last = outcome.records.last();
     let images: u64 =
         outcome.records.iter().filter_map(|r| r.train()).map(|score| score.total).sum();
+    let cost = &outcome.cost;
+    let each: Vec<_> = cost.per_image.iter().map(PerImage::to_json).collect();
+    let split: Vec<_> = cost.split.iter().map(EnergySplit::to_json).collect();
     json!({
         "event": "done",
         "run": run,
@@ -176,10 +180,15 @@ fn done(run: &str, outcome: &Trained) -> serde_json::Value {
         "validation_accuracy": last.and_then(|r| r.validation()).map(|score| score.fraction()),
         "state_hash": last.map(|record| record.state_hash.clone()),
         "epochs": last.map(|record| record.epoch),
-        "cycles": outcome.cost.cycles,
-        "simulated_seconds": outcome.cost.seconds,
-        "joules": outcome.cost.joules,
-        "joules_assumed_share": outcome.cost.joules.map(|_| outcome.cost.assumed_share),
+        "cycles": cost.cycles,
+        "simulated_seconds": cost.seconds,
+        "joules": cost.energy.and_then(|energy| energy.whole()),
+        "joules_at_least": cost.energy.and_then(|energy| energy.at_least()),
+        "parts_priced": cost.energy.map(|energy| energy.priced),
+        "parts": cost.energy.map(|energy| energy.parts),
+        "by_class": split,
+        "per_image": each,
+        "joules_assumed_share": cost.energy.map(|_| cost.assumed_share),
         "train_seconds": seconds,
         "images_per_second": images as f64 / seconds.max(1e-9),
     })

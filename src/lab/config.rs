@@ -4,6 +4,8 @@
 //! own, so an unknown key is reported with its line and a caret; then they are laid over one another and checked.
 //! The result is a [`Config`], which can be written back as one self-contained file.
 
+mod absent;
+mod changed;
 mod check;
 mod chip;
 mod data;
@@ -16,12 +18,15 @@ mod layers;
 mod quantity;
 pub mod sweep;
 
+pub use absent::{Absent, EFFECTS, Effect, absent_words};
 pub use check::{Config, DataConfig, Select, TrainOn};
 pub use file::{ExperimentFile, HardwareFile};
 pub use hardware::{Model, builtin_models, load_model, model_names};
-pub use law::{Law, Setting, SettingValue, Standing};
+pub use law::{Law, Setting, SettingValue};
 pub use layers::{Overlay, Sources, load, overlay, setting, setting_table};
-pub use quantity::{Constant, Constants, CostTable, Kind, Per, QUANTITIES, Quantity};
+pub use quantity::{
+    Constant, Constants, CostClass, CostTable, Kind, Per, QUANTITIES, Quantity, Standing,
+};
 
 /// Why a configuration cannot be used. Each message says where, what was found, what is allowed.
 ///

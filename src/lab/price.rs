@@ -15,8 +15,9 @@
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! let sources = config::Sources { hardware: Some("hermes"), ..Default::default() };
 //! let chip = config::load(&sources)?;
-//! // 64 tiles, one phase, two cells a weight
-//! let peak = price::peak(chip.hardware(), 64, 1, 2).expect("the model has a timing");
+//! // 64 tiles, one phase
+//! let convention = price::Convention::PAIRS;
+//! let peak = price::peak(chip.hardware(), 64, 1, convention).expect("the model has a timing");
 //! assert_eq!(peak.alone.0.cycles, 133);
 //! assert_eq!(price::prefixed(peak.alone.1, "op/s"), "63.1 Top/s");
 //! # Ok(())
@@ -25,16 +26,22 @@
 
 mod bill;
 mod changes;
+mod convention;
 mod cost;
+mod image;
 mod peak;
 mod plan;
 mod stage;
+mod total;
 mod unit;
 
-pub use bill::{Bill, Group, Idle, Line, Missing, Range, Share, price};
+pub use bill::{Bill, Group, Idle, Line, Missing, Share, price};
 pub use changes::{Change, changes};
+pub use convention::Convention;
 pub use cost::Cost;
+pub use image::{Images, PerImage};
 pub use peak::{Figure, Peak, areas, figures, peak};
 pub use plan::{Footprint, LayerFootprint};
 pub use stage::{StageUse, stages};
+pub use total::{EnergySplit, EnergyTotal, Range};
 pub use unit::{bounds, prefixed};

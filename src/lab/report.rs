@@ -22,6 +22,7 @@ pub mod text;
 #[cfg(test)]
 mod sample;
 
+use super::config::Absent;
 use super::price::Cost;
 use super::store::ledger::LedgerRecord;
 use super::store::record::{EpochRecord, Receipt, TimingRecord};
@@ -77,6 +78,8 @@ pub struct RunView<'a> {
     pub timing: &'a TimingRecord,
     /// What the user should know.
     pub warnings: &'a [String],
+    /// What real chips do and the run did not.
+    pub absent: &'a [Absent],
     /// One record an epoch, in order; epoch 0 is the state before the first update.
     pub epochs: &'a [EpochRecord],
     /// Highest level a cell can hold.

@@ -4,7 +4,7 @@
 
 use dalean::chip::ledger::Event;
 use dalean::lab::config::{Config, Sources, load};
-use dalean::lab::price::{Peak, peak};
+use dalean::lab::price::{Convention, Peak, peak};
 
 fn chip(model: &str, settings: &[String]) -> Config {
     load(&Sources { hardware: Some(model), settings, ..Sources::default() }).unwrap()
@@ -13,7 +13,7 @@ fn chip(model: &str, settings: &[String]) -> Config {
 fn peak_of(config: &Config) -> Peak {
     let hardware = config.hardware();
     let tiles = hardware.tile.count_max.unwrap() as u64;
-    peak(hardware, tiles, u64::from(hardware.slices()), 2).unwrap()
+    peak(hardware, tiles, u64::from(hardware.slices()), Convention::PAIRS).unwrap()
 }
 
 /// How far `found` lies from `published`.
@@ -111,6 +111,6 @@ fn hermes_takes_the_power_it_was_fitted_to() {
 #[test]
 fn isaac_reads_as_fast_as_designed() {
     let config = chip("isaac", &[]);
-    let peak = peak(config.hardware(), 16_128 / 2, 16, 8).unwrap();
+    let peak = peak(config.hardware(), 16_128 / 2, 16, Convention::with_cells(8)).unwrap();
     within("ISAAC-CE TOPS (assumed)", peak.back_to_back.1 / 1e12, 40.9, 0.02);
 }

@@ -176,14 +176,8 @@ mod tests {
     fn unequal_phases_add_up() {
         let phases = [SliceTime { settle: 15, convert: 11 }, SliceTime { settle: 7, convert: 7 }];
         let slices = Some(SliceTimes::new(&phases).unwrap());
-        let apart = Timing {
-            settle: 15,
-            convert: 11,
-            share: 1,
-            overlapped: false,
-            slices,
-            ..TIMING
-        };
+        let apart =
+            Timing { settle: 15, convert: 11, share: 1, overlapped: false, slices, ..TIMING };
         let time = ReadTime::of(apart, 2);
         assert_eq!((time.arrays, time.converters), (22, 18));
         assert_eq!((time.read(1, 4, 0), time.again(1, 4)), (15 + 11 + 7 + 7 + 1, 40));

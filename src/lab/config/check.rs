@@ -4,10 +4,12 @@
 use std::collections::BTreeMap;
 use std::fmt::Display;
 
+use super::changed::{self, UnderModel};
 use super::file::{DataFile, ExperimentFile, HardwareFile, LearningFile, NetworkFile, PerLayer};
-use super::quantity::Constants;
+use super::law::{kind_of, settings};
+use super::quantity::{Constants, constants_of};
 use super::{ConfigError, Sources, chip, data};
-use crate::chip::hardware::Hardware;
+use crate::chip::hardware::{ConverterKind, Hardware};
 use crate::learn::error::Centre;
 use crate::learn::route::Route;
 use crate::learn::rule::{Rule, UpdateMode};
@@ -162,12 +164,13 @@ pub(super) fn positive(key: &str, value: f64) -> Result<Positive, ConfigError> {
 }
 
 /// Checks a whole configuration.
-pub(super) fn config(mut file: ExperimentFile) -> Result<Config, ConfigError> {
+pub(super) fn config(mut file: ExperimentFile, model: &UnderModel) -> Result<Config, ConfigError> {
     word("task", &mut file.task, "classify", &[("classify", ())])?;
     let seed = *file.seed.get_or_insert(1);
     let hw = file.hw.get_or_insert_with(HardwareFile::default);
     let hardware = chip::resolve(hw, "hw.")?;
-    let constants = Constants::new(hw, "hw.")?;
+    changed::settle(hw, model, &settings(&hardware, kind_of(hw)));
+    let constants = constants_of(hw, &hardware, "hw.")?;
     let hardware_name = hw.name.get_or_insert_with(|| "unnamed".into()).clone();
     let not_simulated = hw.not_simulated.clone().unwrap_or_default();
     let data = data::resolve(file.data.get_or_insert_with(DataFile::default))?;
@@ -266,6 +269,12 @@ impl Config {
     #[must_use]
     pub const fn constants(&self) -> &Constants {
         &self.constants
+    }
+
+    /// What kind of converters the chip has.
+    #[must_use]
+    pub(crate) fn converter_kind(&self) -> ConverterKind {
+        self.resolved.hw.as_ref().map_or(ConverterKind::Fixed, kind_of)
     }
 
     /// The configuration as one self-contained file, every default written out.

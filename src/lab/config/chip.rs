@@ -224,7 +224,9 @@ fn converter_time(
     // absent is fixed, and is not written back: a chip that does not ask is described as it was
     let kind = match &table.converter {
         None => ConverterKind::Fixed,
-        Some(_) => word(&key("adc.converter"), &mut table.converter, "fixed", ConverterKind::NAMES)?,
+        Some(_) => {
+            word(&key("adc.converter"), &mut table.converter, "fixed", ConverterKind::NAMES)?
+        }
     };
     let phases = match mode {
         DriveMode::PulseWidth { phase_cycles } => phase_cycles.len(),
@@ -384,7 +386,9 @@ fn timing(
     let times = slices.times(settle, convert);
     let SliceTime { settle, convert } = times[0];
     if convert > CYCLES_MAX {
-        let allowed = format!("a conversion takes at most {CYCLES_MAX} cycles: give fewer, or fewer adc.bits");
+        let allowed = format!(
+            "a conversion takes at most {CYCLES_MAX} cycles: give fewer, or fewer adc.bits"
+        );
         return Err(wrong(&step_key, format!("makes conversions of {convert} cycles"), allowed));
     }
     let unequal = times.iter().any(|time| *time != times[0]);
@@ -459,7 +463,8 @@ mod tests {
     #[test]
     fn a_conversion_takes_the_steps_of_its_kind() {
         let convert = |adc: &str| {
-            let (hardware, file) = chip(&format!("adc = {{ {adc} }}\ntiming.clock_mhz = 1")).unwrap();
+            let (hardware, file) =
+                chip(&format!("adc = {{ {adc} }}\ntiming.clock_mhz = 1")).unwrap();
             assert_eq!(chip(&toml::to_string(&file).unwrap()).unwrap().0, hardware, "{adc}");
             hardware.timing.unwrap().convert
         };
@@ -552,7 +557,10 @@ mod tests {
             ("adc = { bits = 8, kind = \"sar\" }", "adc.converter = \"sar\""),
             ("adc = { bits = 8, step_cycles = 2 }", "`hw.adc.step_cycles` is 2; a fixed converter"),
             ("adc = { bits = 8, converter = \"sar\", step_cycles = 0 }", "adc.step_cycles"),
-            ("adc = { bits = 8, converter = \"sar\", phase_bits = \"all\" }", "several drive.phases"),
+            (
+                "adc = { bits = 8, converter = \"sar\", phase_bits = \"all\" }",
+                "several drive.phases",
+            ),
             (
                 "adc = { bits = 8, converter = \"sar\" }\ntiming = { clock_mhz = 1, convert_cycles = 9 }",
                 "`hw.timing.convert_cycles` is 9; a sar converter of 8 bits takes 9 steps",

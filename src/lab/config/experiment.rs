@@ -99,11 +99,6 @@ impl Config {
     /// What may go wrong with these numbers, before anything runs.
     #[must_use]
     pub fn warnings(&self) -> Vec<String> {
-        let mut warnings = Vec::new();
-        warnings.extend(self.constants.complaints());
-        for (what, how) in &self.not_simulated {
-            warnings.push(format!("not simulated: {what} ({how})"));
-        }
-        warnings
+        self.constants.complaints()
     }
 }

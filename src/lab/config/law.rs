@@ -19,6 +19,7 @@ use std::fmt;
 use serde::{Deserialize, Serialize};
 
 use super::file::{AdcFile, HardwareFile};
+use super::quantity::Standing;
 use crate::chip::hardware::{Adc, ConverterKind, Hardware, ReadTime};
 
 /// Something of a chip that a physical number belongs to.
@@ -218,7 +219,10 @@ impl Law {
 
 /// `scales = "walden"`, the law of a quantity's first setting, or a table with a law a setting.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(untagged, expecting = "a law (constant, linear, walden, schreier, comparators, steps), or a table of laws by setting")]
+#[serde(
+    untagged,
+    expecting = "a law (constant, linear, walden, schreier, comparators, steps), or a table of laws by setting"
+)]
 pub enum ScalesFile {
     /// Of the first setting.
     First(Law),
@@ -227,11 +231,11 @@ pub enum ScalesFile {
 }
 
 /// Values of settings.
-pub type Settings = BTreeMap<Setting, SettingValue>;
+pub(super) type Settings = BTreeMap<Setting, SettingValue>;
 
 /// Settings of a chip.
 #[must_use]
-pub fn settings(chip: &Hardware, kind: ConverterKind) -> Settings {
+pub(super) fn settings(chip: &Hardware, kind: ConverterKind) -> Settings {
     Setting::EACH.iter().map(|&setting| (setting, setting.of(chip, kind))).collect()
 }
 
@@ -243,17 +247,6 @@ pub(super) fn kind_of(file: &HardwareFile) -> ConverterKind {
     };
     let of = |word| ConverterKind::NAMES.iter().find(|(name, _)| *name == word);
     word.and_then(of).map_or(ConverterKind::Fixed, |(_, kind)| *kind)
-}
-
-/// How a number is the chip's.
-#[derive(Debug, Clone, PartialEq)]
-pub enum Standing {
-    /// As it was given.
-    Given,
-    /// By the laws of its model, which are named: `walden, adc_bits 6 to 8: x 4`.
-    Scaled(String),
-    /// Not at all, and why: the model states no law.
-    Other(String),
 }
 
 /// Everything that decides whether a number is a chip's.
@@ -286,17 +279,20 @@ impl Place<'_> {
             let name = setting.name();
             let Some(law) = scales.get(setting) else {
                 let why = format!("is for {name} {from}, and no law says what it is at {to}");
-                return (1.0, Standing::Other(why));
+                return (1.0, Standing::NotHere(why));
             };
             let Some(times) = law.factor(from, to, self.kind) else {
-                let why = format!("is for {name} {from}, and its law {} says nothing of {to}", law.name());
-                return (1.0, Standing::Other(why));
+                let why = format!(
+                    "is for {name} {from}, and its law {} says nothing of {to}",
+                    law.name()
+                );
+                return (1.0, Standing::NotHere(why));
             };
             factor *= times;
             said.push(format!("{}, {name} {from} to {to}: x {}", law.name(), rounded(times)));
         }
         if said.is_empty() {
-            return (1.0, Standing::Given);
+            return (1.0, Standing::Stated);
         }
         (factor, Standing::Scaled(said.join("; ")))
     }
@@ -304,7 +300,13 @@ impl Place<'_> {
 
 /// Four digits are enough to read.
 fn rounded(number: f64) -> String {
-    let digits = if number >= 100.0 { 0 } else if number >= 1.0 { 3 } else { 6 };
+    let digits = if number >= 100.0 {
+        0
+    } else if number >= 1.0 {
+        3
+    } else {
+        6
+    };
     let text = format!("{number:.digits$}");
     if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').into() } else { text }
 }
@@ -345,7 +347,7 @@ mod tests {
         let none = Settings::new();
         let bits = [(Setting::AdcBits, Law::Walden)].into();
         let both = [(Setting::AdcBits, Law::Walden), (Setting::Rows, Law::Linear)].into();
-        assert_eq!(place.standing(&[], &none, &bits), (1.0, Standing::Given));
+        assert_eq!(place.standing(&[], &none, &bits), (1.0, Standing::Stated));
         let (factor, standing) = place.standing(&[Setting::AdcBits], &none, &bits);
         let said = "walden, adc_bits 6 to 8: x 4".to_owned();
         assert_eq!((factor, standing), (4.0, Standing::Scaled(said)));
@@ -353,10 +355,10 @@ mod tests {
         assert_eq!(place.standing(&belongs, &none, &both).0, 2.0);
         let (_, standing) = place.standing(&belongs, &none, &bits);
         let why = "is for rows 128, and no law says what it is at 64".to_owned();
-        assert_eq!(standing, Standing::Other(why));
+        assert_eq!(standing, Standing::NotHere(why));
         // a number may say itself what it stands for
         let at = [(Setting::AdcBits, whole(8))].into();
-        assert_eq!(place.standing(&[Setting::AdcBits], &at, &bits), (1.0, Standing::Given));
+        assert_eq!(place.standing(&[Setting::AdcBits], &at, &bits), (1.0, Standing::Stated));
     }
 
     #[test]

@@ -1,5 +1,6 @@
 //! Laying texts over one another: built-in defaults, hardware model, experiment file, a sweep's keys, `--set`, `--hw`.
 
+use super::changed::{self, UnderModel};
 use super::file::{ExperimentFile, HardwareFile};
 use super::{Config, ConfigError, check, hardware};
 
@@ -51,16 +52,26 @@ pub fn load(sources: &Sources<'_>) -> Result<Config, ConfigError> {
     let mut table = toml::Table::new();
     if let Some((name, text)) = sources.experiment {
         let _: ExperimentFile = parse(name, text)?;
-        overlay(&mut table, parse(name, text)?);
+        let mut own = parse(name, text)?;
+        changed::mark(&mut own, name, false);
+        overlay(&mut table, own);
     }
     for Overlay { place, table: over } in sources.overlays {
-        let _: ExperimentFile = table_of(place, over)?;
-        overlay(&mut table, (*over).clone());
+        let mut own = (*over).clone();
+        changed::spread(&mut own);
+        let _: ExperimentFile = table_of(place, &own)?;
+        // a file may cite; what is set on the way in is assumed
+        changed::mark(&mut own, place, *place == "--set");
+        overlay(&mut table, own);
     }
     for setting in sources.settings {
         match taken_back(setting)? {
             Some(keys) => remove(&mut table, &keys),
-            None => overlay(&mut table, setting_table(setting)?),
+            None => {
+                let mut own = setting_table(setting)?;
+                changed::mark(&mut own, "--set", true);
+                overlay(&mut table, own);
+            }
         }
     }
     if let Some(model) = sources.hardware {
@@ -81,17 +92,16 @@ pub fn load(sources: &Sources<'_>) -> Result<Config, ConfigError> {
     };
     let name = own.get("model").and_then(toml::Value::as_str).unwrap_or("ideal").to_owned();
     // a resolved configuration holds its model's numbers itself
-    let mut hw = if own.contains_key("name") {
-        toml::Table::new()
+    let (mut hw, model) = if own.contains_key("name") {
+        (own, UnderModel::default())
     } else {
         let text = hardware::model_text(&name)?;
-        let _: HardwareFile = hardware::model_file(&name, &text)?;
-        parse(&name, &text)?
+        let file: HardwareFile = hardware::model_file(&name, &text)?;
+        changed::lay(parse(&name, &text)?, &file, own)?
     };
-    overlay(&mut hw, own);
     hw.remove("model");
     table.insert("hw".into(), toml::Value::Table(hw));
-    check::config(table_of("configuration", &table)?)
+    check::config(table_of("configuration", &table)?, &model)
 }
 
 /// A table as what its keys mean.
@@ -137,8 +147,13 @@ pub fn setting_table(setting: &str) -> Result<toml::Table, ConfigError> {
     let quoted = format!("{} = {:?}", key.trim(), value.trim());
     let text = if toml::from_str::<toml::Table>(&bare).is_ok() { bare } else { quoted };
     let place = format!("--set {setting}");
-    let _: ExperimentFile = parse(&place, &text)?;
-    parse(&place, &text)
+    let mut table = parse(&place, &text)?;
+    if changed::spread(&mut table) {
+        let _: ExperimentFile = table_of(&place, &table)?;
+    } else {
+        let _: ExperimentFile = parse(&place, &text)?;
+    }
+    Ok(table)
 }
 
 /// The keys that `key=default` takes back, as a table; `None` for any other setting.

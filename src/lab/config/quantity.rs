@@ -15,12 +15,14 @@ use std::collections::BTreeMap;
 use serde::de::{self, Deserializer};
 use serde::{Deserialize, Serialize};
 
+mod class;
+
+pub use class::CostClass;
+
 use super::ConfigError;
 use super::check::wrong;
 use super::file::{HardwareFile, NumberFile};
-use super::law::{
-    Law, Place, ScalesFile, Setting, Settings, Standing, kind_of, settings,
-};
+use super::law::{Law, Place, ScalesFile, Setting, Settings, kind_of, settings};
 use crate::chip::hardware::Hardware;
 use crate::chip::ledger::Event;
 
@@ -242,6 +244,17 @@ pub enum Kind {
     Assumed,
 }
 
+/// How a number came to the setting that it prices.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Standing {
+    /// The model gives it for this setting.
+    Stated,
+    /// The model gives it for another setting, and a law of the model brought it here: what law, from where to where.
+    Scaled(String),
+    /// The model gives it for another setting and says no law: what has changed. It prices nothing.
+    NotHere(String),
+}
+
 /// A physical number of a model.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Constant {
@@ -257,28 +270,19 @@ pub struct Constant {
     pub kind: Kind,
     /// The node it is of, in nanometres, where it says one.
     pub node_nm: Option<f64>,
-    /// Whether it is the chip's, and how.
+    /// Whether it is a number of this setting.
     pub standing: Standing,
     /// As it was given.
     given: [f64; 3],
 }
 
 impl Constant {
-    /// Its value, if it is the chip's.
+    /// Why it prices nothing here, if it does not.
     #[must_use]
-    pub const fn known(&self) -> Option<[f64; 3]> {
-        match self.standing {
-            Standing::Given | Standing::Scaled(_) => Some(self.value),
-            Standing::Other(_) => None,
-        }
-    }
-
-    /// Why it is not the chip's.
-    #[must_use]
-    pub fn unknown(&self) -> Option<String> {
+    pub fn not_here(&self) -> Option<&str> {
         match &self.standing {
-            Standing::Other(why) => Some(format!("{} {why}", self.key)),
-            Standing::Given | Standing::Scaled(_) => None,
+            Standing::NotHere(why) => Some(why),
+            Standing::Stated | Standing::Scaled(_) => None,
         }
     }
 }
@@ -333,6 +337,12 @@ impl Constants {
             let at = number.at.as_ref().unwrap_or(&none);
             let scales = scales(quantity, number.scales.as_ref(), at, &key)?;
             let (factor, standing) = place.standing(quantity.belongs, at, &scales);
+            let standing = match standing {
+                Standing::NotHere(why) => {
+                    Standing::NotHere(format!("{}.{name} {why}", table.name()))
+                }
+                here => here,
+            };
             let given = [low, typical, high].map(|number| number * unit);
             let scaled = matches!(standing, Standing::Scaled(_));
             all.push(Constant {
@@ -400,6 +410,27 @@ impl Constants {
     }
 }
 
+/// Says of the numbers with these keys (`energy.hold_fj`) that they are for these settings, as far as they belong to them.
+pub(super) fn stand_here(file: &mut HardwareFile, keys: &[String], here: &Settings) {
+    let say = |table: CostTable, key: &str, number: &mut NumberFile| {
+        let Some((quantity, _)) = parse(table, key) else { return };
+        if keys.iter().any(|changed| *changed == format!("{}.{key}", table.name())) {
+            let at = number.at.get_or_insert_default();
+            let own = here.iter().filter(|(setting, _)| quantity.belongs.contains(setting));
+            own.for_each(|(&setting, value)| _ = at.entry(setting).or_insert(value.clone()));
+            if at.is_empty() {
+                number.at = None;
+            }
+        }
+    };
+    let energies = file.energy.iter_mut().flatten();
+    energies.for_each(|(key, number)| say(CostTable::Energy, &key.0, number));
+    let powers = file.power.iter_mut().flatten();
+    powers.for_each(|(key, number)| say(CostTable::Power, &key.0, number));
+    let areas = file.area.iter_mut().flatten();
+    areas.for_each(|(key, number)| say(CostTable::Area, &key.0, number));
+}
+
 /// The numbers of a file on its chip.
 ///
 /// # Errors
@@ -436,7 +467,11 @@ fn scales(
             Some(first) => [(*first, *law)].into(),
             None => {
                 let allowed = "its quantity belongs to no setting: remove the key";
-                return Err(wrong(&format!("{key}.scales"), format!("is \"{}\"", law.name()), allowed));
+                return Err(wrong(
+                    &format!("{key}.scales"),
+                    format!("is \"{}\"", law.name()),
+                    allowed,
+                ));
             }
         },
     };
@@ -509,7 +544,8 @@ mod tests {
 
     fn constants(text: &str) -> Result<Constants, String> {
         let file: HardwareFile = toml::from_str(text).map_err(|e| e.to_string())?;
-        let hardware = super::super::chip::resolve(&mut file.clone(), "").map_err(|e| e.to_string())?;
+        let hardware =
+            super::super::chip::resolve(&mut file.clone(), "").map_err(|e| e.to_string())?;
         constants_of(&file, &hardware, "").map_err(|e| e.to_string())
     }
 

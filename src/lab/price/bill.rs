@@ -5,14 +5,18 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 
 use super::changes::Change;
+use super::image::{Images, PerImage};
 use super::plan::Footprint;
+use super::total::{EnergySplit, EnergyTotal, Range};
 use crate::chip::hardware::Hardware;
-use crate::chip::ledger::Event;
-use crate::lab::config::{Constants, CostTable, Kind, Per, QUANTITIES};
+use crate::chip::ledger::{During, Event};
+use crate::lab::config::{
+    Constant, Constants, CostClass, CostTable, Kind, Per, QUANTITIES, Standing,
+};
 use crate::lab::store::ledger::{CountRecord, LedgerRecord};
 
-/// Low, typical, high.
-pub type Range = [f64; 3];
+/// Bits that an addition to a digital sum moves: 32 out, 32 in.
+const SUM_BITS: u64 = 64;
 
 /// Events of one place and what they cost.
 #[derive(Debug, Clone, PartialEq)]
@@ -21,6 +25,8 @@ pub struct Line<'a> {
     pub count: &'a CountRecord,
     /// Which quantity priced it: its name stands for the component.
     pub component: &'static str,
+    /// What the component is of.
+    pub class: CostClass,
     /// The key of the constant.
     pub key: String,
     /// How far to trust that constant.
@@ -34,6 +40,8 @@ pub struct Line<'a> {
 pub struct Idle {
     /// Which quantity: its name stands for the component.
     pub component: &'static str,
+    /// What the component is of.
+    pub class: CostClass,
     /// The key of the constant.
     pub key: String,
     /// How far to trust that constant.
@@ -49,12 +57,18 @@ pub struct Idle {
 /// What could not be priced.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Missing {
-    /// An event, or `static power`.
+    /// An event, a part that idles, or `time`.
     pub what: String,
     /// How often it happened, where it was counted.
     pub count: Option<u64>,
     /// Why it has no price.
     pub why: String,
+    /// What the energy is of that is missing; `None`: no energy is.
+    #[serde(skip)]
+    pub class: Option<CostClass>,
+    /// Phases it is missing in.
+    #[serde(skip)]
+    pub phases: Vec<String>,
 }
 
 /// Joules of what belongs together.
@@ -88,6 +102,8 @@ pub struct Bill<'a> {
     pub seconds: Option<BTreeMap<String, f64>>,
     /// What has no price.
     pub missing: Vec<Missing>,
+    /// Constants that a law of the model brought to this setting: key, and which law from where.
+    pub scaled: Vec<(String, String)>,
 }
 
 /// Prices a ledger. `changes` are the differences between the chip that made it and the one whose constants are
@@ -100,8 +116,7 @@ pub fn price<'a>(
     constants: &Constants,
     changes: &[Change],
 ) -> Bill<'a> {
-    let mut missing = Vec::new();
-    let mut lines = Vec::new();
+    let (mut lines, mut missing) = (Vec::new(), Vec::new());
     for event in Event::ALL {
         let priced = QUANTITIES.iter().find(|q| q.per == Per::Event(event));
         let (Some(quantity), count) = (priced, ledger.total(event)) else { continue };
@@ -110,67 +125,134 @@ pub fn price<'a>(
         }
         let touched: Vec<_> =
             changes.iter().filter(|c| c.events.contains(&event)).map(|c| c.key).collect();
-        let lacks = |why: String| Missing { what: event.name().into(), count: Some(count), why };
-        if !touched.is_empty() {
-            missing.push(lacks(format!("the two chips differ in {}", touched.join(", "))));
-            continue;
-        }
-        let Some(constant) = constants.of(event) else {
-            missing.push(lacks(format!("the model has no energy.{}", quantity.name)));
-            continue;
+        let why = match constants.of(event) {
+            _ if !touched.is_empty() => format!("the two chips differ in {}", touched.join(", ")),
+            None => format!("the model has no energy.{}", quantity.name),
+            Some(constant) => match constant.not_here() {
+                Some(why) => why.to_owned(),
+                None => {
+                    let of_event = ledger.counts.iter().filter(|line| line.event == event.name());
+                    lines.extend(of_event.map(|count| line(constant, count)));
+                    continue;
+                }
+            },
         };
-        let of_event = ledger.counts.iter().filter(|line| line.event == event.name());
-        lines.extend(of_event.map(|count| Line {
-            count,
-            component: quantity.name,
-            key: constant.key.clone(),
-            kind: constant.kind,
-            joules: constant.value.map(|joules| joules * count.count as f64),
-        }));
+        missing.push(Missing {
+            what: event.name().into(),
+            count: Some(count),
+            why,
+            class: Some(quantity.class()),
+            phases: phases_of(ledger, event),
+        });
     }
+    let seconds = seconds(ledger, hardware, changes).unwrap_or_else(|no_time| {
+        missing.extend(no_time);
+        None
+    });
+    let mut idle = Vec::new();
+    for constant in constants.iter().filter(|c| c.quantity.table == CostTable::Power) {
+        let why = match (&seconds, constant.not_here()) {
+            (_, Some(why)) => why.to_owned(),
+            (None, None) => "watts flow for seconds, and no time is known".into(),
+            (Some(seconds), None) => {
+                idle.push(idling(constant, plan.parts(constant.quantity.per, hardware), seconds));
+                continue;
+            }
+        };
+        missing.push(Missing {
+            what: constant.quantity.name.into(),
+            count: None,
+            why,
+            class: Some(constant.quantity.class()),
+            phases: phases(ledger),
+        });
+    }
+    let used = |key: &String| {
+        lines.iter().any(|line| line.key == *key) || idle.iter().any(|idle| idle.key == *key)
+    };
+    let scaled = constants.iter().filter_map(|constant| match &constant.standing {
+        Standing::Scaled(law) => Some((constant.key.clone(), law.clone())),
+        Standing::Stated | Standing::NotHere(_) => None,
+    });
+    let scaled = scaled.filter(|(key, _)| used(key)).collect();
+    Bill { lines, idle, seconds, missing, scaled }
+}
+
+fn line<'a>(constant: &Constant, count: &'a CountRecord) -> Line<'a> {
+    Line {
+        count,
+        component: constant.quantity.name,
+        class: constant.quantity.class(),
+        key: constant.key.clone(),
+        kind: constant.kind,
+        joules: constant.value.map(|joules| joules * count.count as f64),
+    }
+}
+
+fn idling(constant: &Constant, parts: u64, seconds: &BTreeMap<String, f64>) -> Idle {
+    let watts = constant.value.map(|watts| watts * parts as f64);
+    let joules = seconds.iter().map(|(phase, s)| (phase.clone(), watts.map(|w| w * s)));
+    Idle {
+        component: constant.quantity.name,
+        class: constant.quantity.class(),
+        key: constant.key.clone(),
+        kind: constant.kind,
+        parts,
+        watts,
+        joules: joules.collect(),
+    }
+}
+
+/// Seconds by phase, or what is missing because there are none.
+fn seconds(
+    ledger: &LedgerRecord,
+    hardware: &Hardware,
+    changes: &[Change],
+) -> Result<Option<BTreeMap<String, f64>>, Vec<Missing>> {
+    let lacks = |what: &str, why: &str, class, phases| {
+        let (what, why) = (what.into(), why.into());
+        Missing { what, count: None, why, class, phases }
+    };
     let slower: Vec<_> = changes.iter().filter(|c| c.time).map(|c| c.key).collect();
-    let seconds = match (&ledger.cycles, hardware.timing) {
+    match (&ledger.cycles, hardware.timing) {
         (Some(phases), Some(timing)) if slower.is_empty() => {
             let hertz = timing.clock_khz as f64 * 1000.0;
             let seconds = phases.iter().map(|(name, c)| (name.clone(), c.elapsed as f64 / hertz));
-            Some(seconds.collect::<BTreeMap<_, _>>())
+            Ok(Some(seconds.collect()))
         }
         (Some(_), Some(_)) => {
             let why = format!("the two chips differ in {}", slower.join(", "));
-            missing.push(Missing { what: "time".into(), count: None, why });
-            None
+            Err(vec![lacks("time", &why, None, vec![])])
         }
         _ => {
+            let why = "no cycles were counted: a model without [timing]";
+            let mut missing = vec![lacks("time", why, None, vec![])];
             // how often rows are pulsed is known where pulses take time
-            for what in ["time", Event::RowPulses.name()] {
-                let why = "no cycles were counted: a model without [timing]".into();
-                missing.push(Missing { what: what.into(), count: None, why });
+            let pulsed = phases_of(ledger, Event::PulsesAttempted);
+            if !pulsed.is_empty() {
+                let class = Some(CostClass::Device);
+                missing.push(lacks(Event::RowPulses.name(), why, class, pulsed));
             }
-            None
+            Err(missing)
         }
-    };
-    let powers = constants.iter().filter(|c| c.quantity.table == CostTable::Power);
-    let idle: Vec<_> = powers
-        .map(|constant| {
-            let parts = plan.parts(constant.quantity.per, hardware);
-            let watts = constant.value.map(|watts| watts * parts as f64);
-            let phases = seconds.iter().flatten();
-            let joules = phases.map(|(phase, s)| (phase.clone(), watts.map(|w| w * s)));
-            Idle {
-                component: constant.quantity.name,
-                key: constant.key.clone(),
-                kind: constant.kind,
-                parts,
-                watts,
-                joules: joules.collect(),
-            }
-        })
-        .collect();
-    if !idle.is_empty() && seconds.is_none() {
-        let why = "watts flow for seconds, and no time is known".into();
-        missing.push(Missing { what: "static power".into(), count: None, why });
     }
-    Bill { lines, idle, seconds, missing }
+}
+
+/// Phases in which something happened.
+fn phases(ledger: &LedgerRecord) -> Vec<String> {
+    let mut phases: Vec<_> = ledger.counts.iter().map(|line| line.phase.clone()).collect();
+    phases.sort();
+    phases.dedup();
+    phases
+}
+
+/// Phases in which an event happened.
+fn phases_of(ledger: &LedgerRecord, event: Event) -> Vec<String> {
+    let of_event = ledger.counts.iter().filter(|line| line.event == event.name() && line.count > 0);
+    let mut phases: Vec<_> = of_event.map(|line| line.phase.clone()).collect();
+    phases.sort();
+    phases.dedup();
+    phases
 }
 
 fn add(sum: &mut Range, joules: Range) {
@@ -180,13 +262,87 @@ fn add(sum: &mut Range, joules: Range) {
 }
 
 impl Bill<'_> {
-    /// Joules of everything that has a price.
+    /// Joules of everything that has a price, and how much has.
     #[must_use]
-    pub fn total(&self) -> Range {
-        let mut sum = [0.0; 3];
-        self.lines.iter().for_each(|line| add(&mut sum, line.joules));
-        self.idle.iter().flat_map(|i| i.joules.values()).for_each(|&joules| add(&mut sum, joules));
-        sum
+    pub fn total(&self) -> EnergyTotal {
+        self.sum(None, None)
+    }
+
+    /// The same of one phase.
+    #[must_use]
+    pub fn of_phase(&self, phase: &str) -> EnergyTotal {
+        self.sum(None, Some(phase))
+    }
+
+    /// The total, or that of a phase, by class: device, converter, digital, and static where there is such a thing.
+    #[must_use]
+    pub fn split(&self, phase: Option<&str>) -> Vec<EnergySplit> {
+        let classes = CostClass::EACH.iter();
+        let split =
+            classes.map(|&class| EnergySplit { class, total: self.sum(Some(class), phase) });
+        split.filter(|split| split.total.parts > 0).collect()
+    }
+
+    /// What an image takes, phase by phase.
+    #[must_use]
+    pub fn per_image(&self, images: &Images) -> Vec<PerImage> {
+        let of = |(phase, images): (&str, u64)| PerImage {
+            phase: phase.into(),
+            images,
+            total: self.of_phase(phase).each(images),
+            split: self
+                .split(Some(phase))
+                .into_iter()
+                .map(|split| EnergySplit { total: split.total.each(images), ..split })
+                .collect(),
+            seconds: self.seconds.as_ref().and_then(|all| Some(all.get(phase)? / images as f64)),
+        };
+        images.phases().map(of).collect()
+    }
+
+    fn sum(&self, class: Option<CostClass>, phase: Option<&str>) -> EnergyTotal {
+        let of_class = |found: CostClass| class.is_none_or(|class| class == found);
+        let of_phase = |found: &str| phase.is_none_or(|phase| phase == found);
+        let mut joules = [0.0; 3];
+        let mut priced = Vec::new();
+        for line in &self.lines {
+            if of_class(line.class) && of_phase(&line.count.phase) {
+                add(&mut joules, line.joules);
+                priced.push(line.component);
+            }
+        }
+        for idle in self.idle.iter().filter(|idle| of_class(idle.class)) {
+            for (_, &each) in idle.joules.iter().filter(|(phase, _)| of_phase(phase)) {
+                add(&mut joules, each);
+                priced.push(idle.component);
+            }
+        }
+        priced.sort_unstable();
+        priced.dedup();
+        let missing = self.missing.iter().filter(|missing| {
+            let lost = phase.is_none() || missing.phases.iter().any(|found| of_phase(found));
+            lost && missing.class.is_some_and(of_class)
+        });
+        EnergyTotal { joules, priced: priced.len(), parts: priced.len() + missing.count() }
+    }
+
+    /// The part of the typical total that goes into the memory of digital sums, where every product is added to one
+    /// (`mode = "accumulate"`): a sum of 32 bits out and in again, 64 bits a product.
+    #[must_use]
+    pub fn sums_share(&self) -> Option<f64> {
+        let update = |event: Event| {
+            let lines = self.lines.iter().filter(move |line| {
+                line.count.event == event.name() && line.count.operation == During::Update.name()
+            });
+            lines.fold((0, 0.0), |(count, joules): (u64, f64), line| {
+                (count.saturating_add(line.count.count), joules + line.joules[1])
+            })
+        };
+        let (bits, joules) = update(Event::SramBits);
+        let (products, _) = update(Event::Accumulates);
+        let total = self.total().joules[1];
+        let added = products > 0 && bits >= SUM_BITS.saturating_mul(products);
+        (added && total > 0.0).then(|| joules / total)
     }
 
     /// Seconds of all phases.
@@ -254,7 +410,7 @@ impl Bill<'_> {
     /// How much of the typical total leans on each constant, the greatest first.
     #[must_use]
     pub fn shares(&self) -> Vec<Share> {
-        let total = self.total()[1];
+        let total = self.total().joules[1];
         let mut sums: BTreeMap<&str, (f64, Kind)> = BTreeMap::new();
         for line in &self.lines {
             sums.entry(&line.key).or_insert((0.0, line.kind)).0 += line.joules[1];
@@ -283,119 +439,36 @@ impl Bill<'_> {
         (shares.iter().map(|share| share.share).sum::<f64>().min(1.0), shares)
     }
 
-    /// Everything as JSON: joules are `[low, typical, high]`.
+    /// Everything as JSON: joules are `[low, typical, high]`. What is only part of a total is `joules_at_least`.
     #[must_use]
-    pub fn to_json(&self) -> serde_json::Value {
+    pub fn to_json(&self, images: &Images) -> serde_json::Value {
         let (assumed_share, assumed) = self.assumed();
-        serde_json::json!({
-            "joules": self.total(),
+        let split: Vec<_> = self.split(None).iter().map(EnergySplit::to_json).collect();
+        let each: Vec<_> = self.per_image(images).iter().map(PerImage::to_json).collect();
+        let scaled =
+            self.scaled.iter().map(|(key, law)| serde_json::json!({"key": key, "law": law}));
+        let mut all = serde_json::json!({
             "seconds": self.seconds_total(),
             "seconds_by_phase": self.seconds,
+            "by_class": split,
+            "per_image": each,
             "by_component": self.by_component(),
             "by_layer": self.by_layer(),
             "by_pathway": self.by_pathway(),
             "by_operation": self.by_operation(),
             "by_phase": self.by_phase(),
+            "memory_of_sums_share": self.sums_share(),
             "assumed_share": assumed_share,
             "assumed": assumed,
+            "scaled": scaled.collect::<Vec<_>>(),
             "not_priced": self.missing,
-        })
+        });
+        if let Some(object) = all.as_object_mut() {
+            object.extend(self.total().to_json());
+        }
+        all
     }
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::lab::config::{self, Sources};
-    use crate::lab::price::LayerFootprint;
-    use crate::lab::store::ledger::CyclesRecord;
-
-    fn line(phase: &str, layer: usize, event: &str, count: u64) -> CountRecord {
-        CountRecord {
-            phase: phase.into(),
-            layer,
-            pathway: "pp".into(),
-            operation: "update".into(),
-            event: event.into(),
-            count,
-        }
-    }
-
-    fn ledger() -> LedgerRecord {
-        let elapsed = |elapsed| CyclesRecord { elapsed, stages: [].into(), layers: vec![] };
-        LedgerRecord {
-            counts: vec![
-                line("training", 0, "conversions", 1000),
-                line("training", 1, "holds", 500),
-                line("evaluation", 1, "conversions", 3000),
-                line("training", 0, "requested", 77),
-                line("training", 0, "multiplies", 5),
-            ],
-            cycles: Some(
-                [("training".into(), elapsed(2000)), ("evaluation".into(), elapsed(8000))].into(),
-            ),
-        }
-    }
-
-    /// An empty chip with two energies and a static power, at 1 MHz.
-    fn chip() -> config::Config {
-        let text = "
-            [hw]
-            name = \"x\"
-            timing.clock_mhz = 1
-            [hw.energy]
-            conversion_pj = { low = 1, typical = 2, high = 4, source = \"s\", kind = \"assumed\" }
-            hold_fj = { low = 0, typical = 4, high = 4, source = \"s\", kind = \"measured\" }
-            [hw.power]
-            tile_static_nw = { low = 1, typical = 1, high = 1, source = \"s\", kind = \"fitted\" }
-        ";
-        config::load(&Sources { experiment: Some(("x", text)), ..Sources::default() }).unwrap()
-    }
-
-    fn close(found: f64, wanted: f64) -> bool {
-        (found - wanted).abs() <= 1e-9 * wanted.abs()
-    }
-
-    #[test]
-    fn counts_times_constants_and_watts_times_seconds() {
-        let (config, ledger) = (chip(), ledger());
-        let plan =
-            Footprint { layers: vec![LayerFootprint { rows: 300, columns: 256, targets: 1 }] };
-        let bill = price(&ledger, &plan, &config.hardware, &config.constants, &[]);
-        // 4000 conversions, 500 holds, two tiles for 10 ms
-        let wanted = [4e-9 + 2e-11, 8e-9 + 2e-12 + 2e-11, 16e-9 + 2e-12 + 2e-11];
-        for (found, wanted) in bill.total().into_iter().zip(wanted) {
-            assert!(close(found, wanted), "{found} {wanted}");
-        }
-        assert!(close(bill.seconds_total().unwrap(), 0.01));
-        let phases = bill.by_phase();
-        assert_eq!(phases[0].name, "evaluation");
-        assert!(close(phases[0].joules[1], 6e-9 + 1.6e-11));
-        for groups in [bill.by_component(), bill.by_layer(), bill.by_operation(), bill.by_pathway()]
-        {
-            let sum: f64 = groups.iter().map(|group| group.joules[1]).sum();
-            assert!(close(sum, bill.total()[1]), "{groups:?}");
-        }
-        let (share, assumed) = bill.assumed();
-        assert!(close(share, 8e-9 / bill.total()[1]));
-        assert_eq!(assumed[0].key, "energy.conversion_pj");
-        // an action without a price is named; an outcome needs none
-        let missing: Vec<_> = bill.missing.iter().map(|m| (&*m.what, m.count)).collect();
-        assert_eq!(missing, [("multiplies", Some(5))]);
-    }
-
-    #[test]
-    fn what_another_chip_would_do_otherwise_is_not_priced() {
-        let (config, ledger) = (chip(), ledger());
-        let change = Change { key: "tile.rows", events: &[Event::Holds], time: true };
-        let plan = Footprint::default();
-        let bill = price(&ledger, &plan, &config.hardware, &config.constants, &[change]);
-        assert!(close(bill.total()[1], 8e-9) && bill.seconds.is_none());
-        let whys = bill.missing.iter().map(|m| (&*m.what, m.why.contains("tile.rows")));
-        let whys: Vec<_> = whys.collect();
-        assert_eq!(
-            whys,
-            [("holds", true), ("multiplies", false), ("time", true), ("static power", false)]
-        );
-    }
-}
+mod tests;

@@ -1,6 +1,9 @@
 //! What a report shows of a bill: a few totals.
 
-use super::bill::{Bill, Group, Missing, Range, Share};
+use super::bill::{Bill, Group, Missing, Share};
+use super::image::{Images, PerImage};
+use super::total::{EnergySplit, EnergyTotal};
+use crate::chip::engine::Phase;
 use crate::chip::ledger::Event;
 use crate::lab::config::{Constants, CostTable};
 use crate::lab::store::ledger::LedgerRecord;
@@ -12,8 +15,16 @@ pub struct Cost {
     pub cycles: Option<u64>,
     /// Seconds on the chip.
     pub seconds: Option<f64>,
-    /// Joules, when the model has energies.
-    pub joules: Option<Range>,
+    /// Joules, when the model has any constant.
+    pub energy: Option<EnergyTotal>,
+    /// The same by class: device, converter, digital, static.
+    pub split: Vec<EnergySplit>,
+    /// What an image takes, by phase.
+    pub per_image: Vec<PerImage>,
+    /// Part of the typical total that goes into the memory of digital sums ([`Bill::sums_share`]).
+    pub sums_share: Option<f64>,
+    /// Constants that a law brought to this setting: key, law.
+    pub scaled: Vec<(String, String)>,
     /// Joules by component, the greatest first.
     pub components: Vec<Group>,
     /// Joules by phase, the greatest first.
@@ -35,18 +46,33 @@ pub struct Cost {
 }
 
 impl Cost {
+    /// What an image of a phase takes.
+    #[must_use]
+    pub fn of_image(&self, phase: Phase) -> Option<&PerImage> {
+        self.per_image.iter().find(|one| one.phase == phase.name())
+    }
+
     /// Totals of a bill.
     #[must_use]
-    pub fn of(bill: &Bill<'_>, ledger: &LedgerRecord, constants: &Constants) -> Self {
-        let priced = constants.iter().any(|c| c.quantity.table == CostTable::Energy);
+    pub fn of(
+        bill: &Bill<'_>,
+        ledger: &LedgerRecord,
+        constants: &Constants,
+        images: &Images,
+    ) -> Self {
+        let priced = constants.iter().any(|c| c.quantity.table != CostTable::Area);
         let each = Event::ALL.into_iter().filter_map(|event| {
-            let constant = constants.of(event)?;
+            let constant = constants.of(event).filter(|constant| constant.not_here().is_none())?;
             Some((event.name(), constant.quantity.name, constant.value[1]))
         });
         Self {
             cycles: ledger.elapsed(),
             seconds: bill.seconds_total(),
-            joules: priced.then(|| bill.total()),
+            energy: priced.then(|| bill.total()),
+            split: bill.split(None),
+            per_image: if priced { bill.per_image(images) } else { vec![] },
+            sums_share: bill.sums_share(),
+            scaled: bill.scaled.clone(),
             components: bill.by_component(),
             phases: bill.by_phase(),
             operations: bill.by_operation(),

@@ -3,13 +3,15 @@
 //! ```text
 //! alone        1 + read(C, 0) cycles                          one read after the other
 //! back to back 1 + again(C) cycles                            the front end never waits
-//! TOPS         2 x tiles x (2 R C / cells a weight) / time
+//! TOPS         operations of 2 R C tiles products / time
 //! ```
 //!
-//! A tile holds two banks of R x C cells. See docs/MODEL.md, 4.6.
+//! A tile holds two banks of R x C cells, each of which takes part in a product; how products become operations is a
+//! [`Convention`]. See docs/MODEL.md, 4.6.
 
-use super::Range;
+use super::convention::Convention;
 use super::plan::Footprint;
+use super::total::Range;
 use crate::chip::hardware::{Hardware, ReadTime, Timing};
 use crate::lab::config::{Constants, CostTable};
 
@@ -53,6 +55,8 @@ pub fn figures(hardware: &Hardware, words: u64) -> Vec<Figure> {
 pub struct Peak {
     /// Tiles reckoned with.
     pub tiles: u64,
+    /// How operations are counted.
+    pub convention: Convention,
     /// Multiplications with additions of a read of all tiles.
     pub macs: f64,
     /// One read after the other: duration, operations a second.
@@ -61,22 +65,22 @@ pub struct Peak {
     pub back_to_back: (Figure, f64),
 }
 
-/// Peak rate of reading with `tiles` full tiles, in `slices` slices or phases (other than the
-/// chip's own: all as its first), when `cells` cells make a weight.
+/// Peak rate of reading with `tiles` full tiles, in `slices` slices or phases: other than the chip's own, all as its first.
 #[must_use]
-pub fn peak(hardware: &Hardware, tiles: u64, slices: u64, cells: u64) -> Option<Peak> {
+pub fn peak(hardware: &Hardware, tiles: u64, slices: u64, convention: Convention) -> Option<Peak> {
     let timing = hardware.timing?;
     let reads = ReadTime::of(timing, slices);
     let (rows, columns) = (hardware.tile.rows as u64, hardware.tile.columns as u64);
-    let macs = (2 * tiles * rows * columns) as f64 / cells as f64;
+    let products = 2 * tiles * rows * columns;
     let rate = |name, cycles| {
         let figure = Figure { name, cycles, seconds: seconds(&timing, cycles) };
-        let rate = 2.0 * macs / figure.seconds;
+        let rate = convention.operations(products) / figure.seconds;
         (figure, rate)
     };
     Some(Peak {
         tiles,
-        macs,
+        convention,
+        macs: convention.macs(products),
         alone: rate("alone", timing.accept() + reads.read(1, columns, 0)),
         back_to_back: rate("back to back", timing.accept() + reads.again(1, columns)),
     })
@@ -90,6 +94,7 @@ pub fn areas(
     constants: &Constants,
 ) -> Vec<(&'static str, Range)> {
     let given = constants.iter().filter(|c| c.quantity.table == CostTable::Area);
+    let given = given.filter(|c| c.not_here().is_none());
     given
         .map(|c| {
             let parts = plan.parts(c.quantity.per, hardware) as f64;
@@ -116,7 +121,7 @@ mod tests {
         let settings = settings.map(str::to_owned);
         let sources = Sources { settings: &settings, ..Sources::default() };
         let hardware = load(&sources).unwrap().hardware;
-        let peak = peak(&hardware, 3, u64::from(hardware.slices()), 2).unwrap();
+        let peak = peak(&hardware, 3, u64::from(hardware.slices()), Convention::PAIRS).unwrap();
         // 1 + 10 + 10 + 8 + 1 cycles alone, 1 + 20 back to back
         assert_eq!((peak.alone.0.cycles, peak.back_to_back.0.cycles), (30, 21));
         let operations = 2.0 * 3.0 * 65536.0;

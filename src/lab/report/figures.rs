@@ -1,5 +1,6 @@
 //! The figures of the page, in order. To add one: write a small file here, add one line to [`ALL`].
 
+mod absent;
 mod accuracy;
 mod balance;
 mod configuration;
@@ -47,7 +48,7 @@ type Of = Option<&'static str>;
 const CLASSIFY: Of = Some("classify");
 
 /// All figures, in the order of the page, each with the task that it belongs to.
-pub(super) const ALL: [(Of, Draw); 13] = [
+pub(super) const ALL: [(Of, Draw); 14] = [
     (CLASSIFY, accuracy::draw),
     (CLASSIFY, confusion::draw),
     (CLASSIFY, mistakes::draw),
@@ -60,6 +61,7 @@ pub(super) const ALL: [(Of, Draw); 13] = [
     (None, time::draw),
     (None, energy::draw),
     (None, pathways::draw),
+    (None, absent::draw),
     (None, configuration::draw),
 ];
 

@@ -4,6 +4,7 @@ use super::number::{
     count, escape, hash_head, percent, percent_of, place, quotient, ratio, seconds, short,
 };
 use super::{RunView, figures};
+use crate::lab::config::absent_words;
 use crate::lab::price::{Cost, prefixed};
 use crate::lab::store::record::TestOutcome;
 
@@ -165,11 +166,16 @@ fn chip(cost: &Cost, key: &dyn Fn(&str, &str, &str) -> String) -> String {
         let note = format!("{} cycles", short(cycles));
         out += &key("time on the chip", &prefixed(seconds, "s"), &note);
     }
-    if let Some([low, typical, high]) = cost.joules {
-        let [low, high] = [low, high].map(|joules| prefixed(joules, "J"));
+    if let Some(energy) = cost.energy.filter(|energy| energy.priced > 0) {
+        let [low, typical, high] = energy.joules.map(|joules| prefixed(joules, "J"));
         let share = 100.0 * cost.assumed_share;
-        let note = format!("{low} to {high}; {share:.0}\u{202f}% leans on assumed constants");
-        out += &key("energy on the chip", &prefixed(typical, "J"), &note);
+        let (name, parts) = match energy.priced_words() {
+            Some(parts) => ("energy on the chip, at least", format!("{parts}; ")),
+            None => ("energy on the chip", String::new()),
+        };
+        let note =
+            format!("{parts}{low} to {high}; {share:.0}\u{202f}% leans on assumed constants");
+        out += &key(name, &typical, &note);
     }
     out
 }
@@ -187,49 +193,19 @@ fn hash(view: &RunView<'_>) -> String {
     )
 }
 
-/// Warnings, and the effects that the configuration names but the engine does not simulate.
+/// Warnings, and the effects that the engine does not simulate.
 fn notices(view: &RunView<'_>) -> String {
     let mut out = String::new();
     if view.receipt.status != "finished" {
         out +=
             &format!("<li>The run is <b>{}</b>, not finished.</li>", escape(&view.receipt.status));
     }
-    let absent = not_simulated(view.config);
-    // the receipt repeats them, one a line
-    let repeated = |text: &&String| !absent.is_empty() && text.starts_with("not simulated");
-    for warning in view.warnings.iter().filter(|text| !repeated(text)) {
+    for warning in view.warnings {
         out += &format!("<li>{}</li>", escape(warning));
     }
-    if !absent.is_empty() {
-        let names: Vec<_> = absent.iter().map(|(key, _)| escape(&key.replace('_', " "))).collect();
-        let lines = absent.iter().map(|(key, value)| {
-            format!("<li><code>{} = {}</code></li>", escape(key), escape(value))
-        });
-        out += &format!(
-            "<li><details><summary>Not simulated: {}</summary><ul>{}</ul></details></li>",
-            names.join(", "),
-            lines.collect::<String>()
-        );
+    if !view.absent.is_empty() {
+        let words = escape(&absent_words(view.absent));
+        out += &format!("<li><a href=\"#absent\">{words}</a></li>");
     }
     if out.is_empty() { out } else { format!("<ul class=\"notices\">{out}</ul>\n") }
-}
-
-/// Entries of every table named `not_simulated`.
-pub(super) fn not_simulated(config: &str) -> Vec<(String, String)> {
-    fn walk(table: &toml::Table, found: &mut Vec<(String, String)>) {
-        for (key, value) in table {
-            match value.as_table() {
-                Some(inner) if key == "not_simulated" => {
-                    found.extend(inner.iter().map(|(key, value)| (key.clone(), value.to_string())));
-                }
-                Some(inner) => walk(inner, found),
-                None => {}
-            }
-        }
-    }
-    let mut found = Vec::new();
-    if let Ok(table) = config.parse::<toml::Table>() {
-        walk(&table, &mut found);
-    }
-    found
 }

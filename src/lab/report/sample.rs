@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::{Heat, Picture, RunView};
+use crate::lab::config::Absent;
 use crate::lab::price::Cost;
 use crate::lab::store::ledger::LedgerRecord;
 use crate::lab::store::record::{
@@ -23,6 +24,7 @@ pub(super) struct Sample {
     pub cost: Option<Cost>,
     pub timing: TimingRecord,
     pub warnings: Vec<String>,
+    pub absent: Vec<Absent>,
 }
 
 impl Sample {
@@ -33,7 +35,7 @@ impl Sample {
             names.iter().map(move |name| heat(layer, name, rows, columns))
         });
         Self {
-            config: "task = \"classify\"\n[not_simulated]\ndrift = \"<5 %\"\n".into(),
+            config: "task = \"classify\"\n".into(),
             receipt: receipt(&records, classes),
             epochs: records,
             heats: heats.collect(),
@@ -48,6 +50,12 @@ impl Sample {
                 epoch_seconds: vec![0.0, 12.3],
             },
             warnings: vec!["a <warning>".into()],
+            absent: vec![Absent {
+                effect: "drift".into(),
+                real: Some("levels that drift"),
+                instead: Some("a level stays"),
+                chip: Some("<5 %".into()),
+            }],
         }
     }
 
@@ -59,6 +67,7 @@ impl Sample {
             data: "digits".into(),
             timing: &self.timing,
             warnings: &self.warnings,
+            absent: &self.absent,
             epochs: &self.epochs,
             level_max: 15,
             heats: &self.heats,

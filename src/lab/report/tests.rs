@@ -1,9 +1,9 @@
 //! Laws of the page: well formed, nothing that is no number, all text escaped, the records' own values.
 
 use super::sample::Sample;
-use super::{Picture, html, page, text};
-use crate::lab::config::Kind;
-use crate::lab::price::{Cost, Group, Missing, Share};
+use super::{Picture, html, text};
+use crate::lab::config::{CostClass, Kind};
+use crate::lab::price::{Cost, EnergySplit, EnergyTotal, Group, Missing, PerImage, Share};
 use crate::lab::store::ledger::{CyclesRecord, LayerCycles, LedgerRecord};
 use crate::lab::store::record::{ClassifyOutcome, Outcome, TestOutcome};
 
@@ -14,11 +14,34 @@ const PAIR: &[&str] = &["e", "i"];
 /// What a run might cost.
 fn cost() -> Cost {
     let group = |name: &str, joules| Group { name: name.into(), joules };
-    let missing = Missing { what: "holds".into(), count: Some(3), why: "<none>".into() };
+    let missing = Missing {
+        what: "holds".into(),
+        count: Some(3),
+        why: "<none>".into(),
+        class: Some(CostClass::Converter),
+        phases: vec!["training".into()],
+    };
+    let total = |joules, priced, parts| EnergyTotal { joules, priced, parts };
+    let split =
+        |class, joules, priced, parts| EnergySplit { class, total: total(joules, priced, parts) };
+    let split = vec![
+        split(CostClass::Converter, [1e-9, 1.5e-9, 5e-9], 1, 2),
+        split(CostClass::Static, [0.0, 5e-10, 3e-9], 1, 1),
+    ];
     Cost {
         cycles: Some(1_234_567),
         seconds: Some(0.001_234_567),
-        joules: Some([1e-9, 2e-9, 8e-9]),
+        energy: Some(total([1e-9, 2e-9, 8e-9], 2, 3)),
+        per_image: vec![PerImage {
+            phase: "training".into(),
+            images: 1000,
+            total: total([1e-12, 2e-12, 8e-12], 2, 3),
+            split: split.clone(),
+            seconds: Some(1.2e-6),
+        }],
+        split,
+        sums_share: Some(0.3),
+        scaled: vec![],
         components: vec![
             group("conversion", [1e-9, 1.5e-9, 5e-9]),
             group("tile_static", [0.0, 5e-10, 3e-9]),
@@ -81,7 +104,7 @@ fn samples() -> Vec<Sample> {
     let mut priced = dense();
     (priced.cost, priced.ledger) = (Some(cost()), Some(ledger()));
     let mut timed = dense();
-    timed.cost = Some(Cost { joules: None, components: vec![], each: vec![], ..cost() });
+    timed.cost = Some(Cost { energy: None, components: vec![], each: vec![], ..cost() });
     timed.ledger = Some(ledger());
     let mut colour = Sample::new(&[(193, 4, DALE)], 2, 4);
     colour.pictures.remove(0);
@@ -166,7 +189,7 @@ fn the_page_shows_the_numbers_of_the_records() {
         ("saturated conversions in the last epoch", "<td>28</td>"),
         ("class name, escaped", "&lt;one&gt;"),
         ("title, escaped", "digits &amp; &quot;dales&quot;"),
-        ("what is not simulated", "drift = &quot;&lt;5 %&quot;"),
+        ("what is not simulated", "<td>a level stays</td><td>&lt;5 %</td>"),
         ("how to check", "dalean verify"),
     ];
     let page = page.replace('\u{202f}', " ");
@@ -210,13 +233,6 @@ fn summary_is_narrow_aligned_and_dashes_where_nothing_can_be_divided() {
 }
 
 #[test]
-fn effects_that_are_not_simulated_are_found_in_any_table() {
-    let config = "[a]\nx = 1\n[a.not_simulated]\ndrift = 0.5\n";
-    assert_eq!(page::not_simulated(config), [("drift".into(), "0.5".into())]);
-    assert_eq!(page::not_simulated("not toml ["), []);
-}
-
-#[test]
 fn what_a_run_cost_stands_on_page_and_terminal() {
     let mut sample = Sample::new(&[(64, 20, DALE), (20, 10, READOUT)], 3, 10);
     (sample.cost, sample.ledger) = (Some(cost()), Some(ledger()));
@@ -236,12 +252,23 @@ fn what_a_run_cost_stands_on_page_and_terminal() {
         "<td>1.00 nJ</td><td><b>1.50 nJ</b></td><td>5.00 nJ</td><td>75.0 %</td>",
         "energy.&lt;x&gt;_pj",
         "<b>25 %</b> leans on assumed constants",
+        // what has no price makes it a bound
+        "energy on the chip, at least",
+        "at least <b>2.00 nJ</b> (2 of 3 parts priced)",
+        "converter, at least",
+        "<td>1 000</td><td>1.20 us</td><td><b>≥ 2.00 pJ</b></td>",
+        "<b>30 %</b> is memory of the digital sums",
     ] {
         assert!(page.contains(words), "{words}");
     }
     let text = text::summary(&sample.view());
-    let line = "on the chip 1.23 M cycles, 1.23 ms, 2.00 nJ (1.00 nJ to 8.00 nJ), 25 % assumed\n";
-    assert!(text.contains(line) && text.contains("without a price: holds"), "{text}");
+    expect_test::expect![[r#"
+        on the chip 1.23 M cycles, 1.23 ms, at least 2.00 nJ (1.00 nJ to 8.00 nJ), 2 of 3 parts priced
+                    converter at least 75 %, static 25 %, 25 % assumed
+                    to learn from an image at least 2.00 pJ, 1.20 us
+                    without a price: holds
+    "#]]
+    .assert_eq(&text[text.find("on the chip").unwrap()..text.find("state ").unwrap()]);
 }
 
 #[test]
@@ -256,7 +283,7 @@ fn what_a_chip_does_not_say_is_not_on_the_page() {
     assert!(!has(&sample, "time") && has(&sample, "energy"));
     // the reverse
     sample.ledger = Some(ledger());
-    sample.cost = Some(Cost { joules: None, ..cost() });
+    sample.cost = Some(Cost { energy: None, ..cost() });
     assert!(has(&sample, "time") && !has(&sample, "energy"));
 }
 

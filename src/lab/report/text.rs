@@ -4,7 +4,8 @@ use std::fmt::Write as _;
 
 use super::RunView;
 use super::number::{quotient, short_with};
-use crate::lab::price::{Cost, bounds, prefixed};
+use crate::lab::config::absent_words;
+use crate::lab::price::{Cost, PerImage, prefixed};
 use crate::lab::store::record::{EpochRecord, Score};
 use crate::learn::statistics::PathwayRecord;
 
@@ -53,6 +54,9 @@ pub fn summary(view: &RunView<'_>) -> String {
     accuracies(&mut out, view, last);
     if let Some(cost) = view.cost {
         chip(&mut out, cost);
+    }
+    if !view.absent.is_empty() {
+        let _ = writeln!(out, "beside this {}: see the report", absent_words(view.absent));
     }
     let _ = writeln!(out, "state       {}", last.state_hash);
     out
@@ -105,22 +109,50 @@ fn row(
     ]
 }
 
-/// Cycles, seconds and joules of the run on its chip.
+/// Cycles, seconds and joules of the run on its chip, what they are split into, and what an image takes.
 fn chip(out: &mut String, cost: &Cost) {
-    let mut parts = Vec::new();
+    let mut lines = Vec::new();
+    let mut first = Vec::new();
     if let (Some(cycles), Some(seconds)) = (cost.cycles, cost.seconds) {
-        parts.push(format!("{} cycles, {}", short_with(cycles, " "), prefixed(seconds, "s")));
+        first.push(format!("{} cycles, {}", short_with(cycles, " "), prefixed(seconds, "s")));
     }
-    if let Some(joules) = cost.joules {
-        parts.push(bounds(joules, "J"));
-        parts.push(format!("{:.0} % assumed", 100.0 * cost.assumed_share));
+    if let Some(energy) = cost.energy {
+        first.push(energy.words());
     }
-    if !parts.is_empty() {
-        let _ = writeln!(out, "on the chip {}", parts.join(", "));
+    lines.push(first.join(", "));
+    if let Some(energy) = cost.energy.filter(|energy| energy.joules[1] > 0.0) {
+        let share = |joules: f64| format!("{:.0} %", 100.0 * joules / energy.joules[1]);
+        let split = cost.split.iter().map(|split| {
+            let least = if split.total.whole().is_none() { "at least " } else { "" };
+            format!("{} {least}{}", split.class.name(), share(split.total.joules[1]))
+        });
+        let assumed = format!("{:.0} % assumed", 100.0 * cost.assumed_share);
+        lines.push(split.chain([assumed]).collect::<Vec<_>>().join(", "));
     }
+    let images: Vec<_> = cost.per_image.iter().map(image).filter(|one| !one.is_empty()).collect();
+    lines.push(images.join("; "));
     let missing: Vec<_> = cost.missing.iter().map(|missing| &*missing.what).collect();
-    if cost.joules.is_some() && !missing.is_empty() {
-        let _ = writeln!(out, "            without a price: {}", missing.join(", "));
+    if cost.energy.is_some() && !missing.is_empty() {
+        lines.push(format!("without a price: {}", missing.join(", ")));
+    }
+    let heads = std::iter::once("on the chip").chain(std::iter::repeat(""));
+    for (head, text) in heads.zip(lines.iter().filter(|text| !text.is_empty())) {
+        let _ = writeln!(out, "{head:<11} {text}");
+    }
+}
+
+/// `to learn from an image 1.20 uJ, 24.1 us`.
+fn image(one: &PerImage) -> String {
+    let mut parts = Vec::new();
+    if one.total.priced > 0 {
+        let least = if one.total.whole().is_none() { "at least " } else { "" };
+        parts.push(format!("{least}{}", prefixed(one.total.joules[1], "J")));
+    }
+    parts.extend(one.seconds.map(|seconds| prefixed(seconds, "s")));
+    if parts.is_empty() {
+        String::new()
+    } else {
+        format!("to {} {}", one.doing(), parts.join(", "))
     }
 }
 

@@ -7,7 +7,7 @@ use crate::chip::hardware::Hardware;
 use crate::chip::ledger::Event;
 use crate::lab::config::{Config, Constants};
 use crate::lab::data::{self, DataRoot};
-use crate::lab::price::{Bill, Footprint, StageUse, price, stages};
+use crate::lab::price::{Bill, Convention, Footprint, Images, StageUse, price, stages};
 use crate::lab::store::ledger::{CyclesRecord, LedgerRecord};
 
 /// One update or one inference.
@@ -18,11 +18,11 @@ pub struct Act {
     /// Samples it takes in.
     pub samples: u64,
     /// Which ledger it was charged to.
-    pub phase: &'static str,
+    pub phase: Phase,
     /// What happened.
     pub ledger: LedgerRecord,
-    /// Cells that multiplied a whole drive code: those of reads and those of accumulation.
-    pub macs: [u64; 2],
+    /// Products of a cell and a whole drive code: those of reads and those of accumulation.
+    pub products: [u64; 2],
 }
 
 /// What an experiment costs, before it is carried out.
@@ -59,8 +59,8 @@ pub fn profile(config: &Config, root: &DataRoot, machine: Machine) -> Result<Pro
     let inference = LedgerRecord::since(engine, Phase::Evaluation, &before);
     let act = |name, samples, phase: Phase, ledger: LedgerRecord| {
         let slices = u64::from(config.hardware.slices());
-        let macs = [ledger.total(Event::CellReads) / slices, ledger.total(Event::Accumulates)];
-        Act { name, samples, phase: phase.name(), ledger, macs }
+        let products = [ledger.total(Event::CellReads) / slices, ledger.total(Event::Accumulates)];
+        Act { name, samples, phase, ledger, products }
     };
     Ok(Profile {
         acts: [
@@ -86,7 +86,19 @@ impl Act {
     /// Cycles, when the model has a timing.
     #[must_use]
     pub fn cycles(&self) -> Option<&CyclesRecord> {
-        self.ledger.cycles.as_ref()?.get(self.phase)
+        self.ledger.cycles.as_ref()?.get(self.phase.name())
+    }
+
+    /// Its samples, as images.
+    #[must_use]
+    pub fn images(&self) -> Images {
+        Images::of_phase(self.phase, self.samples)
+    }
+
+    /// Operations of it, as a convention counts them.
+    #[must_use]
+    pub fn operations(&self, convention: Convention) -> f64 {
+        convention.operations(self.products.iter().sum())
     }
 
     /// Stages that took time, and what each waited for.

@@ -13,7 +13,7 @@ use super::session::chosen;
 use super::train::read_config;
 use crate::lab::config::Config;
 use crate::lab::data::{self, DataRoot, ImageShape};
-use crate::lab::price::{Cost, Footprint, price};
+use crate::lab::price::{Cost, Footprint, Images, price};
 use crate::lab::report::{self, Heat, Picture, RunView};
 use crate::lab::store::checkpoint::{self, CheckpointError, Identity};
 use crate::lab::store::folder::{self, FolderError, RunFolder, names};
@@ -95,7 +95,7 @@ pub fn report(path: &Path, data_root: Option<&DataRoot>) -> Result<ReportMade, R
 pub(super) fn cost(config: &Config, ledger: &LedgerRecord, records: &[EpochRecord]) -> Cost {
     let plan = Footprint::of_records(records.last().map_or(&[], |record| &record.pathways));
     let bill = price(ledger, &plan, &config.hardware, &config.constants, &[]);
-    Cost::of(&bill, ledger, &config.constants)
+    Cost::of(&bill, ledger, &config.constants, &Images::of_records(records))
 }
 
 /// The file of the state that reads the test set; `None` when it was not kept.
@@ -149,6 +149,7 @@ impl Parts<'_> {
         let pictures = self.pictures();
         let notes = self.receipt.notes.iter().map(ToString::to_string);
         let warnings: Vec<_> = self.config.warnings().into_iter().chain(notes).collect();
+        let absent = self.config.absent();
         let view = RunView {
             title: self.title(),
             config: self.text,
@@ -156,6 +157,7 @@ impl Parts<'_> {
             data: format!("{}: {}", self.config.data_name(), self.receipt.data),
             timing: self.timing,
             warnings: &warnings,
+            absent: &absent,
             epochs: self.records,
             level_max: self.config.hardware.cell.level_bits.level_max(),
             heats: &heats,

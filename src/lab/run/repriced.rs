@@ -7,7 +7,7 @@ use super::train::read_config;
 use super::{RunError, records};
 use crate::chip::hardware::Hardware;
 use crate::lab::config::{Config, Constants, Model, load_model};
-use crate::lab::price::{Bill, Change, Cost, Footprint, changes, price};
+use crate::lab::price::{Bill, Change, Cost, Footprint, Images, changes, price};
 use crate::lab::store::folder::{self, FolderError, names};
 use crate::lab::store::hash;
 use crate::lab::store::ledger::LedgerRecord;
@@ -27,6 +27,8 @@ pub struct Repriced {
     pub not_simulated: BTreeMap<String, String>,
     /// [`Prices::fingerprint`] of the chip whose constants are used.
     pub fingerprint: String,
+    /// Images that went through the chip.
+    pub images: Images,
     plan: Footprint,
     hardware: Hardware,
     constants: Constants,
@@ -111,6 +113,7 @@ pub fn reprice_as(path: &Path, other: Option<Prices>) -> Result<Repriced, RunErr
         ledger,
         not_simulated,
         fingerprint,
+        images: Images::of_records(&records),
         plan,
         hardware,
         constants,
@@ -127,6 +130,6 @@ impl Repriced {
     /// Its totals.
     #[must_use]
     pub fn cost(&self) -> Cost {
-        Cost::of(&self.bill(), &self.ledger, &self.constants)
+        Cost::of(&self.bill(), &self.ledger, &self.constants, &self.images)
     }
 }

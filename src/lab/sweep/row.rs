@@ -64,7 +64,7 @@ impl Facts<'_> {
     }
 
     fn joules(&self, bound: usize) -> Option<Number> {
-        self.cost.joules.and_then(|joules| Number::from_f64(joules[bound]))
+        self.cost.energy.and_then(|energy| Number::from_f64(energy.whole()?[bound]))
     }
 }
 
@@ -115,7 +115,7 @@ pub const RESULTS: &[ResultColumn] = results![
     "joules_low", "energy on the chip, low", Joules, Priced, |f| f.joules(0);
     "joules_high", "energy on the chip, high", Joules, Priced, |f| f.joules(2);
     "joules_assumed", "share of energy that leans on assumed constants", Fraction, Priced,
-        |f| f.cost.joules.and_then(|_| Number::from_f64(f.cost.assumed_share));
+        |f| f.cost.energy.and_then(|_| Number::from_f64(f.cost.assumed_share));
     #[cfg(feature = "grown")] "grown", "what a later program shows", Count, Whole, |f| Some(f.last.grown.into());
 ];
 

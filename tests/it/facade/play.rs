@@ -7,8 +7,8 @@ use std::fmt::Display;
 
 use dalean::hardware::{
     Adc, AdcBits, AdcRange, CellSpec, DigitalSpec, DitherBits, DitherPattern, DriveBits, DriveSpec,
-    ErrorBits, FloorKind, IncrementMax, LevelBits, LutBits, PulseCode, SliceTime, SliceTimes, ResidualBits, Subtract,
-    TileSpec, Timing, Window, WriteScheme, WriteSpec,
+    ErrorBits, FloorKind, IncrementMax, LevelBits, LutBits, PulseCode, ResidualBits, SliceTime,
+    SliceTimes, Subtract, TileSpec, Timing, Window, WriteScheme, WriteSpec,
 };
 use dalean::network::{
     Activation, Augment, Batch, Centre, Decay, DrivenBy, LayerSpec, Positive, RateMantissa, Route,

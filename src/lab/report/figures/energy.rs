@@ -4,10 +4,10 @@ use std::fmt::Write as _;
 
 use super::{Figure, per_epoch, span};
 use crate::lab::config::Kind;
-use crate::lab::price::{Cost, Group, prefixed};
+use crate::lab::price::{Cost, EnergySplit, EnergyTotal, Group, prefixed};
 use crate::lab::report::RunView;
 use crate::lab::report::chart::{Chart, Series};
-use crate::lab::report::number::{escape, float, percent, place, share, size};
+use crate::lab::report::number::{count, escape, float, percent, place, share, size};
 use crate::lab::report::scale::{Axis, Curve, Scale, round};
 
 /// Components drawn as lines, each with its own colour and dashes.
@@ -20,11 +20,14 @@ const DECADES: f64 = 9.0;
 
 pub(super) fn draw(view: &RunView<'_>) -> Option<Figure> {
     let cost = view.cost?;
-    let joules = cost.joules?;
+    let energy = cost.energy?;
+    let joules = energy.joules;
     if cost.components.is_empty() {
         return None;
     }
+    let split: Vec<Group> = cost.split.iter().map(of_class).collect();
     let cuts = [
+        ("Split", &split),
         ("Component", &cost.components),
         ("Phase", &cost.phases),
         ("Operation", &cost.operations),
@@ -35,31 +38,87 @@ pub(super) fn draw(view: &RunView<'_>) -> Option<Figure> {
     let table =
         |&(name, groups): &(&str, &Vec<Group>)| groups_table(name, groups, joules[1], &scale);
     // the two halves of the figure come out about as long as one another
-    let (left, right) = (cuts[..1].iter().map(table), cuts[1..].iter().map(table));
+    let (left, right) = (cuts[..2].iter().map(table), cuts[2..].iter().map(table));
     let (left, right) = (left.collect::<String>(), right.collect::<String>());
     let [low, typical, high] = joules.map(|joules| prefixed(joules, "J"));
-    let missing: Vec<_> = cost.missing.iter().map(|one| one.what.replace('_', " ")).collect();
+    let missing = cost.missing.iter().filter(|one| one.class.is_some());
+    let missing: Vec<_> = missing.map(|one| one.what.replace('_', " ")).collect();
     let missing = match missing.is_empty() {
         true => String::new(),
         false => format!(" Without a price: {}.", escape(&missing.join(", "))),
     };
+    let (least, parts) = match energy.priced_words() {
+        Some(parts) => ("at least ", format!(" ({parts})")),
+        None => ("", String::new()),
+    };
+    let sums = cost.sums_share.map_or_else(String::new, |share| {
+        format!(
+            " <b>{}</b> is memory of the digital sums: with <code>learning.mode = \"accumulate\"</code> a product is \
+             added to a sum of 32 bits, 64 bits out and in; <code>online</code> and <code>replay</code> do without.",
+            percent(share, 0)
+        )
+    });
     Some(Figure {
         id: "energy",
         title: "Energy",
         caption: format!(
-            "Counts of the ledger times constants of the hardware model: <b>{typical}</b> for the whole run, the final test \
-             aside, bounds {low} to {high}; <b>{}</b> leans on assumed constants. Each bound adds all low or all high \
+            "Counts of the ledger times constants of the hardware model: {least}<b>{typical}</b>{parts} for the whole run, the final \
+             test aside, bounds {low} to {high}; <b>{}</b> leans on assumed constants. Each bound adds all low or all high \
              constants: the line spans them, the dot is the typical value. Static power belongs to no layer, pathway or \
-             operation; what a target does for both of its banks is charged to its excitatory pathway.{missing}",
+             operation; what a target does for both of its banks is charged to its excitatory pathway.{sums}{missing}",
             percent(cost.assumed_share, 0)
         ),
         body: format!(
-            "<div class=\"halves\"><div>{}{left}</div><div>{}{right}</div></div>",
+            "{}<div class=\"halves\"><div>{}{left}</div><div>{}{right}</div></div>",
+            images(cost),
             lines(view, cost),
             constants(cost)
         ),
         wide: true,
     })
+}
+
+/// A class as a group like others.
+fn of_class(split: &EnergySplit) -> Group {
+    let least = if split.total.whole().is_none() { ", at least" } else { "" };
+    Group { name: format!("{}{least}", split.class.name()), joules: split.total.joules }
+}
+
+/// What an image takes.
+fn images(cost: &Cost) -> String {
+    let mut rows = String::new();
+    let classes: Vec<_> = cost.split.iter().map(|split| split.class).collect();
+    let joules = |total: &EnergyTotal| match (total.priced, total.whole()) {
+        (0, _) => "–".into(),
+        (_, Some(joules)) => prefixed(joules[1], "J"),
+        (_, None) => format!("≥ {}", prefixed(total.joules[1], "J")),
+    };
+    for one in &cost.per_image {
+        let _ = write!(
+            rows,
+            "<tr><th scope=\"row\">to {}</th><td>{}</td><td>{}</td><td><b>{}</b></td>",
+            one.doing(),
+            count(one.images),
+            one.seconds.map_or("–".into(), |seconds| prefixed(seconds, "s")),
+            joules(&one.total)
+        );
+        for class in &classes {
+            let of_class = one.split.iter().find(|split| split.class == *class);
+            let text = of_class.map_or("–".into(), |split| joules(&split.total));
+            let _ = write!(rows, "<td>{text}</td>");
+        }
+        rows += "</tr>";
+    }
+    if rows.is_empty() {
+        return rows;
+    }
+    let heads = classes.iter().map(|class| format!("<th scope=\"col\">{}</th>", class.name()));
+    format!(
+        "<div class=\"scroll\"><table class=\"joules\"><thead><tr><th scope=\"col\">An image takes</th>\
+         <th scope=\"col\">images</th><th scope=\"col\">time</th><th scope=\"col\">energy</th>{}</tr></thead>\
+         <tbody>{rows}</tbody></table></div>",
+        heads.collect::<String>()
+    )
 }
 
 /// Training, epoch by epoch.

@@ -1,0 +1,187 @@
+//! What real chips do and this program does not simulate: one table, for every chip alike.
+//!
+//! A model file adds the figures of its chip under `[not_simulated]`; it cannot leave a line out. A later step that
+//! simulates an effect takes its line away.
+
+use serde::Serialize;
+
+use super::Config;
+
+/// Which chips have an effect.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Substrate {
+    /// All of them.
+    Any,
+    /// Those that compute with currents in wires.
+    Electronic,
+    /// Those that compute with light.
+    Optical,
+}
+
+/// Something that real chips do and the engine does not.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Effect {
+    /// Its key under `[not_simulated]`.
+    pub key: &'static str,
+    /// What real chips have.
+    pub real: &'static str,
+    /// What is simulated in its place.
+    pub instead: &'static str,
+    of: Substrate,
+}
+
+macro_rules! effects {
+    ($($of:ident $key:literal, $real:literal, $instead:literal;)*) => {
+        &[$(Effect { key: $key, real: $real, instead: $instead, of: Substrate::$of },)*]
+    };
+}
+
+/// The effects: writes, storage, reads, and what surrounds the tiles.
+#[rustfmt::skip]
+pub const EFFECTS: &[Effect] = effects![
+    Any "write_nonlinearity", "steps that depend on level and direction", "a pulse moves a cell by exactly one level, or by none at an end of its window";
+    Any "unidirectional", "cells that move in small steps one way only", "steps up and down are alike";
+    Any "cycle_to_cycle", "steps that vary from pulse to pulse", "every pulse does the same";
+    Any "device_to_device", "cells that differ in step, range and response", "all cells are alike";
+    Any "programming_noise", "loads that miss their level", "loads are exact";
+    Any "write_failure", "pulses that fail, verified writes that do not end", "a verified pulse takes its time and is always right";
+    Any "write_disturb", "pulses that move neighbours on the same line", "a pulse reaches its own cell alone";
+    Any "stuck_cells", "cells that no pulse moves", "every cell works";
+    Any "endurance", "cells that wear out", "cells take any number of pulses";
+    Any "drift", "levels that drift, relax or are lost with time", "a level stays as it was written";
+    Any "read_noise", "noise of cells, lines, amplifiers and light", "reads are free of noise";
+    Any "read_nonlinearity", "currents that are not in proportion to drive and level", "a current is the exact product";
+    Any "on_off", "a lowest level that still conducts", "level 0 conducts nothing";
+    Electronic "ir_drop", "voltage lost along wires, sneak currents", "wires have no resistance";
+    Any "settling", "currents that have not settled when they are sampled", "a read has settled after the cycles the model gives";
+    Any "converter_errors", "offset, gain error, non-linearity and noise of converters and drivers", "they are exact but for bits and range";
+    Any "temperature", "temperature and supply that vary", "both are constant";
+    Optical "loss", "light lost in couplers, crossings and cells", "no light is lost";
+    Optical "wavelength_crosstalk", "colours that leak into one another", "colours do not leak";
+    Optical "thermal_crosstalk", "heaters that warm their neighbours", "a heater warms its own cell only";
+    Any "input_transport", "time and energy of images and answers beyond the tiles", "images arrive as fast as they are read, and cost nothing until then";
+    Any "control", "time and energy of what issues the operations", "the next operation is there when the last has ended; energy only where a model gives it as static";
+];
+
+/// An effect that a chip is simulated without.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Absent {
+    /// Its key.
+    pub effect: String,
+    /// What real chips have; nothing where only the model names the effect.
+    pub real: Option<&'static str>,
+    /// What is simulated in its place.
+    pub instead: Option<&'static str>,
+    /// What the model says of its own chip.
+    pub chip: Option<String>,
+}
+
+impl Absent {
+    /// `read noise`.
+    #[must_use]
+    pub fn name(&self) -> String {
+        self.effect.replace('_', " ")
+    }
+
+    /// What is simulated, and what the chip has.
+    #[must_use]
+    pub fn text(&self) -> String {
+        let chip = self.chip.as_ref().map(|chip| match self.instead {
+            Some(_) => format!("this chip: {chip}"),
+            None => chip.clone(),
+        });
+        let parts = [self.instead.map(str::to_owned), chip];
+        parts.into_iter().flatten().collect::<Vec<_>>().join("; ")
+    }
+}
+
+/// `22 effects of real chips, 5 of them with figures of this chip`.
+#[must_use]
+pub fn absent_words(absent: &[Absent]) -> String {
+    let figures = absent.iter().filter(|one| one.chip.is_some()).count();
+    let mut text = format!("{} effects of real chips are not simulated", absent.len());
+    if figures > 0 {
+        text += &format!(", {figures} with figures of this one");
+    }
+    text
+}
+
+impl Config {
+    /// What real chips of this kind do and a run does not: the program's list, with what the model says of its own.
+    #[must_use]
+    pub fn absent(&self) -> Vec<Absent> {
+        let drive = self.resolved.hw.as_ref().and_then(|hw| hw.drive.as_ref());
+        let optical = drive.is_some_and(|drive| drive.mode.as_deref() == Some("amplitude"));
+        let has = |effect: &&Effect| match (effect.of, effect.key) {
+            // a floor above 0 is a lowest level that conducts
+            (_, "on_off") => self.hardware.cell.window.floor() == 0,
+            (Substrate::Any, _) => true,
+            (Substrate::Electronic, _) => !optical,
+            (Substrate::Optical, _) => optical,
+        };
+        let mut all: Vec<_> = EFFECTS
+            .iter()
+            .filter(has)
+            .map(|effect| Absent {
+                effect: effect.key.into(),
+                real: Some(effect.real),
+                instead: Some(effect.instead),
+                chip: self.not_simulated.get(effect.key).cloned(),
+            })
+            .collect();
+        for (key, chip) in &self.not_simulated {
+            if !all.iter().any(|one| one.effect == *key) {
+                let (effect, chip) = (key.clone(), Some(chip.clone()));
+                all.push(Absent { effect, real: None, instead: None, chip });
+            }
+        }
+        all
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::lab::config::{Sources, load};
+
+    fn absent(hardware: Option<&str>, settings: &[&str]) -> Vec<Absent> {
+        let settings: Vec<String> = settings.iter().map(ToString::to_string).collect();
+        let sources = Sources { hardware, settings: &settings, ..Sources::default() };
+        load(&sources).unwrap().absent()
+    }
+
+    fn find<'a>(all: &'a [Absent], key: &str) -> Option<&'a Absent> {
+        all.iter().find(|one| one.effect == key)
+    }
+
+    #[test]
+    fn a_model_that_names_nothing_leaves_nothing_out() {
+        let bare = absent(None, &[]);
+        let keys: Vec<_> = EFFECTS.iter().map(|effect| effect.key).collect();
+        let mut once = keys.clone();
+        once.sort_unstable();
+        once.dedup();
+        assert_eq!(once.len(), keys.len());
+        for effect in EFFECTS {
+            assert_eq!(find(&bare, effect.key).is_some(), effect.of != Substrate::Optical);
+        }
+        let light = absent(Some("mrr"), &[]);
+        assert!(find(&light, "loss").is_some() && find(&light, "ir_drop").is_none());
+    }
+
+    #[test]
+    fn a_model_adds_its_figures_and_its_own_lines() {
+        let all = absent(Some("pcm14"), &["hw.not_simulated.ageing=\"3 % a year\""]);
+        let drift = find(&all, "drift").unwrap();
+        assert!(drift.text().starts_with("a level stays as it was written; this chip: "));
+        let own = find(&all, "ageing").unwrap();
+        assert_eq!((&*own.text(), own.real), ("3 % a year", None));
+        assert!(absent_words(&all).starts_with(&format!("{} effects", all.len())));
+    }
+
+    #[test]
+    fn a_floor_above_0_is_an_on_off_ratio() {
+        assert!(find(&absent(None, &[]), "on_off").is_some());
+        assert!(find(&absent(None, &["hw.cell.floor=2"]), "on_off").is_none());
+    }
+}
