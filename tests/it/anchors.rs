@@ -114,3 +114,17 @@ fn isaac_reads_as_fast_as_designed() {
     let peak = peak(config.hardware(), 16_128 / 2, 16, Convention::with_cells(8)).unwrap();
     within("ISAAC-CE TOPS (assumed)", peak.back_to_back.1 / 1e12, 40.9, 0.02);
 }
+
+/// Jia et al., JSSC 2020, brought as a user brings a chip: at one-bit operands, array and converters alone, as published.
+/// The time of a read is fitted to this point; the energies are those of the chip's own table.
+#[test]
+fn a_chip_of_ones_own_meets_what_was_published_of_it() {
+    let config = chip(concat!(env!("CARGO_MANIFEST_DIR"), "/hw_models/own/jia2020.toml"), &[]);
+    let peak = peak(config.hardware(), 1, 1, Convention::PAIRS).unwrap();
+    within("Jia 2020 TOPS", peak.alone.1 / 1e12, 0.874, 0.005);
+    let of = |event| config.constants().of(event).unwrap().value[1];
+    let (rows, columns) = (2304.0, 256.0);
+    let joules = 2.0 * rows * columns * of(Event::CellReads) + columns * of(Event::Conversions);
+    let tops_per_watt = 2.0 * rows * columns / joules / 1e12;
+    within("Jia 2020 TOPS/W", tops_per_watt, 400.0, 0.005);
+}

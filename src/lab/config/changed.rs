@@ -83,6 +83,7 @@ pub(super) fn lay(
     }
     model.remove("modes");
     give_way(&mut model, &own);
+    forget(&mut model, &own);
     let before = model.clone();
     super::overlay(&mut model, own);
     model.remove("model");
@@ -114,6 +115,24 @@ fn give_way(model: &mut Table, own: &Table) {
     if let Some(Value::Table(adc)) = model.get_mut("adc") {
         adc.remove("step_cycles");
         adc.remove("phase_bits");
+    }
+}
+
+/// A number that is given anew stands for the chip, whatever the model's stood for.
+fn forget(model: &mut Table, own: &Table) {
+    for table in NUMBERS {
+        let (Some(Value::Table(numbers)), Some(Value::Table(given))) =
+            (model.get_mut(table), own.get(table))
+        else {
+            continue;
+        };
+        for (key, number) in given {
+            if number.get("typical").is_some()
+                && let Some(Value::Table(number)) = numbers.get_mut(key)
+            {
+                number.remove("at");
+            }
+        }
     }
 }
 
@@ -156,4 +175,185 @@ pub(super) fn settle(file: &mut HardwareFile, model: &UnderModel, chip: &Setting
         others.keys().filter_map(|key| Some((*key, chip.get(key)?.clone()))).collect();
     super::quantity::stand_here(file, &model.changed, &here);
     file.constants_for = Some(others);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{Config, CostTable, Kind, Sources, Standing, load};
+
+    fn chip(model: &str, settings: &[&str]) -> Config {
+        let settings: Vec<String> = settings.iter().map(ToString::to_string).collect();
+        let sources = Sources { hardware: Some(model), settings: &settings, ..Sources::default() };
+        let config = load(&sources).unwrap_or_else(|error| panic!("{model} {settings:?}: {error}"));
+        let text = config.to_toml();
+        let again = Sources { experiment: Some(("resolved", &text)), ..Sources::default() };
+        let again = load(&again).unwrap();
+        assert_eq!(
+            again.constants, config.constants,
+            "a chip that was written down costs the same"
+        );
+        assert_eq!((again.to_toml(), again.hardware), (text, config.hardware.clone()));
+        config
+    }
+
+    fn error(model: &str, settings: &[&str]) -> String {
+        let settings: Vec<String> = settings.iter().map(ToString::to_string).collect();
+        let sources = Sources { hardware: Some(model), settings: &settings, ..Sources::default() };
+        load(&sources).unwrap_err().to_string()
+    }
+
+    /// Picojoules of a conversion, if it has a price.
+    fn conversion(config: &Config) -> Option<[f64; 3]> {
+        let constant = config.constants.get(CostTable::Energy, "conversion").unwrap();
+        let picojoules = constant.value.map(|joules| (joules * 1e15).round() / 1e3);
+        constant.not_here().is_none().then_some(picojoules)
+    }
+
+    fn changed(config: &Config) -> Option<String> {
+        let summary = config.resolved.hw.as_ref().unwrap().summary.clone().unwrap();
+        assert_eq!(config.hardware_name.ends_with(", changed"), summary.contains("; changed: "));
+        summary.split_once("; changed: ").map(|(_, keys)| keys.to_owned())
+    }
+
+    #[test]
+    fn a_model_by_itself_is_not_changed_and_neither_is_one_that_is_told_its_own() {
+        for settings in [&[][..], &["hw.adc.bits=6"], &["hw.tile.rows=128", "hw.adc.bits=6"]] {
+            let config = chip("reram", settings);
+            assert_eq!(config.hardware_name, "reram");
+            assert_eq!(changed(&config), None);
+            assert_eq!(conversion(&config), Some([0.3, 4.3, 34.5]));
+        }
+    }
+
+    #[test]
+    fn a_number_by_set_is_assumed_and_says_by_whom() {
+        for (setting, value) in [
+            ("hw.energy.conversion_pj=1.4", [1.4, 1.4, 1.4]),
+            ("hw.energy.conversion_pj={ low = 1, typical = 2, high = 3 }", [1.0, 2.0, 3.0]),
+            ("hw.energy.conversion_pj.typical=9", [0.3, 9.0, 34.5]),
+            (
+                "hw.energy.conversion_pj={ low = 1, typical = 2, high = 3, source = \"bench\", kind = \"measured\" }",
+                [1.0, 2.0, 3.0],
+            ),
+        ] {
+            let config = chip("reram", &[setting]);
+            let constant = config.constants.get(CostTable::Energy, "conversion").unwrap();
+            assert_eq!((conversion(&config), constant.kind), (Some(value), Kind::Assumed));
+            assert!(constant.source.starts_with("by --set"), "{setting}: {}", constant.source);
+            assert_eq!(changed(&config).as_deref(), Some("energy.conversion_pj"));
+        }
+        // a measured number of another table stays what it was
+        let config = chip("reram", &["hw.energy.conversion_pj=1.4"]);
+        assert_eq!(
+            config.constants.get(CostTable::Energy, "cell_pulse").unwrap().kind,
+            Kind::Measured
+        );
+        let wrong = error("reram", &["hw.energy.conversion_pj.typical=90"]);
+        assert!(wrong.contains("low <= typical <= high"), "{wrong}");
+    }
+
+    #[test]
+    fn a_file_that_cites_is_believed_and_one_that_does_not_is_assumed() {
+        let of = |number: &str| {
+            let text = format!("hw.model = \"reram\"\nhw.energy.conversion_pj = {{ {number} }}");
+            let sources = Sources { experiment: Some(("mine.toml", &text)), ..Sources::default() };
+            let config = load(&sources).unwrap();
+            let constant = config.constants.get(CostTable::Energy, "conversion").unwrap().clone();
+            (constant.kind, constant.source)
+        };
+        let number = "low = 1, typical = 2, high = 3";
+        let cited = of(&format!("{number}, source = \"bench\", kind = \"measured\""));
+        assert_eq!(cited, (Kind::Measured, "bench".into()));
+        assert_eq!(of(number), (Kind::Assumed, "by mine.toml".into()));
+    }
+
+    #[test]
+    fn a_constant_follows_its_law_or_is_not_priced() {
+        let config = chip("reram", &["hw.adc.bits=8"]);
+        assert_eq!(conversion(&config), Some([1.2, 17.2, 138.0]));
+        let energy = config.constants.get(CostTable::Energy, "conversion").unwrap();
+        let said = Standing::Scaled("walden, adc_bits 6 to 8: x 4".into());
+        assert_eq!((&energy.standing, energy.kind), (&said, Kind::Assumed));
+        let area = config.constants.get(CostTable::Area, "adc").unwrap();
+        assert!((area.value[1] / (4.0 * 8300e-12) - 1.0).abs() < 1e-12);
+        assert_eq!(config.hardware.timing.unwrap().convert, 9, "a step a bit and one more");
+        assert_eq!(changed(&config).as_deref(), Some("adc.bits"));
+        assert_eq!(chip("reram", &["hw.adc.bits=4"]).hardware.timing.unwrap().convert, 5);
+
+        // a flash is no SAR of so many bits, and a lossless converter has none
+        for settings in [&["hw.adc.converter=flash"][..], &["hw.adc=ideal"]] {
+            let config = chip("reram", settings);
+            assert_eq!(conversion(&config), None, "{settings:?}");
+        }
+        let flash = chip("reram", &["hw.adc.converter=flash", "hw.adc.step_cycles=2"]);
+        assert_eq!(flash.hardware.timing.unwrap().convert, 2);
+        // what was fitted to one point says nothing of another
+        assert_eq!(conversion(&chip("hermes", &["hw.adc.bits=9"])), None);
+        let ramp = chip("prime", &["hw.adc.bits=8"]);
+        assert_eq!(
+            (ramp.hardware.timing.unwrap().convert, conversion(&ramp).unwrap()[1]),
+            (256, 5.04)
+        );
+        let pulse = |settings: &[&str]| {
+            let config = chip("reram", settings);
+            let pulse = config.constants.get(CostTable::Energy, "cell_pulse").unwrap().clone();
+            pulse.not_here().is_none().then_some((pulse.value[1] * 1e15).round())
+        };
+        assert_eq!(pulse(&["hw.timing.pulse_cycles=100"]), Some(1400.0));
+        // twice the clock and twice the cycles is the same pulse
+        assert_eq!(pulse(&["hw.timing.pulse_cycles=100", "hw.timing.clock_mhz=2000"]), Some(700.0));
+        assert_eq!(pulse(&["hw.cell.level_bits=4"]), None);
+    }
+
+    #[test]
+    fn the_default_chip_has_a_price_for_every_width_and_kind_of_converter() {
+        assert_eq!(conversion(&chip("ideal", &[])), Some([1.0, 10.0, 100.0]));
+        assert_eq!(conversion(&chip("ideal", &["hw.adc.bits=8"])), Some([1.0, 10.0, 100.0]));
+        assert_eq!(conversion(&chip("ideal", &["hw.adc.bits=6"])).unwrap()[1], 2.5);
+        let sar = chip("ideal", &["hw.adc.bits=10", "hw.adc.converter=sar"]);
+        assert_eq!(
+            (conversion(&sar).unwrap()[1], sar.hardware.timing.unwrap().convert),
+            (40.0, 11)
+        );
+        let ramp = chip("ideal", &["hw.adc.bits=10", "hw.adc.converter=ramp"]);
+        assert_eq!(ramp.hardware.timing.unwrap().convert, 1024);
+    }
+
+    #[test]
+    fn a_number_that_is_given_with_a_setting_is_for_that_setting() {
+        let config = chip("reram", &["hw.adc.bits=8", "hw.energy.conversion_pj=7"]);
+        let constant = config.constants.get(CostTable::Energy, "conversion").unwrap();
+        assert_eq!((conversion(&config), &constant.standing), (Some([7.0; 3]), &Standing::Stated));
+        // and the area, of which nothing was said, follows its law
+        let area = config.constants.get(CostTable::Area, "adc").unwrap();
+        assert!(matches!(area.standing, Standing::Scaled(_)));
+        assert_eq!(changed(&config).as_deref(), Some("adc.bits, energy.conversion_pj"));
+    }
+
+    #[test]
+    fn keys_of_another_kind_of_converter_give_way() {
+        // neurram steps by 30 cycles; a fixed converter has no steps
+        let fixed = chip("neurram", &["hw.adc.converter=fixed", "hw.timing.convert_cycles=300"]);
+        assert_eq!(fixed.hardware.timing.unwrap().convert, 300);
+        let refused = error("neurram", &["hw.timing.convert_cycles=300"]);
+        assert!(refused.contains("a sar converter of 10 bits takes 11 steps"), "{refused}");
+        let refused = error("reram", &["hw.constants_for.rows=3"]);
+        assert!(refused.contains("hw.constants_for"), "{refused}");
+    }
+
+    #[test]
+    fn laws_of_settings_that_a_quantity_does_not_belong_to_are_refused() {
+        for (setting, wanted) in [
+            ("hw.energy.hold_fj.scales=walden", "belongs to no setting"),
+            (
+                "hw.energy.conversion_pj.scales={ rows = \"linear\" }",
+                "`conversion` belongs to adc_bits, converter",
+            ),
+            ("hw.energy.conversion_pj.at={ lut_bits = 3 }", "speaks of lut_bits"),
+            ("hw.energy.conversion_pj.scales=cubic", "a law (constant, linear, walden"),
+        ] {
+            let found = error("reram", &[setting]);
+            assert!(found.contains(wanted), "{setting}: {found}");
+        }
+    }
 }
