@@ -15,18 +15,25 @@ use clap::{Args, CommandFactory, Parser, Subcommand};
 use crate::chip::crossbar::kernel::Backend;
 use crate::lab::config::{self, Config, Sources};
 use crate::lab::data::DataRoot;
+use crate::lab::near;
 use crate::lab::run::Machine;
+use out::say;
 
 mod bench;
 mod data;
 mod export;
 mod hw;
+mod keys;
+mod known;
+mod out;
 mod price;
 mod progress;
 mod report;
 mod run;
+mod runs;
 mod store;
 mod sweep;
+mod table;
 mod trace;
 
 /// What stops a command.
@@ -76,6 +83,10 @@ enum Command {
     Eval(run::EvalArgs),
     /// Do a run again and compare every state hash
     Verify(run::VerifyArgs),
+    /// List runs, the newest first: how far they are, what they know, what sets them apart
+    Runs(runs::RunsArgs),
+    /// Put runs side by side: keys that differ, results, the first epoch whose states differ
+    Compare(runs::CompareArgs),
     /// Carry out many runs from one file, and keep them in a store
     Sweep(sweep::SweepArgs),
     /// Write the table of a sweep as CSV, JSON or Parquet
@@ -95,6 +106,8 @@ enum Command {
     /// Show and check hardware models
     #[command(subcommand)]
     Hw(hw::HwCommand),
+    /// Every key of every file: what it takes, its default, its meaning
+    Keys(keys::KeysArgs),
     /// Write one update as waves: registers of a tile (VCD), operations of all tiles (Perfetto)
     Trace(trace::TraceArgs),
     /// Measure how fast this machine is: kernels, and whole updates
@@ -103,6 +116,9 @@ enum Command {
     Completions {
         /// Which shell
         shell: clap_complete::Shell,
+        /// One JSON object on standard output
+        #[arg(long)]
+        json: bool,
     },
 }
 
@@ -113,7 +129,7 @@ struct Shared {
     #[arg(long, value_name = "N")]
     threads: Option<usize>,
     /// Loops to use: scalar, neon, avx2, avx512, amx; results do not depend on it [default: the fastest there is]
-    #[arg(long, value_name = "NAME")]
+    #[arg(long, value_name = "NAME", value_parser = known::kernels(), hide_possible_values = true)]
     kernel: Option<String>,
     /// Folder of data sets [default: data, or DALEAN_DATA]
     #[arg(long, value_name = "DIR")]
@@ -137,7 +153,7 @@ fn environment(name: &str) -> Option<String> {
 impl Shared {
     fn machine(&self) -> Result<Machine, Failure> {
         let backend = match &self.kernel {
-            Some(name) => Backend::named(name).map_err(|e| usage(&e.to_string()))?,
+            Some(name) => kernel(name)?,
             None => Backend::best(),
         };
         let cores = || std::thread::available_parallelism().map_or(1, usize::from);
@@ -151,6 +167,12 @@ impl Shared {
     fn data_root(&self) -> DataRoot {
         data_root(self.data_dir.clone())
     }
+}
+
+/// The back end of a name.
+fn kernel(name: &str) -> Result<Backend, Failure> {
+    Backend::named(name)
+        .map_err(|error| usage(&format!("{error}{}", near::hint(name, Backend::NAMES))))
 }
 
 fn data_root(given: Option<PathBuf>) -> DataRoot {
@@ -187,21 +209,21 @@ fn configuration(
     config::load(&sources).map_err(|error| usage(&error.to_string()))
 }
 
-/// Prints a line to standard output; a reader that has gone away is no fault of ours.
-fn say(line: &str) {
-    use std::io::Write;
-    let _ = writeln!(std::io::stdout(), "{line}");
-}
-
 /// Runs the program and gives its exit code.
 #[must_use]
 pub fn main() -> ExitCode {
-    let cli = Cli::parse();
-    let json = std::env::args().any(|argument| argument == "--json");
+    let cli = match Cli::try_parse() {
+        Ok(cli) => cli,
+        Err(error) => return unparsed(&error),
+    };
+    let json = std::env::args_os().any(|argument| argument == "--json");
     let done = match cli.command {
         Command::Train(args) => run::train(&args),
         Command::Eval(args) => run::eval(&args),
         Command::Verify(args) => run::verify(&args),
+        Command::Runs(args) => runs::list(&args),
+        Command::Compare(args) => runs::compare(&args),
+        Command::Keys(args) => keys::execute(&args),
         Command::Sweep(args) => sweep::execute(&args),
         Command::Export(args) => export::execute(&args),
         Command::Store(command) => store::execute(&command),
@@ -212,14 +234,23 @@ pub fn main() -> ExitCode {
         Command::Hw(command) => hw::execute(&command),
         Command::Trace(args) => trace::execute(&args),
         Command::Bench(args) => bench::execute(&args),
-        Command::Completions { shell } => {
+        Command::Completions { shell, json } => {
             let mut script = Vec::new();
             clap_complete::generate(shell, &mut Cli::command(), "dalean", &mut script);
-            say(String::from_utf8_lossy(&script).trim_end());
+            let script = String::from_utf8_lossy(&script);
+            if json {
+                let shell = shell.to_string();
+                let script =
+                    serde_json::json!({"event": "completions", "shell": shell, "script": script});
+                say(&script.to_string());
+            } else {
+                say(script.trim_end());
+            }
             Ok(())
         }
     };
-    match done {
+    let whole = || out::fault().map_or(Ok(()), |message| Err(Failure { code: 1, message }));
+    match done.and_then(|()| whole()) {
         Ok(()) => ExitCode::SUCCESS,
         Err(Failure { code, message }) => {
             if json {
@@ -230,6 +261,25 @@ pub fn main() -> ExitCode {
             let word = if red { "\u{1b}[31merror\u{1b}[0m" } else { "error" };
             eprintln!("{word}: {message}");
             ExitCode::from(code)
+        }
+    }
+}
+
+/// Arguments that name no command: help and version go to standard output, mistakes to the other one.
+fn unparsed(error: &clap::Error) -> ExitCode {
+    if error.use_stderr() {
+        let _ = error.print();
+        return ExitCode::from(2);
+    }
+    let text = error.render();
+    let live = std::io::stdout().is_terminal();
+    let text = if live { text.ansi().to_string() } else { text.to_string() };
+    say(text.trim_end());
+    match out::fault() {
+        None => ExitCode::SUCCESS,
+        Some(message) => {
+            eprintln!("error: {message}");
+            ExitCode::from(1)
         }
     }
 }

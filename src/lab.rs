@@ -2,9 +2,11 @@
 
 pub mod config;
 pub mod data;
+pub mod near;
 pub mod price;
 pub mod report;
 pub mod run;
+pub mod runs;
 pub mod store;
 pub mod sweep;
 pub mod table;

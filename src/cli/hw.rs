@@ -1,12 +1,16 @@
-//! `hw list`, `hw show`, `hw peak`, `hw check`.
+//! `hw list`, `hw new`, `hw show`, `hw peak`, `hw check`.
+
+use std::io::Write;
+use std::path::{Path, PathBuf};
 
 use clap::{Args, Subcommand};
 use serde_json::json;
 
-use super::{Done, Failure, say, usage};
+use super::{Done, Failure, known, say, usage};
 use crate::chip::hardware::{Adc, AdcRange, Hardware, PulseCode, Subtract, Timing};
 use crate::lab::config::{
-    self, Config, Constant, CostTable, Sources, Standing, builtin_models, load_model,
+    self, Config, Constant, CostTable, Model, Sources, Standing, builtin_models, load_model,
+    model_names,
 };
 use crate::lab::price::{Convention, bounds, figures, peak, prefixed};
 
@@ -18,27 +22,63 @@ const WORDS: u64 = 10;
 #[derive(Debug, Subcommand)]
 pub(super) enum HwCommand {
     /// Show the built-in models
-    List,
+    List {
+        /// One JSON object a line on standard output, each with an `event`
+        #[arg(long)]
+        json: bool,
+        /// Print only names
+        #[arg(long, short)]
+        quiet: bool,
+    },
+    /// Write a model file to begin with, every key explained; it is valid as it stands
+    New {
+        /// Name of the chip: NAME.toml is written, and must not be there
+        name: PathBuf,
+        /// One JSON object on standard output
+        #[arg(long)]
+        json: bool,
+        /// Print only the name of the file
+        #[arg(long, short)]
+        quiet: bool,
+    },
     /// Show a model: its numbers, times and energies, then its text with sources
     Show {
         /// A built-in name or a file
+        #[arg(value_parser = known::models(), hide_possible_values = true)]
         model: String,
         /// Change a key, such as hw.timing.lanes=8 (repeatable)
         #[arg(long = "set", value_name = "KEY=VALUE")]
         settings: Vec<String>,
+        /// Print a model file that can be saved and used, with what --set changes
+        #[arg(long, conflicts_with_all = ["json", "quiet"])]
+        toml: bool,
+        /// One JSON object on standard output
+        #[arg(long)]
+        json: bool,
+        /// Leave out the text of the model
+        #[arg(long, short)]
+        quiet: bool,
     },
     /// The most a chip can read: operations a second of all its tiles, in any mode
     Peak(PeakArgs),
     /// Check a model file: keys, ranges, a source beside every number, units
     Check {
         /// A built-in name or a file
+        #[arg(value_parser = known::models(), hide_possible_values = true)]
         model: String,
+        /// One JSON object on standard output
+        #[arg(long)]
+        json: bool,
+        /// Print nothing when it is valid
+        #[arg(long, short)]
+        quiet: bool,
     },
 }
 
 #[derive(Debug, Args)]
 pub(super) struct PeakArgs {
     /// A built-in name or a file
+    #[arg(value_parser = known::models(), hide_possible_values = true)]
     model: String,
     /// Change a key, such as hw.drive.phases=2 (repeatable)
     #[arg(long = "set", value_name = "KEY=VALUE")]
@@ -72,28 +112,128 @@ fn widths(text: &str) -> Result<Widths, String> {
 
 pub(super) fn execute(command: &HwCommand) -> Done {
     match command {
-        HwCommand::List => {
-            for model in builtin_models() {
-                say(&format!("{:12} {}", model.name, model.summary));
+        HwCommand::List { json, quiet } => {
+            for Model { name, summary, .. } in builtin_models() {
+                say(&match (json, quiet) {
+                    (true, _) => {
+                        json!({"event": "model", "name": name, "summary": summary}).to_string()
+                    }
+                    (_, true) => name,
+                    _ => format!("{name:12} {summary}"),
+                });
             }
+            Ok(())
         }
-        HwCommand::Show { model, settings } => show(model, settings)?,
-        HwCommand::Peak(args) if args.modes => modes::show(args)?,
-        HwCommand::Peak(args) => show_peak(args)?,
-        HwCommand::Check { model } => {
-            let model = load_model(model).map_err(|e| usage(&e.to_string()))?;
-            let complaints = model.constants.complaints();
-            if !complaints.is_empty() {
-                return Err(Failure { code: 1, message: complaints.join("\n") });
+        HwCommand::New { name, json, quiet } => new(name, *json, *quiet),
+        HwCommand::Show { model, settings, toml, json, quiet } => {
+            let given = load_model(model).map_err(|e| usage(&e.to_string()))?;
+            let config = changed(model, settings)?;
+            if *toml {
+                say(saved(&given, &config, settings).trim_end());
+            } else if *json {
+                say(&model_json(&given, &config).to_string());
+            } else {
+                show(&given, &config, *quiet);
             }
-            let numbers = model.constants.iter().count();
-            say(&format!(
-                "{}: valid; every table has a source, {numbers} physical numbers lie where they can",
-                model.name
-            ));
+            Ok(())
         }
+        HwCommand::Peak(args) if args.modes => modes::show(args),
+        HwCommand::Peak(args) => show_peak(args),
+        HwCommand::Check { model, json, quiet } => check(model, *json, *quiet),
+    }
+}
+
+/// Writes a model file to begin with; a file that is there stays.
+fn new(name: &Path, json: bool, quiet: bool) -> Done {
+    let chip = name.file_stem().and_then(|stem| stem.to_str()).unwrap_or_default();
+    let good = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
+    if chip.is_empty() || !chip.chars().all(good) {
+        let message = format!(
+            "the name of the chip is {:?}; use letters, digits, `_` and `-`, such as `dalean hw new mychip`",
+            name.display().to_string()
+        );
+        return Err(usage(&message));
+    }
+    if model_names().contains(&chip) {
+        let message = format!("{chip} is a built-in model; give yours another name");
+        return Err(usage(&message));
+    }
+    let path = name.with_extension("toml");
+    let place = path.display().to_string();
+    #[expect(clippy::disallowed_methods, reason = "the file the user named")]
+    let made = std::fs::File::create_new(&path)
+        .and_then(|mut file| file.write_all(config::template(chip).as_bytes()));
+    made.map_err(|error| Failure {
+        code: 1,
+        message: format!("cannot write {place}: {error}; choose another name, or remove it"),
+    })?;
+    say(&match (json, quiet) {
+        (true, _) => json!({"event": "done", "model": chip, "file": place}).to_string(),
+        (_, true) => place,
+        _ => format!(
+            "{place}: a chip that is valid as it stands; replace what is not yours\n\
+             check    dalean hw check {place}\n\
+             train    dalean train --hw {place}"
+        ),
+    });
+    Ok(())
+}
+
+fn check(model: &str, json: bool, quiet: bool) -> Done {
+    let model = load_model(model).map_err(|e| usage(&e.to_string()))?;
+    let complaints = model.constants.complaints();
+    if !complaints.is_empty() {
+        return Err(Failure { code: 1, message: complaints.join("\n") });
+    }
+    let numbers = model.constants.iter().count();
+    if json {
+        say(&json!({"event": "done", "model": model.name, "valid": true, "numbers": numbers})
+            .to_string());
+    } else if !quiet {
+        say(&format!(
+            "{}: valid; every table has a source, {numbers} physical numbers lie where they can",
+            model.name
+        ));
     }
     Ok(())
+}
+
+/// A model as a file: its own text, or with what was changed written out under a name of its own.
+fn saved(model: &Model, config: &Config, settings: &[String]) -> String {
+    if settings.is_empty() {
+        return model.text.clone();
+    }
+    format!(
+        "# {} with {}, by `dalean hw show`\n{}",
+        model.name,
+        settings.join(", "),
+        config.hardware_toml(&format!("{}-changed", model.name))
+    )
+}
+
+fn model_json(model: &Model, config: &Config) -> serde_json::Value {
+    let constants: Vec<_> = config
+        .constants
+        .iter()
+        .map(|c| {
+            json!({"key": c.key, "low": c.value[0], "typical": c.value[1], "high": c.value[2],
+                "kind": c.kind, "source": c.source})
+        })
+        .collect();
+    let times: Vec<_> = config
+        .hardware
+        .timing
+        .iter()
+        .flat_map(|_| figures(&config.hardware, WORDS))
+        .map(|f| json!({"what": f.name, "cycles": f.cycles, "seconds": f.seconds}))
+        .collect();
+    let numbers: serde_json::Map<_, _> = numbers(&config.hardware)
+        .into_iter()
+        .map(|(name, value)| (name.to_owned(), json!(value)))
+        .collect();
+    json!({"event": "model", "name": model.name, "summary": model.summary, "numbers": numbers,
+        "times": times, "constants": constants, "not_simulated": config.not_simulated,
+        "toml": model.text})
 }
 
 /// A model with some keys changed, as a run on it would have it.
@@ -102,9 +242,7 @@ fn changed(model: &str, settings: &[String]) -> Result<Config, Failure> {
     config::load(&sources).map_err(|e| usage(&e.to_string()))
 }
 
-fn show(name: &str, settings: &[String]) -> Done {
-    let model = load_model(name).map_err(|e| usage(&e.to_string()))?;
-    let config = changed(name, settings)?;
+fn show(model: &Model, config: &Config, quiet: bool) {
     say(&format!("{}: {}\n", model.name, model.summary));
     for (name, value) in numbers(&config.hardware) {
         say(&format!("  {name:16} {value}"));
@@ -138,8 +276,9 @@ fn show(name: &str, settings: &[String]) -> Done {
     for (what, how) in &config.not_simulated {
         say(&format!("  {what}: {how}"));
     }
-    say(&format!("\n{}", model.text.trim_end()));
-    Ok(())
+    if !quiet {
+        say(&format!("\n{}", model.text.trim_end()));
+    }
 }
 
 fn constant_text(constant: &Constant, unit: &str) -> String {

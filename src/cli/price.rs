@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 use serde_json::json;
 
-use super::{Done, Shared, configuration, say};
+use super::{Done, Shared, configuration, known, say};
 use crate::lab::price::{Bill, Convention, EnergySplit, Group, Images, areas, bounds, prefixed};
 use crate::lab::run::{self, Act, Profile};
 
@@ -19,9 +19,10 @@ const SUMS: &str = "a product is added to a 32-bit sum, 64 bits out and in; lear
 #[derive(Debug, Args)]
 pub(super) struct PriceArgs {
     /// Folder of a finished run
+    #[arg(value_hint = clap::ValueHint::DirPath)]
     run: PathBuf,
     /// Constants of another hardware model: a built-in name or a file
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", value_parser = known::models(), hide_possible_values = true)]
     hw: Option<String>,
     /// One JSON object on standard output
     #[arg(long)]
@@ -33,7 +34,7 @@ pub(super) struct ProfileArgs {
     /// Experiment file [default: the built-in digits]
     file: Option<PathBuf>,
     /// Hardware model: a built-in name or a file
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", value_parser = known::models(), hide_possible_values = true)]
     hw: Option<String>,
     /// Change a key, such as hw.timing.lanes=8 (repeatable)
     #[arg(long = "set", value_name = "KEY=VALUE")]

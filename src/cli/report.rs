@@ -13,6 +13,7 @@ use crate::lab::sweep;
 #[derive(Debug, Args)]
 pub(super) struct ReportArgs {
     /// Folder of a run, or a store
+    #[arg(value_hint = clap::ValueHint::DirPath)]
     run: PathBuf,
     /// A store: which sweep; needed when it has several
     #[arg(long, value_name = "NAME")]

@@ -8,7 +8,7 @@ use clap::Args;
 use serde_json::json;
 
 use super::progress::Meter;
-use super::{Done, Failure, Shared, configuration, environment, say, usage};
+use super::{Done, Failure, Shared, configuration, environment, known, say, usage};
 use crate::lab::price::{EnergySplit, PerImage};
 use crate::lab::run::{self, Machine, RunError, RunEvent, Trained, Verdict};
 use crate::lab::store::index::{INDEX, Store};
@@ -18,9 +18,10 @@ use crate::lab::sweep::{self, Sampled};
 #[derive(Debug, Args)]
 pub(super) struct TrainArgs {
     /// Experiment file [default: the built-in digits]
+    #[arg(value_hint = clap::ValueHint::FilePath)]
     file: Option<PathBuf>,
     /// Hardware model: a built-in name or a file
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", value_parser = known::models(), hide_possible_values = true)]
     hw: Option<String>,
     /// Change a key, such as hw.cell.level_bits=4; KEY=default takes back what a file said (repeatable)
     #[arg(long = "set", value_name = "KEY=VALUE")]
@@ -32,7 +33,7 @@ pub(super) struct TrainArgs {
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Continue a run from its last finished epoch
-    #[arg(long, value_name = "RUN", conflicts_with_all = ["file", "hw", "settings", "seed", "out"])]
+    #[arg(long, value_name = "RUN", value_hint = clap::ValueHint::DirPath, conflicts_with_all = ["file", "hw", "settings", "seed", "out"])]
     resume: Option<PathBuf>,
     #[command(flatten)]
     shared: Shared,
@@ -41,6 +42,7 @@ pub(super) struct TrainArgs {
 #[derive(Debug, Args)]
 pub(super) struct EvalArgs {
     /// Folder of a run
+    #[arg(value_hint = clap::ValueHint::DirPath)]
     run: PathBuf,
     #[command(flatten)]
     shared: Shared,
@@ -49,6 +51,7 @@ pub(super) struct EvalArgs {
 #[derive(Debug, Args)]
 pub(super) struct VerifyArgs {
     /// Folder of a run, or a store
+    #[arg(value_hint = clap::ValueHint::DirPath)]
     run: PathBuf,
     /// Compare only the first N epochs
     #[arg(long, value_name = "N", conflicts_with = "sample")]

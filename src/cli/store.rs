@@ -19,6 +19,9 @@ pub(super) enum StoreCommand {
         /// One JSON object a line
         #[arg(long)]
         json: bool,
+        /// Print only the result
+        #[arg(long, short)]
+        quiet: bool,
     },
     /// Bring the finished runs and the sweeps of other stores into one
     Merge {
@@ -30,6 +33,9 @@ pub(super) enum StoreCommand {
         /// One JSON object a line
         #[arg(long)]
         json: bool,
+        /// Print only the result
+        #[arg(long, short)]
+        quiet: bool,
     },
     /// Make the rows of the index again from the run folders
     Index {
@@ -38,6 +44,9 @@ pub(super) enum StoreCommand {
         /// One JSON object a line
         #[arg(long)]
         json: bool,
+        /// Print only the result
+        #[arg(long, short)]
+        quiet: bool,
     },
 }
 
@@ -49,16 +58,16 @@ impl From<crate::lab::store::index::StoreError> for Failure {
 
 pub(super) fn execute(command: &StoreCommand) -> Done {
     match command {
-        StoreCommand::List { store, json } => list(&Store::existing(store)?, *json),
-        StoreCommand::Merge { into, from, json } => {
+        StoreCommand::List { store, json, quiet } => list(&Store::existing(store)?, *json, *quiet),
+        StoreCommand::Merge { into, from, json, quiet } => {
             let mut into = Store::open(into)?;
             for from in from {
-                merge(&mut into, &Store::existing(from)?, *json)?;
+                merge(&mut into, &Store::existing(from)?, *json, *quiet)?;
             }
             Ok(())
         }
-        StoreCommand::Index { store, json } => {
-            let bar = ProgressBar::new(0);
+        StoreCommand::Index { store, json, quiet } => {
+            let bar = bar(*quiet);
             let found =
                 sweep::reindex(&mut Store::open(store)?, &mut |run, of| show(&bar, run, of));
             bar.finish_and_clear();
@@ -74,15 +83,20 @@ pub(super) fn execute(command: &StoreCommand) -> Done {
     }
 }
 
+/// A bar, unless it is to be quiet.
+fn bar(quiet: bool) -> ProgressBar {
+    if quiet { ProgressBar::hidden() } else { ProgressBar::new(0) }
+}
+
 /// How far it is; a bar that is not on a terminal stays hidden.
 fn show(bar: &ProgressBar, run: usize, of: usize) {
     bar.set_length(of as u64);
     bar.set_position(run as u64);
 }
 
-fn list(store: &Store, json: bool) -> Done {
+fn list(store: &Store, json: bool, quiet: bool) -> Done {
     let runs = store.rows()?.len();
-    if !json {
+    if !json && !quiet {
         say(&format!("{}: {runs} finished runs", store.path().display()));
     }
     for record in store.sweeps()? {
@@ -99,8 +113,8 @@ fn list(store: &Store, json: bool) -> Done {
     Ok(())
 }
 
-fn merge(into: &mut Store, from: &Store, json: bool) -> Done {
-    let bar = ProgressBar::new(0);
+fn merge(into: &mut Store, from: &Store, json: bool, quiet: bool) -> Done {
+    let bar = bar(quiet);
     let merged = sweep::merge(into, from, &mut |run, of| show(&bar, run, of));
     bar.finish_and_clear();
     let merged = merged?;

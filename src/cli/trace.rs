@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use serde_json::json;
 
-use super::{Done, Failure, Shared, configuration, say, usage};
+use super::{Done, Failure, Shared, configuration, known, say, usage};
 use crate::chip::engine::tick::TileAt;
 use crate::chip::ledger::Interval;
 use crate::lab::wave::{self, Look};
@@ -15,7 +15,7 @@ pub(super) struct TraceArgs {
     /// Experiment file [default: the built-in digits]
     file: Option<PathBuf>,
     /// Hardware model: a built-in name or a file
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", value_parser = known::models(), hide_possible_values = true)]
     hw: Option<String>,
     /// Change a key, such as learning.batch=4 for a short trace (repeatable)
     #[arg(long = "set", value_name = "KEY=VALUE")]

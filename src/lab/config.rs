@@ -9,17 +9,22 @@ mod changed;
 mod check;
 mod chip;
 mod data;
+mod differs;
 mod experiment;
 pub mod file;
 mod given;
 mod hardware;
+pub mod keys;
 mod law;
 mod layers;
 mod quantity;
 pub mod sweep;
+mod template;
+mod wrong;
 
 pub use absent::{Absent, EFFECTS, Effect, absent_words};
 pub use check::{Config, DataConfig, Select, TrainOn};
+pub use differs::{Difference, flat};
 pub use file::{ExperimentFile, HardwareFile};
 pub use hardware::{Model, builtin_models, load_model, model_names};
 pub use law::{Law, Setting, SettingValue};
@@ -27,6 +32,7 @@ pub use layers::{Overlay, Sources, load, overlay, setting, setting_table};
 pub use quantity::{
     Constant, Constants, CostClass, CostTable, Kind, Per, QUANTITIES, Quantity, Standing,
 };
+pub use template::template;
 
 /// Why a configuration cannot be used. Each message says where, what was found, what is allowed.
 ///

@@ -11,6 +11,7 @@
 
 mod chart;
 mod colour;
+pub mod compare;
 mod figures;
 mod image;
 mod number;

@@ -14,12 +14,14 @@ mod train;
 mod verify;
 
 pub use profile::{Act, Profile, profile};
-pub use proof::records;
+pub use proof::{records, untouched};
 pub use report::{ReportMade, report};
 pub use repriced::{Prices, Repriced, reprice, reprice_as};
 pub use session::Session;
 pub use task::Progress;
-pub use train::{Keeping, RunEvent, Trained, address_of, carry_on, evaluate, resume, train};
+pub use train::{
+    Keeping, RunEvent, Trained, address_of, carry_on, configuration, evaluate, resume, train,
+};
 pub use verify::{Verdict, verify};
 
 use crate::chip::crossbar::kernel::Backend;

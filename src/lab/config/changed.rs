@@ -12,6 +12,9 @@ use super::file::HardwareFile;
 use super::law::{Settings, kind_of, settings};
 use super::{ConfigError, chip};
 
+/// What is put behind the name of a model that is changed.
+pub(super) const SUFFIX: &str = ", changed";
+
 /// Tables of physical numbers.
 const NUMBERS: [&str; 3] = ["energy", "power", "area"];
 
@@ -90,14 +93,16 @@ pub(super) fn lay(
     let changed = differences(&before, &model);
     if !changed.is_empty() {
         let text = |key: &str| model.get(key).and_then(Value::as_str).unwrap_or_default();
-        let name = format!("{}, changed", text("name"));
+        let name = format!("{}{SUFFIX}", text("name"));
         let summary = format!("{}; changed: {}", text("summary"), changed.join(", "));
         model.insert("name".into(), Value::String(name));
         model.insert("summary".into(), Value::String(summary));
     }
     let mut alone = file.clone();
     let own_settings = chip::resolve(&mut alone, "").map(|chip| settings(&chip, kind_of(&alone)));
-    let settings = own_settings.unwrap_or_default();
+    let mut settings = own_settings.unwrap_or_default();
+    // a chip that was changed and saved says itself what its numbers are for
+    settings.extend(file.constants_for.iter().flatten().map(|(key, value)| (*key, value.clone())));
     Ok((model, UnderModel { settings, changed }))
 }
 
@@ -211,7 +216,7 @@ mod tests {
 
     fn changed(config: &Config) -> Option<String> {
         let summary = config.resolved.hw.as_ref().unwrap().summary.clone().unwrap();
-        assert_eq!(config.hardware_name.ends_with(", changed"), summary.contains("; changed: "));
+        assert_eq!(config.hardware_name.ends_with(super::SUFFIX), summary.contains("; changed: "));
         summary.split_once("; changed: ").map(|(_, keys)| keys.to_owned())
     }
 

@@ -5,11 +5,12 @@ use std::collections::BTreeMap;
 use std::fmt::Display;
 
 use super::changed::{self, UnderModel};
-use super::file::{DataFile, ExperimentFile, HardwareFile, LearningFile, NetworkFile, PerLayer};
+use super::file::{ChipFile, DataFile, ExperimentFile, LearningFile, NetworkFile, PerLayer};
 use super::law::{kind_of, settings};
 use super::quantity::{Constants, constants_of};
 use super::{ConfigError, Sources, chip, data};
 use crate::chip::hardware::{ConverterKind, Hardware};
+use crate::lab::near;
 use crate::learn::error::Centre;
 use crate::learn::route::Route;
 use crate::learn::rule::{Rule, UpdateMode};
@@ -106,6 +107,8 @@ pub struct Config {
     pub(crate) not_simulated: BTreeMap<String, String>,
     /// Name of the hardware model.
     pub(crate) hardware_name: String,
+    /// The hardware model that it was laid over, while that is known.
+    pub(super) model: Option<toml::Table>,
     pub(super) resolved: ExperimentFile,
 }
 
@@ -126,10 +129,11 @@ pub(super) fn word<T: Copy>(
 ) -> Result<T, ConfigError> {
     let value = value.get_or_insert_with(|| default.into());
     let found = words.iter().find(|(word, _)| word == value);
-    let names = || words.iter().map(|(word, _)| *word).collect::<Vec<_>>().join(", ");
-    found
-        .map(|(_, meaning)| *meaning)
-        .ok_or_else(|| wrong(key, format!("is \"{value}\""), format!("it is one of {}", names())))
+    found.map(|(_, meaning)| *meaning).ok_or_else(|| {
+        let names: Vec<_> = words.iter().map(|(word, _)| *word).collect();
+        let hint = near::hint(value, names.iter().copied());
+        wrong(key, format!("is \"{value}\""), format!("it is one of {}{hint}", names.join(", ")))
+    })
 }
 
 pub(super) fn between(key: &str, found: i64, min: i64, max: i64) -> Result<i64, ConfigError> {
@@ -167,7 +171,7 @@ pub(super) fn positive(key: &str, value: f64) -> Result<Positive, ConfigError> {
 pub(super) fn config(mut file: ExperimentFile, model: &UnderModel) -> Result<Config, ConfigError> {
     word("task", &mut file.task, "classify", &[("classify", ())])?;
     let seed = *file.seed.get_or_insert(1);
-    let hw = file.hw.get_or_insert_with(HardwareFile::default);
+    let ChipFile(hw) = file.hw.get_or_insert_with(ChipFile::default);
     let hardware = chip::resolve(hw, "hw.")?;
     changed::settle(hw, model, &settings(&hardware, kind_of(hw)));
     let constants = constants_of(hw, &hardware, "hw.")?;
@@ -220,6 +224,7 @@ pub(super) fn config(mut file: ExperimentFile, model: &UnderModel) -> Result<Con
         constants,
         not_simulated,
         hardware_name,
+        model: None,
         resolved: file,
     })
 }
@@ -271,10 +276,15 @@ impl Config {
         &self.constants
     }
 
+    /// Name of the model under the chip, whatever was laid over it.
+    pub(crate) fn model_name(&self) -> &str {
+        self.hardware_name.strip_suffix(changed::SUFFIX).unwrap_or(&self.hardware_name)
+    }
+
     /// What kind of converters the chip has.
     #[must_use]
     pub(crate) fn converter_kind(&self) -> ConverterKind {
-        self.resolved.hw.as_ref().map_or(ConverterKind::Fixed, kind_of)
+        self.resolved.hw.as_ref().map_or(ConverterKind::Fixed, |hw| kind_of(hw))
     }
 
     /// The configuration as one self-contained file, every default written out.

@@ -19,14 +19,25 @@ pub enum PerLayer<T> {
     Each(Vec<T>),
 }
 
-/// Structures of optional keys that refuse unknown ones.
+/// Structures of optional keys that refuse unknown ones. What stands above a key is its meaning, for `dalean keys` too.
 macro_rules! keys {
-    ($($(#[$doc:meta])* $name:ident { $($(#[$field_doc:meta])* $field:ident: $kind:ty,)* })*) => {$(
-        $(#[$doc])*
+    ($($(#[doc = $doc:literal])* $name:ident {
+        $($(#[doc = $meaning:literal])* $(#[cfg($when:meta)])? $field:ident: $kind:ty,)*
+    })*) => {$(
+        $(#[doc = $doc])*
         #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
         #[serde(deny_unknown_fields)]
         pub struct $name {
-            $($(#[$field_doc])* #[serde(skip_serializing_if = "Option::is_none")] pub $field: Option<$kind>,)*
+            $(
+                $(#[doc = $meaning])* $(#[cfg($when)])?
+                #[serde(skip_serializing_if = "Option::is_none")] pub $field: Option<$kind>,
+            )*
+        }
+
+        impl $name {
+            /// Each key and what it means.
+            pub(super) const MEANINGS: &'static [(&'static str, &'static str)] =
+                &[$($(#[cfg($when)])? (stringify!($field), concat!($($meaning),*)),)*];
         }
     )*};
 }
@@ -36,7 +47,7 @@ pub(super) use keys;
 keys! {
     /// An experiment file.
     ExperimentFile {
-        /// `classify`.
+        /// Who makes the error words.
         task: String,
         /// Seed of all draws.
         seed: u64,
@@ -47,7 +58,7 @@ keys! {
         /// Rule, rate, batch, epochs.
         learning: LearningFile,
         /// The chip: a model and what differs from it.
-        hw: HardwareFile,
+        hw: ChipFile,
     }
     /// `[data]`: a named set, or files of one's own.
     DataFile {
@@ -82,17 +93,17 @@ keys! {
     NetworkFile {
         /// Units of each hidden layer.
         hidden: Vec<usize>,
-        /// Output units: the number of classes, or 1 for two classes.
+        /// Output units.
         outputs: usize,
-        /// `sigmoid`, `relu`, `identity`, of hidden layers; outputs are sigmoid.
+        /// Function of hidden units; outputs are sigmoid.
         activation: String,
         /// Sigmoid width of each layer.
         alpha: PerLayer<f64>,
-        /// Weight of the level after the greatest, a power of two, of each layer.
+        /// Weight of the level after the greatest, of each layer.
         weight_max: PerLayer<f64>,
-        /// `none` or `rows`.
+        /// Whether a constant input is learnt from.
         bias: String,
-        /// `p`.
+        /// Which outputs are read.
         readout: String,
         /// Initial gain of excitatory and inhibitory arrays of hidden layers.
         init_gain: [f64; 2],
@@ -101,13 +112,13 @@ keys! {
     }
     /// `[learning]`.
     LearningFile {
-        /// `ed`, `ed_seed`, `kaneko`, `dfa`, `bp`.
+        /// The learning rule.
         rule: String,
         /// Passes over the training set.
         epochs: u32,
         /// Samples of an update.
         batch: i64,
-        /// `accumulate`, `replay`, `online`.
+        /// When a batch is written.
         mode: String,
         /// Rate, before multipliers.
         rate: f64,
@@ -115,21 +126,21 @@ keys! {
         rate_multipliers: PerLayer<f64>,
         /// Small factor beside the shift.
         rate_mantissa: i64,
-        /// `cosine` or `constant`.
+        /// How the rate falls over the run.
         decay: String,
-        /// `none`, `batch`, `running`.
+        /// What is subtracted from errors.
         centre: String,
-        /// `modulo`, `random_sparse`, `scalar_broadcast`, `random_dense`.
+        /// How errors reach hidden units.
         route: String,
-        /// Words a hidden unit adds (modulo).
+        /// Words a hidden unit adds.
         taps: usize,
         /// Shift of the sum of words.
         tap_shift: u32,
         /// Training images move by up to so many pixels.
         shift_pixels: u32,
-        /// `train`, or `all`: training and validation examples.
+        /// What is learnt from.
         train_on: String,
-        /// `best_validation` or `last`: the epoch whose state reads the test set.
+        /// The epoch whose state reads the test set.
         select: String,
         /// What a later program reads and no run uses.
         #[cfg(feature = "grown")]
@@ -176,17 +187,17 @@ keys! {
     }
     /// `[cell]`.
     CellFile {
-        /// Bits of a stored level, 1..=12.
+        /// Bits of a stored level.
         level_bits: i64,
-        /// Least level.
+        /// Least level: floor over ceiling is the conductance of an off cell over that of an on cell.
         floor: i64,
-        /// Greatest level; default `2^level_bits - 1`.
+        /// Greatest level.
         ceiling: i64,
-        /// `recoverable` or `absorbing`.
+        /// What becomes of a cell on the floor.
         floor_kind: String,
         /// Where the numbers come from.
         source: String,
-        /// `measured`, `fitted`, `assumed`.
+        /// How far to trust the numbers.
         kind: String,
     }
     /// `[tile]`.
@@ -195,24 +206,24 @@ keys! {
         rows: i64,
         /// Columns of a tile.
         columns: i64,
-        /// Tiles on the chip; default: as many as it takes.
+        /// Tiles on the chip.
         count: i64,
         /// Whether rows can be read while columns are driven.
         transposed_read: bool,
         /// Where the numbers come from.
         source: String,
-        /// `measured`, `fitted`, `assumed`.
+        /// How far to trust the numbers.
         kind: String,
     }
     /// `[drive]`.
     DriveFile {
-        /// Bits of a drive code, 1..=8.
+        /// Bits of a drive code.
         bits: i64,
-        /// `voltage`, `pulse_width` or `amplitude`.
+        /// How a drive code is put on a row.
         mode: String,
-        /// Bits a DAC applies at a time; follows from `phases` with `pulse_width`.
+        /// Bits a DAC applies at a time.
         dac_bits: i64,
-        /// Pulse width: time slots of a phase; default `2^dac_bits - 1`.
+        /// Pulse width: time slots of a phase.
         slots: i64,
         /// Pulse width: cycles of a slot.
         slot_cycles: i64,
@@ -220,7 +231,7 @@ keys! {
         phases: i64,
         /// Where the numbers come from.
         source: String,
-        /// `measured`, `fitted`, `assumed`.
+        /// How far to trust the numbers.
         kind: String,
     }
     /// `[lut]`.
@@ -229,35 +240,35 @@ keys! {
         bits: i64,
         /// Where the numbers come from.
         source: String,
-        /// `measured`, `fitted`, `assumed`.
+        /// How far to trust the numbers.
         kind: String,
     }
     /// `[error]`.
     ErrorFile {
-        /// Bits of an error word, 2..=9.
+        /// Bits of an error word.
         bits: i64,
         /// Where the numbers come from.
         source: String,
-        /// `measured`, `fitted`, `assumed`.
+        /// How far to trust the numbers.
         kind: String,
     }
     /// `[write]`.
     WriteFile {
-        /// Most pulses a write gives a cell, 1..=127.
+        /// Most pulses a write gives a cell.
         increment_max: i64,
-        /// Random bits of rounding: 0 (half-up), 8, 16.
+        /// Random bits of rounding.
         dither_bits: i64,
-        /// `per_cell` or `separable`.
+        /// Where the random bits of a cell come from.
         dither: String,
         /// Bits of the digital remainder behind a cell.
         residual_bits: i64,
-        /// `rounded` or `rank1`.
+        /// How sums become pulses.
         scheme: String,
-        /// Slots of a train (`rank1`).
+        /// Slots of a train.
         train_slots: i64,
         /// Where the numbers come from.
         source: String,
-        /// `measured`, `fitted`, `assumed`.
+        /// How far to trust the numbers.
         kind: String,
     }
     /// `[timing]`: cycles, in the words of docs/TILE.md.
@@ -278,17 +289,17 @@ keys! {
         bus_hops: i64,
         /// `T_W`: cycles of a pulse.
         pulse_cycles: i64,
-        /// `unary` or `amplitude`.
+        /// How many pulses a number of levels takes.
         pulses: String,
         /// Whether every pulse is followed by a read of what it did.
         verify: bool,
-        /// `W`: cells that can be pulsed at a time; default: a whole row of both banks.
+        /// `W`: cells that can be pulsed at a time.
         write_active_max: i64,
         /// Cycles of a digital action: 1, or the symbols of a digital clock on an optical chip.
         beat_cycles: i64,
         /// Where the numbers come from.
         source: String,
-        /// `measured`, `fitted`, `assumed`.
+        /// How far to trust the numbers.
         kind: String,
     }
     /// One physical number of `[energy]`, `[power]` or `[area]`; the unit is in its key.
@@ -301,7 +312,7 @@ keys! {
         high: f64,
         /// Where the numbers come from.
         source: String,
-        /// `measured`, `fitted`, `assumed`.
+        /// How far to trust the numbers.
         kind: String,
         /// How it follows the settings it belongs to: a law (`walden`, `linear`, ...), or one a setting.
         scales: ScalesFile,
@@ -312,15 +323,15 @@ keys! {
     }
     /// `[adc]` of finite converters.
     AdcTable {
-        /// Resolution, 2..=16.
+        /// Resolution.
         bits: i64,
-        /// `tracking`, `calibrated`, `full`, or a shift.
+        /// Where the range of a converter lies.
         range: RangeFile,
-        /// Shift added to the calibrated one: 3 up to 6 bits, 4 above. Of `calibrated` alone.
+        /// Shift added to the calibrated one.
         headroom: i64,
-        /// `never` or `epoch`. Of `calibrated` alone.
+        /// When it is calibrated again.
         recalibrate: String,
-        /// `digital` or `current`.
+        /// Where the banks are subtracted.
         subtract: String,
         /// Cycles of a conversion: `fixed` (as `timing.convert_cycles` says), `sar` (bits + 1 steps), `counter` and `ramp`
         /// (2^bits steps), `flash` (one step).
@@ -332,8 +343,40 @@ keys! {
         phase_bits: String,
         /// Where the numbers come from.
         source: String,
-        /// `measured`, `fitted`, `assumed`.
+        /// How far to trust the numbers.
         kind: String,
+    }
+}
+
+/// `hw = "reram"`, or a table: the chip of an experiment.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+#[serde(transparent)]
+pub struct ChipFile(pub HardwareFile);
+
+impl std::ops::Deref for ChipFile {
+    type Target = HardwareFile;
+
+    fn deref(&self) -> &HardwareFile {
+        &self.0
+    }
+}
+
+impl<'de> Deserialize<'de> for ChipFile {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct Either;
+        impl<'de> Visitor<'de> for Either {
+            type Value = ChipFile;
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str("the name of a hardware model, or a table of its keys")
+            }
+            fn visit_str<E: de::Error>(self, text: &str) -> Result<ChipFile, E> {
+                Ok(ChipFile(HardwareFile { model: Some(text.into()), ..HardwareFile::default() }))
+            }
+            fn visit_map<M: MapAccess<'de>>(self, map: M) -> Result<ChipFile, M::Error> {
+                HardwareFile::deserialize(de::value::MapAccessDeserializer::new(map)).map(ChipFile)
+            }
+        }
+        deserializer.deserialize_any(Either)
     }
 }
 

@@ -2,8 +2,10 @@
 
 use super::file::HardwareFile;
 use super::quantity::{Constants, constants_of};
+use super::wrong::text_error;
 use super::{ConfigError, chip};
 use crate::chip::hardware::Hardware;
+use crate::lab::near;
 
 /// The built-in models, by name, as their files are.
 macro_rules! models {
@@ -57,7 +59,8 @@ pub(super) fn model_text(name: &str) -> Result<String, ConfigError> {
     if let Some((_, text)) = BUILTIN.iter().find(|(builtin, _)| *builtin == name) {
         return Ok((*text).to_owned());
     }
-    let hint = format!("built-in models are {}", model_names().join(", "));
+    let near = near::hint(name, model_names());
+    let hint = format!("built-in models are {}{near}", model_names().join(", "));
     #[expect(clippy::disallowed_methods, reason = "models live in files")]
     std::fs::read_to_string(name).map_err(|error| ConfigError::Unreadable {
         path: name.into(),
@@ -68,8 +71,7 @@ pub(super) fn model_text(name: &str) -> Result<String, ConfigError> {
 
 /// Reads a model file: every key known, every table with a source.
 pub(super) fn model_file(name: &str, text: &str) -> Result<HardwareFile, ConfigError> {
-    let file: HardwareFile = toml::from_str(text)
-        .map_err(|e| ConfigError::Text { place: name.into(), error: e.to_string() })?;
+    let file: HardwareFile = toml::from_str(text).map_err(|error| text_error(name, &error))?;
     let wrong = |key: &str, found: &str, allowed: &str| ConfigError::Value {
         key: key.into(),
         found: found.into(),

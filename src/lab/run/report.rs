@@ -177,12 +177,14 @@ impl Parts<'_> {
         let first = sizes.first().map_or(0, |(_, [rows, _])| rows.saturating_sub(bias));
         let units = sizes.iter().map(|(_, [_, columns])| columns);
         let sizes: Vec<_> = std::iter::once(&first).chain(units).map(usize::to_string).collect();
+        let differs = self.config.differences_text();
         format!(
-            "{} by {}: {} on {}",
+            "{} by {}: {} on {}{}{differs}",
             self.config.data_name(),
             self.config.rule_name(),
             sizes.join("-"),
-            self.config.hardware_name
+            self.config.hardware_name,
+            if differs.is_empty() { "" } else { "; " }
         )
     }
 

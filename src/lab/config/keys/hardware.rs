@@ -1,0 +1,295 @@
+//! Keys of hardware models. A default is that of a model file that is silent; in an experiment, the model's own number.
+
+use super::KeyFileKind::Hardware;
+use super::{KeyEntry, KeyTable, KeyValues, flag, key, other, real, whole, words};
+use crate::lab::config::file::{
+    AdcTable, CellFile, DriveFile, ErrorFile, HardwareFile, LutFile, NumberFile, TileFile,
+    TimingFile, WriteFile,
+};
+
+const fn table(
+    path: &'static str,
+    about: &'static str,
+    meanings: &'static [(&'static str, &'static str)],
+    entries: &'static [KeyEntry],
+) -> KeyTable {
+    KeyTable { path, file: Hardware, about, meanings, entries }
+}
+
+pub(super) const TABLES: &[KeyTable] = &[
+    table("", "The model itself.", HardwareFile::MEANINGS, ROOT),
+    table("cell", "Cells.", CellFile::MEANINGS, CELL),
+    table("tile", "Physical arrays with their converters.", TileFile::MEANINGS, TILE),
+    table("drive", "Row drivers.", DriveFile::MEANINGS, DRIVE),
+    table(
+        "adc",
+        "Column converters: this table, or `adc = \"ideal\"`, which loses nothing.",
+        AdcTable::MEANINGS,
+        ADC,
+    ),
+    table("lut", "The table of the activation and its slope.", LutFile::MEANINGS, LUT),
+    table("error", "The error bus.", ErrorFile::MEANINGS, ERROR),
+    table("write", "How sums become pulses.", WriteFile::MEANINGS, WRITE),
+    table(
+        "timing",
+        "Cycles of what a tile does, in the words of docs/TILE.md; without it no cycles are counted.",
+        TimingFile::MEANINGS,
+        TIMING,
+    ),
+    table(
+        "energy.*",
+        "One physical number of `[energy]`, `[power]` or `[area]`; the unit is in its key.",
+        NumberFile::MEANINGS,
+        NUMBER,
+    ),
+];
+
+const PROVENANCE: [KeyEntry; 2] = [
+    other("source", "text").otherwise("a model file that lacks it is refused"),
+    words(
+        "kind",
+        &[
+            ("measured", "on silicon, or read from a cited source that did"),
+            ("fitted", "adjusted until a model met a published result"),
+            ("assumed", "a guess, a memory, or a number of another chip"),
+        ],
+    )
+    .otherwise("a model file that lacks it is refused"),
+];
+
+const ROOT: &[KeyEntry] = &[
+    other("model", "a name of `dalean hw list`, or a path").default("\"ideal\""),
+    other("name", "text"),
+    other("summary", "text"),
+    other("cell", "a table"),
+    other("tile", "a table"),
+    other("drive", "a table"),
+    other("adc", "\"ideal\" or a table").default("\"ideal\""),
+    other("lut", "a table"),
+    other("error", "a table"),
+    other("write", "a table"),
+    other("timing", "a table").otherwise("no cycles are counted"),
+    other("energy", "a table of physical numbers").otherwise("no energy is reckoned"),
+    other("power", "a table of physical numbers"),
+    other("area", "a table of physical numbers"),
+    other("node_nm", "nanometres"),
+    other("constants_for", "a table of settings").otherwise("numbers are for the chip as it is"),
+    other("modes", "a table of lists of settings, such as \"drive.bits=4\""),
+    other("not_simulated", "a table of texts"),
+];
+
+const CELL: &[KeyEntry] = &[
+    whole("level_bits", 1, 12).unit("bits").default("8"),
+    whole("floor", 0, 254).law("below the ceiling").unit("levels").default("0"),
+    whole("ceiling", 1, 255)
+        .law("above the floor, at most 2^level_bits - 1")
+        .unit("levels")
+        .otherwise("2^level_bits - 1"),
+    words(
+        "floor_kind",
+        &[
+            ("recoverable", "a cell on the floor is programmed as any other"),
+            ("absorbing", "a cell that reaches the floor is pruned: it stays there"),
+        ],
+    )
+    .default("\"recoverable\""),
+    PROVENANCE[0],
+    PROVENANCE[1],
+];
+
+const TILE: &[KeyEntry] = &[
+    whole("rows", 1, 32_768).unit("rows").default("256"),
+    whole("columns", 1, 32_768).unit("columns").default("256"),
+    whole("count", 1, 1 << 30)
+        .law("the network has to fit")
+        .unit("tiles")
+        .otherwise("as many as it takes"),
+    flag("transposed_read").default("false"),
+    PROVENANCE[0],
+    PROVENANCE[1],
+];
+
+const PULSE_WIDTH: &[&str] = &["hw.drive.mode=pulse_width"];
+
+const DRIVE: &[KeyEntry] = &[
+    whole("bits", 1, 8).unit("bits").default("8"),
+    words(
+        "mode",
+        &[
+            ("voltage", "slices of `dac_bits`, one after the other"),
+            ("pulse_width", "a pulse as long as the code, phase by phase"),
+            ("amplitude", "the amplitude of light: the whole code at once"),
+        ],
+    )
+    .default("\"voltage\""),
+    whole("dac_bits", 1, 8)
+        .law("at most drive.bits")
+        .unit("bits")
+        .otherwise("drive.bits; with \"pulse_width\" it follows from `phases`"),
+    whole("slots", 255, 100_000_000)
+        .law("at least 2^(bits of a phase) - 1")
+        .unit("slots")
+        .only("with drive.mode = \"pulse_width\"", PULSE_WIDTH)
+        .otherwise("2^(bits of a phase) - 1"),
+    whole("slot_cycles", 1, 392_156)
+        .law("a phase takes at most 100000000 cycles")
+        .unit("cycles")
+        .default("1")
+        .only("with drive.mode = \"pulse_width\"", PULSE_WIDTH),
+    whole("phases", 1, 8)
+        .law("at most drive.bits")
+        .default("1")
+        .only("with drive.mode = \"pulse_width\"", PULSE_WIDTH),
+    PROVENANCE[0],
+    PROVENANCE[1],
+];
+
+const FINITE: &[&str] = &["hw.adc.bits=8"];
+const CALIBRATED: &[&str] = &["hw.adc.bits=8", "hw.adc.range=calibrated"];
+
+const STEPS: &[&str] = &["hw.adc.bits=8", "hw.adc.converter=sar"];
+const PHASES: &[&str] =
+    &["hw.adc.bits=8", "hw.adc.converter=sar", "hw.drive.mode=pulse_width", "hw.drive.phases=2"];
+
+const ADC: &[KeyEntry] = &[
+    whole("bits", 2, 16).unit("bits").otherwise("the table needs it"),
+    other("range", "\"tracking\", \"calibrated\", \"full\", or a shift in 0..=40")
+        .default("\"tracking\"")
+        .only("", FINITE),
+    whole("headroom", 0, 16)
+        .unit("bits")
+        .default("4")
+        .otherwise("3 up to 6 bits")
+        .only("with adc.range = \"calibrated\"", CALIBRATED),
+    words(
+        "recalibrate",
+        &[("never", "once, before the first update"), ("epoch", "before each epoch")],
+    )
+    .default("\"never\"")
+    .only("with adc.range = \"calibrated\"", CALIBRATED),
+    words(
+        "subtract",
+        &[
+            ("digital", "each bank is converted, codes are subtracted"),
+            ("current", "the difference of the banks is converted"),
+        ],
+    )
+    .default("\"digital\"")
+    .only("", FINITE),
+    words(
+        "converter",
+        &[
+            ("fixed", "takes `timing.convert_cycles`, whatever its bits"),
+            ("sar", "bits + 1 steps: a comparison a bit, and one to sample"),
+            ("counter", "2^bits steps: counts"),
+            ("ramp", "2^bits steps: compares with a rising reference"),
+            ("flash", "one step: a comparator a code"),
+        ],
+    )
+    .otherwise("fixed")
+    .only("", FINITE),
+    whole("step_cycles", 1, 100_000_000)
+        .unit("cycles")
+        .default("1")
+        .only("with an adc.converter that steps", STEPS),
+    words(
+        "phase_bits",
+        &[
+            ("owed", "the bits of the output that earlier phases have not carried, at least one"),
+            ("all", "all bits, in each phase"),
+        ],
+    )
+    .default("\"owed\"")
+    .only("with such a converter and several drive.phases", PHASES),
+    PROVENANCE[0],
+    PROVENANCE[1],
+];
+
+const LUT: &[KeyEntry] =
+    &[whole("bits", 2, 14).unit("bits").default("10"), PROVENANCE[0], PROVENANCE[1]];
+
+const ERROR: &[KeyEntry] =
+    &[whole("bits", 2, 9).unit("bits").default("8"), PROVENANCE[0], PROVENANCE[1]];
+
+const WRITE: &[KeyEntry] = &[
+    whole("increment_max", 1, 127).unit("pulses").default("7"),
+    key("dither_bits", KeyValues::Choice(&[0, 8, 16]))
+        .unit("bits")
+        .default("8")
+        .otherwise("0 rounds halves up"),
+    words(
+        "dither",
+        &[
+            ("per_cell", "a word for each cell"),
+            ("separable", "a word for each row and each column, added"),
+        ],
+    )
+    .default("\"per_cell\"")
+    .only("with write.dither_bits above 0", &["hw.write.dither_bits=8"]),
+    whole("residual_bits", 0, 15).unit("bits").default("0"),
+    words(
+        "scheme",
+        &[
+            ("rounded", "sums are shifted and rounded with a random word"),
+            ("rank1", "coincidences of two random trains, one sample at a time"),
+        ],
+    )
+    .default("\"rounded\""),
+    key("train_slots", KeyValues::PowerOfTwo(1, 4))
+        .law("at most write.increment_max")
+        .unit("slots")
+        .otherwise("the greatest power of two up to write.increment_max, at most 32")
+        .only("with write.scheme = \"rank1\"", &["hw.write.scheme=rank1", "learning.mode=replay"]),
+    PROVENANCE[0],
+    PROVENANCE[1],
+];
+
+const COUNTED: &[&str] = &["hw.timing.clock_mhz=1000"];
+
+const TIMING: &[KeyEntry] = &[
+    real("clock_mhz", 0.001, 1e6).unit("MHz").otherwise("the table needs it"),
+    whole("settle_cycles", 1, 100_000_000)
+        .law("0 too with drive.mode = \"pulse_width\"")
+        .unit("cycles")
+        .default("1")
+        .only("", COUNTED),
+    whole("convert_cycles", 1, 100_000_000)
+        .law("of fixed converters: others have adc.step_cycles")
+        .unit("cycles")
+        .default("1")
+        .only("", COUNTED),
+    whole("columns_per_adc", 1, 32_768).unit("columns").default("1").only("", COUNTED),
+    flag("overlap").default("false").only("", COUNTED),
+    whole("lanes", 1, 32_768).unit("columns").default("1").only("", COUNTED),
+    whole("bus_hops", 0, 1_000_000).unit("cycles").default("0").only("", COUNTED),
+    whole("pulse_cycles", 1, 100_000_000).unit("cycles").default("1").only("", COUNTED),
+    words(
+        "pulses",
+        &[
+            ("unary", "as many pulses as levels, one after the other"),
+            ("amplitude", "one pulse whose height is the number of levels"),
+        ],
+    )
+    .default("\"unary\"")
+    .only("", COUNTED),
+    flag("verify").default("false").only("", COUNTED),
+    whole("write_active_max", 1, 65_536)
+        .unit("cells")
+        .only("", COUNTED)
+        .otherwise("a whole row of both banks"),
+    whole("beat_cycles", 1, 1_000_000).unit("cycles").default("1").only("", COUNTED),
+    PROVENANCE[0],
+    PROVENANCE[1],
+];
+
+const NUMBER: &[KeyEntry] = &[
+    other("low", "a number of 0 or more").law("low <= typical <= high"),
+    other("typical", "a number of 0 or more").law("low <= typical <= high"),
+    other("high", "a number of 0 or more").law("low <= typical <= high"),
+    PROVENANCE[0],
+    PROVENANCE[1],
+    other("scales", "a law, or a table of laws by setting: constant, linear, walden, schreier, comparators, steps")
+        .otherwise("at another setting it prices nothing"),
+    other("at", "a table of settings, such as { adc_bits = 8 }").otherwise("those of its model"),
+    other("node_nm", "nanometres").otherwise("those of its model"),
+];
