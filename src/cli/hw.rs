@@ -217,7 +217,8 @@ fn model_json(model: &Model, config: &Config) -> serde_json::Value {
         .iter()
         .map(|c| {
             json!({"key": c.key, "low": c.value[0], "typical": c.value[1], "high": c.value[2],
-                "kind": c.kind, "source": c.source})
+                "kind": c.kind, "source": c.source, "node_nm": c.node_nm,
+                "scaled_by": c.scaled_by(), "not_of_this_chip": c.not_here()})
         })
         .collect();
     let times: Vec<_> = config
@@ -243,7 +244,7 @@ fn changed(model: &str, settings: &[String]) -> Result<Config, Failure> {
 }
 
 fn show(model: &Model, config: &Config, quiet: bool) {
-    say(&format!("{}: {}\n", model.name, model.summary));
+    say(&format!("{}: {}\n", config.hardware_name, config.hardware_summary()));
     for (name, value) in numbers(&config.hardware) {
         say(&format!("  {name:16} {value}"));
     }

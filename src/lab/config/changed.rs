@@ -355,6 +355,8 @@ mod tests {
                 "`conversion` belongs to adc_bits, converter",
             ),
             ("hw.energy.conversion_pj.at={ lut_bits = 3 }", "speaks of lut_bits"),
+            ("hw.tile.kind=guess", "`hw.tile.kind` is \"guess\""),
+            ("hw.adc.kind=sar", "adc.converter = \"sar\""),
             ("hw.energy.conversion_pj.scales=cubic", "a law (constant, linear, walden"),
         ] {
             let found = error("reram", &[setting]);

@@ -6,6 +6,7 @@ use std::fmt::Display;
 
 use super::changed::{self, UnderModel};
 use super::file::{ChipFile, DataFile, ExperimentFile, LearningFile, NetworkFile, PerLayer};
+use super::hardware::check_marks;
 use super::law::{kind_of, settings};
 use super::quantity::{Constants, constants_of};
 use super::{ConfigError, Sources, chip, data};
@@ -173,6 +174,7 @@ pub(super) fn config(mut file: ExperimentFile, model: &UnderModel) -> Result<Con
     let seed = *file.seed.get_or_insert(1);
     let ChipFile(hw) = file.hw.get_or_insert_with(ChipFile::default);
     let hardware = chip::resolve(hw, "hw.")?;
+    check_marks(hw, "hw.")?;
     changed::settle(hw, model, &settings(&hardware, kind_of(hw)));
     let constants = constants_of(hw, &hardware, "hw.")?;
     let hardware_name = hw.name.get_or_insert_with(|| "unnamed".into()).clone();
@@ -274,6 +276,12 @@ impl Config {
     #[must_use]
     pub const fn constants(&self) -> &Constants {
         &self.constants
+    }
+
+    /// What the chip is, in a sentence, and what was changed of its model.
+    pub(crate) fn hardware_summary(&self) -> &str {
+        let hw = self.resolved.hw.as_ref();
+        hw.and_then(|hw| hw.summary.as_deref()).unwrap_or_default()
     }
 
     /// Name of the model under the chip, whatever was laid over it.

@@ -103,6 +103,20 @@ pub(super) fn model_file(name: &str, text: &str) -> Result<HardwareFile, ConfigE
     Ok(file)
 }
 
+/// Checks the marks of tables that have one, whatever laid them over a model.
+pub(super) fn check_marks(file: &HardwareFile, prefix: &str) -> Result<(), ConfigError> {
+    for (table, _, kind) in provenance(file) {
+        if let Some(other) = kind.filter(|mark| !["measured", "fitted", "assumed"].contains(mark)) {
+            return Err(ConfigError::Value {
+                key: format!("{prefix}{table}.kind"),
+                found: format!("is \"{other}\""),
+                allowed: "it says how far to trust the numbers: measured, fitted or assumed".into(),
+            });
+        }
+    }
+    Ok(())
+}
+
 /// `(table, source, kind)` of every table that is there.
 fn provenance(file: &HardwareFile) -> Vec<(&'static str, Option<&str>, Option<&str>)> {
     let mut all = Vec::new();

@@ -165,8 +165,7 @@ pub const QUANTITIES: [Quantity; 24] = [
         "V^2 G t lies between 0.1 V, 10 nS, 1 ns and 0.5 V, 0.2 mS, 1 us",
     )
     .of(&[Setting::ReadNs, Setting::DacBits]),
-    energy("hold", Event::Holds, [1e-18, 1e-12], "C V^2 of some femtofarads")
-    .of(&[Setting::AdcBits]),
+    energy("hold", Event::Holds, [1e-18, 1e-12], "C V^2 of some femtofarads"),
     energy(
         "conversion",
         Event::Conversions,
@@ -310,6 +309,15 @@ pub struct Constant {
 }
 
 impl Constant {
+    /// The law that brought it to the chip's setting, if one did.
+    #[must_use]
+    pub fn scaled_by(&self) -> Option<&str> {
+        match &self.standing {
+            Standing::Scaled(law) => Some(law),
+            Standing::Stated | Standing::NotHere(_) => None,
+        }
+    }
+
     /// Why it prices nothing here, if it does not.
     #[must_use]
     pub fn not_here(&self) -> Option<&str> {
