@@ -19,6 +19,13 @@ use crate::lab::near;
 use crate::lab::run::Machine;
 use out::say;
 
+/// A line on standard error, as `eprintln!`, which would end the program where nobody hears it.
+macro_rules! tell {
+    ($($words:tt)*) => {
+        $crate::cli::note(&format!($($words)*))
+    };
+}
+
 mod bench;
 mod data;
 mod export;
@@ -169,6 +176,24 @@ impl Shared {
     }
 }
 
+/// Where the files of a run lie now.
+#[derive(Debug, Clone, Args)]
+struct Moved {
+    /// Where the run's own data are now: its file, or the folder that holds its files under their names. What is there
+    /// has to be what the run was made with
+    #[arg(long, value_name = "PATH")]
+    data: Option<PathBuf>,
+}
+
+impl Moved {
+    fn root(&self, root: DataRoot) -> DataRoot {
+        match &self.data {
+            Some(place) => root.with_files(place),
+            None => root,
+        }
+    }
+}
+
 /// The back end of a name.
 fn kernel(name: &str) -> Result<Backend, Failure> {
     Backend::named(name)
@@ -184,34 +209,48 @@ fn usage(message: &str) -> Failure {
     Failure { code: 2, message: message.into() }
 }
 
-/// Reads the configuration a command names.
+/// Reads the configuration a command names: without a file, what users get by saying nothing, the built-in digits.
 fn configuration(
     file: Option<&PathBuf>,
     hw: Option<&str>,
     settings: &[String],
     seed: Option<u64>,
 ) -> Result<Config, Failure> {
-    let (name, text) = match file {
-        None => {
-            ("the built-in example".to_owned(), include_str!("../examples/digits.toml").to_owned())
-        }
+    let read = match file {
+        None => None,
         Some(path) => {
             #[expect(clippy::disallowed_methods, reason = "the file the user named")]
             let text = std::fs::read_to_string(path).map_err(|error| {
                 let hint = "name an experiment file, such as examples/mnist.toml";
                 usage(&format!("cannot read {}: {error}; {hint}", path.display()))
             })?;
-            (path.display().to_string(), text)
+            Some((path.display().to_string(), text))
         }
     };
-    let experiment = Some((&*name, &*text));
+    let experiment = read.as_ref().map(|(name, text)| (&**name, &**text));
     let sources = Sources { experiment, hardware: hw, settings, seed, ..Sources::default() };
     config::load(&sources).map_err(|error| usage(&error.to_string()))
+}
+
+/// Prints a line to standard error; that nobody hears it, or that its disk is full, is no reason to end.
+fn note(line: &str) {
+    use std::io::Write;
+    let _ = writeln!(std::io::stderr(), "{line}");
+}
+
+/// Turns the end of a file's allowed size into an error of the write that met it, which says where and what to do.
+fn hear_file_limits() {
+    #[cfg(unix)]
+    {
+        let heard = std::sync::Arc::default();
+        let _ = signal_hook::flag::register(signal_hook::consts::SIGXFSZ, heard);
+    }
 }
 
 /// Runs the program and gives its exit code.
 #[must_use]
 pub fn main() -> ExitCode {
+    hear_file_limits();
     let cli = match Cli::try_parse() {
         Ok(cli) => cli,
         Err(error) => return unparsed(&error),
@@ -259,7 +298,7 @@ pub fn main() -> ExitCode {
             }
             let red = std::io::stderr().is_terminal();
             let word = if red { "\u{1b}[31merror\u{1b}[0m" } else { "error" };
-            eprintln!("{word}: {message}");
+            note(&format!("{word}: {message}"));
             ExitCode::from(code)
         }
     }
@@ -278,7 +317,7 @@ fn unparsed(error: &clap::Error) -> ExitCode {
     match out::fault() {
         None => ExitCode::SUCCESS,
         Some(message) => {
-            eprintln!("error: {message}");
+            note(&format!("error: {message}"));
             ExitCode::from(1)
         }
     }
@@ -294,7 +333,7 @@ mod tests {
     }
 
     #[test]
-    fn the_built_in_example_is_valid() {
+    fn saying_nothing_is_valid() {
         configuration(None, None, &[], None).unwrap();
     }
 }

@@ -75,6 +75,10 @@ tests() {
     cargo test "${rtl[@]}" --lib --bins --test it --test tidy
     cargo test "${rtl[@]}" --doc
 
+    # a few hundred starts; tests/deep.sh attack does thousands
+    step "an attack on the program"
+    cargo test "${rtl[@]}" --test attack -- --nocapture
+
     step "the tile in SystemVerilog against the tile in Rust"
     if [[ ${#rtl[@]} -gt 0 ]]; then
         cargo test "${rtl[@]}" --test rtl -- --nocapture

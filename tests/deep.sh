@@ -10,10 +10,13 @@
 #   faults     src/chip, src/learn, src/lab/store            plants faults into the sources; the laws must notice
 #   rtl        hw_models/rtl, src/chip/engine/tick/tile      plants faults into the SystemVerilog
 #   emulated   src/chip/crossbar/kernel                      AVX-512 and AMX on an emulated processor
+#   attack     src/cli, src/lab                              thousands of starts over damaged files, full disks, limits, kills
 #   grown      src/lab, src/chip/ledger.rs                   the program with more keys, events and columns
+#   extending  docs/EXTENDING.md                             its changes, applied to a copy, compiled and trained with
+#   defaults   hw_models, src/lab/config, src/chip/engine    every chip and converter width trains by default, three seeds
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
-known=(release cases faults rtl emulated grown)
+known=(release cases faults rtl emulated attack grown extending defaults)
 chosen=("$@")
 [[ ${#chosen[@]} -gt 0 ]] || chosen=("${known[@]}")
 for name in "${chosen[@]}"; do
@@ -38,7 +41,10 @@ for name in "${chosen[@]}"; do
             cargo build --release
             tests/emulated.sh
             ;;
+        extending) cargo test --test it extending -- --ignored ;;
+        attack) ATTACK_STARTS="${ATTACK_STARTS:-4000}" cargo test --release --test attack -- --nocapture ;;
         grown) cargo test --features grown --test it golden_run ;;
+        defaults) cargo test --release --test it defaults -- --include-ignored --nocapture ;;
     esac
     printf '== %s: passed in %d s\n' "$name" $((SECONDS - before))
 done

@@ -31,6 +31,7 @@ mod currents;
 mod each;
 mod error;
 mod forward;
+mod mute;
 #[cfg(test)]
 mod pairs;
 mod passes;
@@ -221,14 +222,16 @@ pub struct Engine {
     potentiation_only: bool,
     /// What is told of the pulses of a write.
     collect: Collect,
-    /// Rate mantissa.
-    mantissa: u32,
+    /// Small factor of the rate of each layer.
+    mantissas: Vec<u32>,
     unit: ErrorUnit,
     layers: Vec<Layer>,
     /// What units hand on and how steep they are there, by layer.
     tables: Vec<LookUp>,
     registers: Vec<Registers>,
     currents: Vec<Currents>,
+    /// What layers said while they were evaluated.
+    said: Vec<mute::Said>,
     /// Sums of levels of each row, by layer and array; forgotten when a level moves.
     row_sums: Vec<Option<Vec<Vec<i64>>>>,
     samples: usize,
@@ -268,7 +271,7 @@ impl Engine {
             seed,
             potentiation_only: false,
             collect,
-            mantissa: 1,
+            mantissas: vec![1; count],
             unit: ErrorUnit::new(
                 Centre::None,
                 hardware.digital.error_bits,
@@ -276,6 +279,7 @@ impl Engine {
             ),
             registers: vec![Registers::default(); layers.len()],
             currents: vec![[[0; 2]; 2]; layers.len()],
+            said: vec![mute::Said::default(); layers.len()],
             row_sums: vec![None; layers.len()],
             tables,
             layers,
@@ -306,15 +310,19 @@ impl Engine {
         self.potentiation_only = only;
     }
 
-    /// Sets the small factor of the rate, 1..=15.
-    pub const fn set_mantissa(&mut self, mantissa: u32) {
-        self.mantissa = mantissa;
+    /// Sets the small factor of the rate of each layer, 1..=15.
+    ///
+    /// # Panics
+    /// When there is not one a layer.
+    pub fn set_mantissas(&mut self, mantissas: &[u32]) {
+        assert!(mantissas.len() == self.layers.len(), "one mantissa a layer");
+        self.mantissas = mantissas.to_vec();
     }
 
-    /// Small factor of the rate.
+    /// Small factor of the rate of each layer.
     #[must_use]
-    pub const fn mantissa(&self) -> u32 {
-        self.mantissa
+    pub fn mantissas(&self) -> &[u32] {
+        &self.mantissas
     }
 
     /// Whether writes only potentiate.
@@ -342,9 +350,16 @@ impl Engine {
         }
     }
 
-    /// Starts recording operations, or stops and gives what was executed since drives were last loaded.
+    /// Starts recording operations, or stops and gives what was executed since the last [`Engine::begin_update`].
     pub fn record(&mut self, on: bool) -> Vec<Recorded> {
         std::mem::replace(&mut self.tape, on.then(Vec::new)).unwrap_or_default()
+    }
+
+    /// What was recorded before belongs to another update.
+    pub fn begin_update(&mut self) {
+        if let Some(tape) = &mut self.tape {
+            tape.clear();
+        }
     }
 
     /// The chip.
@@ -448,9 +463,6 @@ impl Engine {
     /// When the numbers do not have the shape the operation says: tasks and rules are our own code.
     pub fn execute(&mut self, operation: &Operation<'_>) {
         if let Some(tape) = &mut self.tape {
-            if matches!(operation, Operation::LoadDrives { .. }) {
-                tape.clear();
-            }
             tape.push(Recorded::new(operation));
         }
         match *operation {

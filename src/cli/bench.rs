@@ -140,7 +140,7 @@ pub(super) fn execute(args: &BenchArgs) -> Done {
     let wanted = |section: &&Section| args.only.is_empty() || args.only.contains(section);
     for section in sections.iter().filter(wanted) {
         if !args.json && !args.quiet {
-            eprintln!("measuring {} ...", section.name());
+            tell!("measuring {} ...", section.name());
         }
         for table in section.measure(&plan) {
             if args.json {

@@ -118,7 +118,7 @@ fn fetch(name: &str, from: &str, data_dir: Option<PathBuf>, json: bool, quiet: b
         if json {
             say(&json!({"event": "fetch", "message": line}).to_string());
         } else if !quiet {
-            eprintln!("{}{line}", if live { "\r\u{1b}[K" } else { "" });
+            tell!("{}{line}", if live { "\r\u{1b}[K" } else { "" });
         }
     };
     let used = data::fetch(set, &origin, &root, &mut tell)?;

@@ -1,7 +1,5 @@
 //! `export`: the table of a sweep as a file.
 
-use std::fs::File;
-use std::io::BufWriter;
 use std::path::PathBuf;
 
 use clap::Args;
@@ -10,8 +8,8 @@ use serde_json::json;
 use super::out::print;
 use super::sweep::store_path;
 use super::{Done, Failure, say, usage};
-use crate::lab::store::folder::write_whole;
 use crate::lab::store::index::Store;
+use crate::lab::store::place::write_out;
 use crate::lab::sweep::{self, SweepError};
 use crate::lab::table::Format;
 
@@ -54,19 +52,22 @@ pub(super) fn execute(args: &ExportArgs) -> Done {
         code: 1,
         message: format!("cannot write {place}: {error}"),
     };
+    if results.lost > 0 {
+        tell!(
+            "warning: {} points were finished, but their folders are gone; `dalean sweep` does them again",
+            results.lost
+        );
+    }
+    // the whole table first, then its place: half a table is none
+    let mut bytes = Vec::new();
+    results.table.write(format, &mut bytes).map_err(|e| failure("the table", &e))?;
     match &args.out {
         None => {
-            let mut bytes = Vec::new();
-            results.table.write(format, &mut bytes).map_err(|e| failure("standard output", &e))?;
             print(&bytes);
         }
         Some(out) => {
             let place = out.display().to_string();
-            let write = |file: &mut File| {
-                let out = BufWriter::new(file);
-                results.table.write(format, out).map_err(std::io::Error::other)
-            };
-            write_whole(out, write).map_err(|e| failure(&place, &e))?;
+            write_out(out, &bytes).map_err(|e| failure(&place, &e))?;
             let (points, finished) = (results.table.len(), results.finished);
             if args.json {
                 say(&json!({"event": "done", "sweep": record.name, "file": place,

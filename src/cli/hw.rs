@@ -9,8 +9,8 @@ use serde_json::json;
 use super::{Done, Failure, known, say, usage};
 use crate::chip::hardware::{Adc, AdcRange, Hardware, PulseCode, Subtract, Timing};
 use crate::lab::config::{
-    self, Config, Constant, CostTable, Model, Sources, Standing, builtin_models, load_model,
-    model_names,
+    self, Config, Constant, CostTable, Model, Sources, Standing, absent_words, builtin_models,
+    load_model, model_names,
 };
 use crate::lab::price::{Convention, bounds, figures, peak, prefixed};
 
@@ -179,21 +179,26 @@ fn new(name: &Path, json: bool, quiet: bool) -> Done {
     Ok(())
 }
 
-fn check(model: &str, json: bool, quiet: bool) -> Done {
-    let model = load_model(model).map_err(|e| usage(&e.to_string()))?;
+fn check(name: &str, json: bool, quiet: bool) -> Done {
+    let model = load_model(name).map_err(|e| usage(&e.to_string()))?;
     let complaints = model.constants.complaints();
     if !complaints.is_empty() {
         return Err(Failure { code: 1, message: complaints.join("\n") });
     }
     let numbers = model.constants.iter().count();
+    let config = changed(name, &[])?;
+    let (on_off, absent) = (on_off(&config.hardware), config.absent());
     if json {
-        say(&json!({"event": "done", "model": model.name, "valid": true, "numbers": numbers})
-            .to_string());
+        say(&json!({"event": "done", "model": model.name, "valid": true, "numbers": numbers,
+            "on_off": on_off, "not_simulated": absent})
+        .to_string());
     } else if !quiet {
         say(&format!(
             "{}: valid; every table has a source, {numbers} physical numbers lie where they can",
             model.name
         ));
+        say(&format!("on/off {on_off}"));
+        say(&format!("{}: dalean hw show {name}", absent_words(&absent)));
     }
     Ok(())
 }
@@ -218,7 +223,8 @@ fn model_json(model: &Model, config: &Config) -> serde_json::Value {
         .map(|c| {
             json!({"key": c.key, "low": c.value[0], "typical": c.value[1], "high": c.value[2],
                 "kind": c.kind, "source": c.source, "node_nm": c.node_nm,
-                "scaled_by": c.scaled_by(), "not_of_this_chip": c.not_here()})
+                "class": c.quantity.class().name(), "scaled": c.scaled(),
+                "not_priced_here": c.not_here()})
         })
         .collect();
     let times: Vec<_> = config
@@ -233,7 +239,7 @@ fn model_json(model: &Model, config: &Config) -> serde_json::Value {
         .map(|(name, value)| (name.to_owned(), json!(value)))
         .collect();
     json!({"event": "model", "name": model.name, "summary": model.summary, "numbers": numbers,
-        "times": times, "constants": constants, "not_simulated": config.not_simulated,
+        "times": times, "constants": constants, "not_simulated": config.absent(),
         "toml": model.text})
 }
 
@@ -271,11 +277,10 @@ fn show(model: &Model, config: &Config, quiet: bool) {
             say(&format!("  {:16} {}", constant.quantity.name, constant_text(constant, unit)));
         }
     }
-    if !config.not_simulated.is_empty() {
-        say("\nNot simulated:");
-    }
-    for (what, how) in &config.not_simulated {
-        say(&format!("  {what}: {how}"));
+    let absent = config.absent();
+    say(&format!("\n{}:", absent_words(&absent)));
+    for one in &absent {
+        say(&format!("  {}: {}", one.name(), one.text()));
     }
     if !quiet {
         say(&format!("\n{}", model.text.trim_end()));
@@ -295,8 +300,8 @@ fn constant_text(constant: &Constant, unit: &str) -> String {
     let node = constant.node_nm.map_or_else(String::new, |node| format!(", {node} nm"));
     let standing = match &constant.standing {
         Standing::Stated => String::new(),
-        Standing::Scaled(law) => format!(", scaled by {law}"),
-        Standing::NotHere(why) => return format!("not of this chip: {why}"),
+        Standing::Scaled(law) => format!(", by law: {law}"),
+        Standing::NotHere(why) => return format!("not priced for this setting: {why}"),
     };
     format!("{value:36} {kind}{node}{standing}")
 }
@@ -381,6 +386,25 @@ fn show_peak(args: &PeakArgs) -> Done {
     Ok(())
 }
 
+/// What the floor of a cell is as a ratio of conductances.
+fn on_off(hardware: &Hardware) -> String {
+    let window = hardware.cell.window;
+    let (floor, ceiling) = (window.floor(), window.ceiling());
+    if floor > 0 {
+        let ratio = f64::from(ceiling) / f64::from(floor);
+        return format!("{ratio:.1} to 1: hw.cell.ceiling over hw.cell.floor");
+    }
+    // the nearest floor of ten to one that a cell can have
+    let tenth = (u32::from(ceiling) + 5) / 10;
+    match tenth {
+        0 => "without end: level 0 conducts nothing".into(),
+        floor => format!(
+            "without end: level 0 conducts nothing; {:.1} to 1 with hw.cell.floor = {floor}",
+            f64::from(ceiling) / f64::from(floor)
+        ),
+    }
+}
+
 fn numbers(hardware: &Hardware) -> Vec<(&'static str, String)> {
     let h = hardware;
     let converter = match h.adc {
@@ -402,6 +426,7 @@ fn numbers(hardware: &Hardware) -> Vec<(&'static str, String)> {
     let window = (h.cell.window.floor(), h.cell.window.ceiling());
     vec![
         ("cell", format!("{} bits, levels {}..={}", h.cell.level_bits.get(), window.0, window.1)),
+        ("on/off", on_off(h)),
         ("tile", format!("{} x {} cells a bank", h.tile.rows, h.tile.columns)),
         (
             "drive",

@@ -6,27 +6,33 @@ use clap::Args;
 use serde_json::json;
 
 use super::{Done, Shared, configuration, known, say};
+use crate::lab::config::{Config, absent_words};
 use crate::lab::price::{Bill, Convention, EnergySplit, Group, Images, areas, bounds, prefixed};
-use crate::lab::run::{self, Act, Profile};
+use crate::lab::run::{self, Act, ModeUse, Profile, Repriced};
+
+mod tables;
 
 /// Assumed constants named in a table.
 const NAMED: usize = 5;
 /// Share of the total from which memory of digital sums is explained.
 const SHOWN: f64 = 0.05;
 /// What that memory is, and what does without.
-const SUMS: &str = "a product is added to a 32-bit sum, 64 bits out and in; learning.mode = \"online\" or \"replay\" has none";
+const SUMS: &str = "a product is added to a 32-bit sum, 64 bits out and in; learning.mode = \"online\" or \"replay\" does without";
 
 #[derive(Debug, Args)]
 pub(super) struct PriceArgs {
     /// Folder of a finished run
     #[arg(value_hint = clap::ValueHint::DirPath)]
     run: PathBuf,
-    /// Constants of another hardware model: a built-in name or a file
+    /// Constants of another hardware model: a built-in name or a file (several: side by side)
     #[arg(long, value_name = "FILE", value_parser = known::models(), hide_possible_values = true)]
-    hw: Option<String>,
-    /// One JSON object on standard output
+    hw: Vec<String>,
+    /// One JSON object a model on standard output
     #[arg(long)]
     json: bool,
+    /// Print only totals
+    #[arg(long, short)]
+    quiet: bool,
 }
 
 #[derive(Debug, Args)]
@@ -47,26 +53,46 @@ pub(super) struct ProfileArgs {
 }
 
 pub(super) fn price(args: &PriceArgs) -> Done {
-    let run = run::reprice(&args.run, args.hw.as_deref())?;
-    let bill = run.bill();
+    let priced = |hw: Option<&String>| run::reprice(&args.run, hw.map(String::as_str));
+    let runs: Vec<Repriced> = match &*args.hw {
+        [] => vec![priced(None)?],
+        models => models.iter().map(|hw| priced(Some(hw))).collect::<Result<_, _>>()?,
+    };
     if args.json {
-        let changes: Vec<_> = run
-            .changes
-            .iter()
-            .map(|change| {
-                let events: Vec<_> = change.events.iter().map(|event| event.name()).collect();
-                json!({"key": change.key, "events": events, "time": change.time})
-            })
-            .collect();
-        let mut object = json!({"event": "price", "run": args.run.display().to_string(),
-            "made_on": run.made_on, "priced_as": run.priced_as, "changes": changes,
-            "cycles": run.ledger.elapsed()});
-        merge(&mut object, bill.to_json(&run.images));
-        say(&object.to_string());
+        for run in &runs {
+            say(&price_json(args, run).to_string());
+        }
         return Ok(());
     }
-    say(&format!("run on {}, constants of {}", run.made_on, run.priced_as));
-    if !run.changes.is_empty() {
+    match &*runs {
+        [run] => show_price(run, args.quiet),
+        runs => tables::side_by_side(runs),
+    }
+    if !args.quiet {
+        say(&format!("{}: see the page of the run", absent_words(&runs[0].absent)));
+    }
+    Ok(())
+}
+
+fn price_json(args: &PriceArgs, run: &Repriced) -> serde_json::Value {
+    let changes = run.changes.iter().map(|change| {
+        let events: Vec<_> = change.events.iter().map(|event| event.name()).collect();
+        json!({"key": change.key, "events": events, "time": change.time})
+    });
+    let mut object = json!({"event": "price", "run": args.run.display().to_string(),
+        "made_on": run.made_on, "priced_as": run.priced_as,
+        "changes": changes.collect::<Vec<_>>(), "cycles": run.ledger.elapsed(),
+        "not_simulated": run.absent});
+    merge(&mut object, run.bill().to_json(&run.images));
+    object
+}
+
+fn show_price(run: &Repriced, quiet: bool) {
+    let bill = run.bill();
+    if !quiet {
+        say(&format!("run on {}, constants of {}", run.made_on, run.priced_as));
+    }
+    if !run.changes.is_empty() && !quiet {
         let keys: Vec<_> = run.changes.iter().map(|change| change.key).collect();
         say(&format!(
             "the chips differ in {}: what that touches is left out below; to count it, train on {}",
@@ -76,6 +102,10 @@ pub(super) fn price(args: &PriceArgs) -> Done {
     }
     if let (Some(cycles), Some(seconds)) = (run.ledger.elapsed(), bill.seconds_total()) {
         say(&format!("time     {cycles} cycles, {}", prefixed(seconds, "s")));
+    }
+    if quiet {
+        say(&format!("energy   {}", bill.total().words()));
+        return;
     }
     show_energy(&bill, &run.images);
     for (heading, groups) in [
@@ -87,7 +117,6 @@ pub(super) fn price(args: &PriceArgs) -> Done {
         show_groups(heading, &groups, bill.total().joules[1]);
     }
     show_missing(&bill);
-    Ok(())
 }
 
 fn merge(object: &mut serde_json::Value, more: serde_json::Value) {
@@ -103,9 +132,11 @@ fn show_energy(bill: &Bill<'_>, images: &Images) {
     if let Some(share) = bill.sums_share().filter(|&share| share >= SHOWN) {
         say(&format!("  {:.0} % is memory of the digital sums: {SUMS}", 100.0 * share));
     }
-    for one in bill.per_image(images) {
+    // of a single one, the total is said above
+    for one in bill.per_image(images).into_iter().filter(|one| one.images > 1) {
         let time = one.seconds.map_or_else(String::new, |s| format!(", {}", prefixed(s, "s")));
-        say(&format!("to {}, of {}: {}{time}", one.doing(), one.images, one.total.words()));
+        let (doing, total) = (one.doing(), one.total.words());
+        say(&format!("to {doing}, the mean of {}: {total}{time}", one.images));
         show_split(&one.split, one.total.joules[1]);
     }
     show_groups("by component", &bill.by_component(), total.joules[1]);
@@ -141,6 +172,9 @@ fn show_groups(heading: &str, groups: &[Group], total: f64) {
 }
 
 fn show_missing(bill: &Bill<'_>) {
+    for (key, law) in &bill.scaled {
+        say(&format!("by law: {key}: {law}"));
+    }
     for missing in &bill.missing {
         let count = missing.count.map_or_else(String::new, |count| format!(" ({count})"));
         say(&format!("no price: {}{count}: {}", missing.what, missing.why));
@@ -152,9 +186,14 @@ pub(super) fn profile(args: &ProfileArgs) -> Done {
     let config = configuration(args.file.as_ref(), args.hw.as_deref(), &args.settings, args.seed)?;
     let profile = run::profile(&config, &shared.data_root(), shared.machine()?)?;
     if shared.json {
+        say(&plan_json(&config, &profile).to_string());
         for act in &profile.acts {
             say(&act_json(&profile, act).to_string());
         }
+        for mode in &profile.modes {
+            say(&mode_json(&profile, mode).to_string());
+        }
+        say(&json!({"event": "not_simulated", "effects": config.absent()}).to_string());
         return Ok(());
     }
     let tiles = profile.plan.tiles(&profile.hardware);
@@ -169,21 +208,29 @@ pub(super) fn profile(args: &ProfileArgs) -> Done {
         say(&format!("area of {name}: {typical:.3} mm2 ({low:.3} to {high:.3})"));
     }
     if !shared.quiet {
-        // what is not simulated is a list of its own: `hw show`
-        let warnings = profile.warnings.iter().filter(|text| !text.starts_with("not simulated"));
-        for warning in warnings {
+        for warning in &profile.warnings {
             say(&format!("warning: {warning}"));
-        }
-        let effects: Vec<_> =
-            config.not_simulated.keys().map(|key| key.replace('_', " ")).collect();
-        if !effects.is_empty() {
-            say(&format!("not simulated: {} (see dalean hw show)", effects.join(", ")));
         }
     }
     for act in &profile.acts {
         show_act(&profile, act);
     }
+    tables::modes(&profile);
+    say(&format!("\n{}: see dalean hw show MODEL", absent_words(&config.absent())));
     Ok(())
+}
+
+fn mode_json(profile: &Profile, mode: &ModeUse) -> serde_json::Value {
+    let mut object =
+        json!({"event": "mode", "mode": mode.mode, "own": mode.own, "also": mode.also});
+    let more = match &mode.act {
+        Ok(act) => act_json(profile, act),
+        Err(why) => json!({"refused": why}),
+    };
+    let event = object["event"].take();
+    merge(&mut object, more);
+    object["event"] = event;
+    object
 }
 
 /// Operations a second and a joule; a partial sum of joules has no such rate.
@@ -192,6 +239,17 @@ fn rates(act: &Act, bill: &Bill<'_>) -> (Option<f64>, Option<f64>) {
     let rate = bill.seconds_total().filter(|&s| s > 0.0).map(|seconds| operations / seconds);
     let joules = bill.total().whole().map(|joules| joules[1]).filter(|&joules| joules > 0.0);
     (rate, joules.map(|joules| operations / joules))
+}
+
+/// What the network takes of the chip.
+fn plan_json(config: &Config, profile: &Profile) -> serde_json::Value {
+    let Profile { plan, hardware, constants, .. } = profile;
+    let areas = areas(plan, hardware, constants).into_iter();
+    let areas: Vec<_> =
+        areas.map(|(name, area)| json!({"name": name, "square_metres": area})).collect();
+    json!({"event": "plan", "data": config.data_name(), "hardware": config.hardware_name,
+        "cells": plan.cells(), "tiles": plan.tiles(hardware), "areas": areas,
+        "warnings": profile.warnings})
 }
 
 fn act_json(profile: &Profile, act: &Act) -> serde_json::Value {

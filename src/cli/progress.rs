@@ -38,7 +38,8 @@ impl Meter {
 
     /// Notes a batch.
     pub(super) fn batch(&mut self, progress: Progress) {
-        let Progress { epoch, done: samples, total: samples_total, answers } = progress;
+        let Progress { epoch, epochs, done: samples, total: samples_total, answers } = progress;
+        self.epochs = epochs;
         let done = u64::from(epoch) * samples_total as u64 + samples as u64;
         if self.samples == 0 {
             // a continued run has a past that this process did not spend time on
@@ -63,7 +64,7 @@ impl Meter {
             bar.set_message(message);
         } else if self.last_line.elapsed() >= Duration::from_secs(LINE_SECONDS) {
             self.last_line = Instant::now();
-            eprintln!(
+            tell!(
                 "epoch {}/{}: {samples}/{samples_total} samples, {message}",
                 epoch + 1,
                 self.epochs
@@ -101,7 +102,7 @@ impl Meter {
     pub(super) fn line(&self, line: &str) {
         match &self.bar {
             Some(bar) => bar.println(line),
-            None => eprintln!("{line}"),
+            None => tell!("{line}"),
         }
     }
 
@@ -177,7 +178,7 @@ impl SweepMeter {
             bar.set_message(format!("{} to go", self.to_go()));
         } else if !self.quiet && self.last_line.elapsed() >= Duration::from_secs(LINE_SECONDS) {
             self.last_line = Instant::now();
-            eprintln!("{}/{} runs, {} to go", self.finished, self.runs, self.to_go());
+            tell!("{}/{} runs, {} to go", self.finished, self.runs, self.to_go());
         }
     }
 
@@ -196,7 +197,7 @@ impl SweepMeter {
         match &self.bar {
             _ if self.quiet => {}
             Some(bar) => bar.println(line),
-            None => eprintln!("{line}"),
+            None => tell!("{line}"),
         }
     }
 

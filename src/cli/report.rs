@@ -5,10 +5,10 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use serde_json::json;
 
-use super::{Done, data_root, say};
-use crate::lab::run;
+use super::{Done, Moved, data_root, say};
 use crate::lab::store::index::{INDEX, Store};
 use crate::lab::sweep;
+use crate::lab::{report, run};
 
 #[derive(Debug, Args)]
 pub(super) struct ReportArgs {
@@ -21,6 +21,11 @@ pub(super) struct ReportArgs {
     /// Folder of data sets, for pictures of wrong answers [default: data, or DALEAN_DATA]
     #[arg(long, value_name = "DIR")]
     data_dir: Option<PathBuf>,
+    #[command(flatten)]
+    moved: Moved,
+    /// Say what the columns of the table mean
+    #[arg(long)]
+    explain: bool,
     /// One JSON object on standard output
     #[arg(long)]
     json: bool,
@@ -57,7 +62,7 @@ fn sweep(path: &Path, args: &ReportArgs) -> Done {
 
 /// Draws the page of one run again.
 fn run(path: &Path, args: &ReportArgs) -> Done {
-    let made = run::report(path, Some(&data_root(args.data_dir.clone())))?;
+    let made = run::report(path, Some(&args.moved.root(data_root(args.data_dir.clone()))))?;
     let page = made.path.display().to_string();
     if args.json {
         let run = path.display().to_string();
@@ -66,6 +71,9 @@ fn run(path: &Path, args: &ReportArgs) -> Done {
     }
     if !args.quiet {
         say(&made.summary);
+        if args.explain {
+            say(&report::text::words());
+        }
         made.notes.iter().for_each(|note| say(&format!("left out {note}")));
     }
     say(&format!("report   {page}"));

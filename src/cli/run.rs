@@ -1,19 +1,19 @@
 //! `train`, `eval`, `verify`.
 
-use std::path::PathBuf;
-use std::sync::Arc;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex};
 
 use clap::Args;
 use serde_json::json;
 
 use super::progress::Meter;
-use super::{Done, Failure, Shared, configuration, environment, known, say, usage};
+use super::{Done, Failure, Moved, Shared, configuration, environment, known, note, say, usage};
 use crate::lab::price::{EnergySplit, PerImage};
 use crate::lab::run::{self, Machine, RunError, RunEvent, Trained, Verdict};
 use crate::lab::store::index::{INDEX, Store};
 use crate::lab::store::record::{TestOutcome, TestRecord};
-use crate::lab::sweep::{self, Sampled};
+use crate::lab::sweep::{self, Finding, Sampled};
 
 #[derive(Debug, Args)]
 pub(super) struct TrainArgs {
@@ -36,6 +36,8 @@ pub(super) struct TrainArgs {
     #[arg(long, value_name = "RUN", value_hint = clap::ValueHint::DirPath, conflicts_with_all = ["file", "hw", "settings", "seed", "out"])]
     resume: Option<PathBuf>,
     #[command(flatten)]
+    moved: Moved,
+    #[command(flatten)]
     shared: Shared,
 }
 
@@ -44,6 +46,8 @@ pub(super) struct EvalArgs {
     /// Folder of a run
     #[arg(value_hint = clap::ValueHint::DirPath)]
     run: PathBuf,
+    #[command(flatten)]
+    moved: Moved,
     #[command(flatten)]
     shared: Shared,
 }
@@ -62,6 +66,8 @@ pub(super) struct VerifyArgs {
     /// Which runs are drawn [default: from the clock, and printed]
     #[arg(long, value_name = "N", requires = "sample")]
     sample_seed: Option<u64>,
+    #[command(flatten)]
+    moved: Moved,
     #[command(flatten)]
     shared: Shared,
 }
@@ -93,6 +99,12 @@ pub(super) fn stop_flag() -> Arc<AtomicBool> {
 pub(super) fn train(args: &TrainArgs) -> Done {
     let shared = &args.shared;
     let machine = shared.machine()?;
+    if args.resume.is_none() && args.moved.data.is_some() {
+        return Err(usage(
+            "--data says where the data of a run are that is continued (--resume); of a new run, say it with --set \
+             data.train=FILE or in its file",
+        ));
+    }
     let stop = stop_flag();
     let config = match &args.resume {
         Some(_) => None,
@@ -105,22 +117,28 @@ pub(super) fn train(args: &TrainArgs) -> Done {
     let mut folder = PathBuf::new();
     let mut on_event = |event: RunEvent<'_>| {
         match event {
-            RunEvent::Started { folder: path, data, warnings, epoch, epochs } => {
+            RunEvent::Started { folder: path, data, said, warnings, rates, epoch, epochs } => {
                 folder = path.into();
                 meter = Meter::new(quiet, epochs);
                 if json {
                     let run = path.display().to_string();
-                    say(&json!({"event": "started", "run": run, "data": data, "epoch": epoch,
-                        "epochs": epochs, "warnings": warnings})
+                    say(&json!({"event": "started", "run": run, "data": data, "data_read": said, "epoch": epoch,
+                        "epochs": epochs, "warnings": warnings, "rates": rates})
                     .to_string());
                 } else if !quiet {
                     meter.line(data);
+                    for line in said {
+                        meter.line(&format!("data: {line}"));
+                    }
                     meter.line(&format!(
                         "run {}  kernel {}  threads {}",
                         path.display(),
                         machine.backend().name(),
                         machine.threads()
                     ));
+                    for rate in rates {
+                        meter.line(&format!("rate of {rate}"));
+                    }
                     if epoch > 0 {
                         meter.line(&format!("continuing after epoch {epoch}"));
                     }
@@ -133,7 +151,7 @@ pub(super) fn train(args: &TrainArgs) -> Done {
             RunEvent::Warning(warning) if json => {
                 say(&json!({"event": "warning", "message": warning}).to_string());
             }
-            RunEvent::Warning(warning) if quiet => eprintln!("warning: {warning}"),
+            RunEvent::Warning(warning) if quiet => note(&format!("warning: {warning}")),
             RunEvent::Warning(warning) => meter.line(&format!("warning: {warning}")),
             RunEvent::Epoch(record, seconds) => {
                 meter.epoch(record, seconds);
@@ -145,7 +163,7 @@ pub(super) fn train(args: &TrainArgs) -> Done {
         }
         !stop.load(Ordering::SeqCst)
     };
-    let data = shared.data_root();
+    let data = args.moved.root(shared.data_root());
     let outcome = match (&args.resume, &config) {
         (Some(path), _) => run::resume(path, &data, machine, &mut on_event),
         (None, Some(config)) => {
@@ -159,12 +177,24 @@ pub(super) fn train(args: &TrainArgs) -> Done {
     let outcome = outcome?;
     if json {
         say(&done(&folder.display().to_string(), &outcome).to_string());
+    } else if quiet {
+        say(&result(&folder, &outcome));
     } else {
         say(&outcome.summary);
         say(&format!("report   {}", folder.join("report.html").display()));
         say(&format!("verify   dalean verify {}", folder.display()));
     }
     Ok(())
+}
+
+/// The result alone: the score of the test, or of the last validation, and where the run is.
+fn result(folder: &Path, outcome: &Trained) -> String {
+    let test = outcome.receipt.classified().map(|test| ("test", test.score));
+    let validation = || Some(("validation", outcome.records.last()?.validation()?));
+    let score = test.or_else(validation).map_or_else(String::new, |(of, score)| {
+        format!("{of} {:.2} % ({} of {})  ", 100.0 * score.fraction(), score.correct, score.total)
+    });
+    format!("{score}{}", folder.display())
 }
 
 fn done(run: &str, outcome: &Trained) -> serde_json::Value {
@@ -179,6 +209,7 @@ fn done(run: &str, outcome: &Trained) -> serde_json::Value {
         "event": "done",
         "run": run,
         "test_accuracy": receipt.classified().map(|test| test.score.fraction()),
+        "notes": outcome.notes.iter().map(ToString::to_string).collect::<Vec<_>>(),
         "test_epoch": receipt.test.as_ref().map(TestOutcome::epoch),
         "validation_accuracy": last.and_then(|r| r.validation()).map(|score| score.fraction()),
         "state_hash": last.map(|record| record.state_hash.clone()),
@@ -191,6 +222,7 @@ fn done(run: &str, outcome: &Trained) -> serde_json::Value {
         "parts": cost.energy.map(|energy| energy.parts),
         "by_class": split,
         "per_image": each,
+        "not_simulated": outcome.absent,
         "joules_assumed_share": cost.energy.map(|_| cost.assumed_share),
         "train_seconds": seconds,
         "images_per_second": images as f64 / seconds.max(1e-9),
@@ -199,7 +231,8 @@ fn done(run: &str, outcome: &Trained) -> serde_json::Value {
 
 pub(super) fn eval(args: &EvalArgs) -> Done {
     let shared = &args.shared;
-    let (test, state_hash) = run::evaluate(&args.run, &shared.data_root(), shared.machine()?)?;
+    let (test, state_hash) =
+        run::evaluate(&args.run, &args.moved.root(shared.data_root()), shared.machine()?)?;
     let TestOutcome::Classify(TestRecord { epoch, ref select, score, .. }) = test;
     if shared.json {
         say(&json!({
@@ -236,13 +269,17 @@ pub(super) fn verify(args: &VerifyArgs) -> Done {
             "{store} is a store; say with --sample N how many of its runs are done again"
         )));
     }
-    let total = args.epochs.unwrap_or(0);
-    let mut meter = Meter::new(shared.quiet || shared.json, total);
-    let verdict =
-        run::verify(&args.run, &shared.data_root(), machine, args.epochs, &mut |progress| {
+    let mut meter = Meter::new(shared.quiet || shared.json, 0);
+    let verdict = run::verify(
+        &args.run,
+        &args.moved.root(shared.data_root()),
+        machine,
+        args.epochs,
+        &mut |progress| {
             meter.batch(progress);
             !stop.load(Ordering::SeqCst)
-        });
+        },
+    );
     meter.finish();
     match verdict? {
         Verdict::Same { epochs, state_hash, test, unchecked } => {
@@ -261,7 +298,7 @@ pub(super) fn verify(args: &VerifyArgs) -> Done {
         }
         Verdict::Different { what, wanted, found } => Err(Failure {
             code: 4,
-            message: format!("{what} differs: the run says {wanted}, this machine finds {found}"),
+            message: format!("{what} differs: the run says {wanted}, doing it again gives {found}"),
         }),
     }
 }
@@ -272,38 +309,62 @@ fn sample(args: &VerifyArgs, count: usize, machine: Machine, stop: &AtomicBool) 
     let store = Store::existing(&args.run)?;
     // whoever made the store shall not know which runs will be looked at
     let seed = args.sample_seed.unwrap_or_else(super::progress::moment);
-    let mut same = 0;
-    let mut different = None;
-    let mut on_run = |number: usize, sampled: &Sampled| match &sampled.verdict {
-        Verdict::Same { epochs, state_hash, .. } => {
-            same += 1;
-            if shared.json {
-                say(&json!({"event": "run", "key": sampled.key, "verified": true, "state_hash": state_hash})
-                    .to_string());
-            } else if !shared.quiet {
-                say(&format!(
-                    "{number:>4}/{count}  {}  {epochs} state hashes are the same",
-                    sampled.key
-                ));
+    let quiet = shared.quiet || shared.json;
+    let meter = Mutex::new(Meter::new(quiet, 0));
+    let meter = || meter.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+    let (mut same, mut busy) = (0, 0);
+    let mut wrong = Vec::new();
+    let mut on_run = |number: usize, sampled: &Sampled| {
+        std::mem::replace(&mut *meter(), Meter::new(quiet, 0)).finish();
+        let key = &sampled.key;
+        let (text, code) = match &sampled.finding {
+            Finding::Done(Verdict::Same { epochs, state_hash, .. }) => {
+                same += 1;
+                if shared.json {
+                    say(&json!({"event": "run", "key": key, "verified": true, "state_hash": state_hash})
+                        .to_string());
+                } else if !shared.quiet {
+                    say(&format!("{number:>4}/{count}  {key}  {epochs} records are the same"));
+                }
+                return;
             }
-        }
-        Verdict::Different { what, wanted, found } => {
-            let text = format!(
-                "run {}: {what} differs: the store says {wanted}, this machine finds {found}",
-                sampled.key
-            );
-            if shared.json {
-                say(&json!({"event": "run", "key": sampled.key, "verified": false, "message": text}).to_string());
+            Finding::Busy => {
+                busy += 1;
+                return;
             }
-            eprintln!("{text}");
-            different.get_or_insert(text);
+            Finding::Done(Verdict::Different { what, wanted, found }) => (
+                format!("{what} differs: its folder says {wanted}, doing it again gives {found}"),
+                4,
+            ),
+            Finding::Index { column, index, folder } => (
+                format!("`{column}` differs: the index says {index}, its folder gives {folder}"),
+                4,
+            ),
+            Finding::Address { found } => {
+                (format!("the folder of that name holds the run {found}"), 4)
+            }
+            Finding::Broken(why) => (format!("it cannot be done again: {why}"), 1),
+        };
+        let text = format!("run {key}: {text}");
+        if shared.json {
+            say(&json!({"event": "run", "key": key, "verified": false, "message": text})
+                .to_string());
         }
+        note(&text);
+        wrong.push(code);
     };
-    let mut go_on = |_| !stop.load(Ordering::SeqCst);
-    let root = shared.data_root();
+    let mut go_on = |progress| {
+        meter().batch(progress);
+        !stop.load(Ordering::SeqCst)
+    };
+    let root = args.moved.root(shared.data_root());
     let runs = sweep::sample(&store, count, seed, &root, machine, &mut on_run, &mut go_on)?;
-    if let Some(message) = different {
-        return Err(Failure { code: 4, message });
+    if let Some(code) = wrong.iter().max() {
+        let message = format!("{} of {runs} runs do not hold, as said above", wrong.len());
+        return Err(Failure { code: *code, message });
+    }
+    if busy > 0 {
+        note(&format!("warning: {busy} runs were left out: other processes are at them"));
     }
     let again = format!("--sample {count} --sample-seed {seed}");
     if shared.json {

@@ -8,7 +8,7 @@ use serde_json::json;
 use super::table::columns;
 use super::{Done, environment, say, usage};
 use crate::lab::config::Difference;
-use crate::lab::report::compare::Comparison;
+use crate::lab::report::compare::{Comparison, html};
 use crate::lab::runs::{self, ListedRun, RunStatus};
 use crate::lab::store::record::Score;
 
@@ -30,6 +30,9 @@ pub(super) struct CompareArgs {
     /// Folders of runs; states are compared with those of the first
     #[arg(required = true, num_args = 2.., value_hint = clap::ValueHint::DirPath)]
     runs: Vec<PathBuf>,
+    /// Write a page that draws them over one another
+    #[arg(long, value_name = "FILE", value_hint = clap::ValueHint::FilePath)]
+    out: Option<PathBuf>,
     /// One JSON object on standard output
     #[arg(long)]
     json: bool,
@@ -114,8 +117,17 @@ pub(super) fn compare(args: &CompareArgs) -> Done {
         return Err(usage("give two runs or more"));
     }
     let comparison = runs::compare(&args.runs)?;
+    if let Some(path) = &args.out {
+        let page = html(&comparison, env!("CARGO_PKG_VERSION"));
+        super::trace::write(path, page.as_bytes())?;
+    }
+    let page = args.out.as_ref().map(|path| path.display().to_string());
     if args.json {
-        say(&compare_json(&comparison).to_string());
+        let mut all = compare_json(&comparison);
+        if let Some(page) = page {
+            all["page"] = json!(page);
+        }
+        say(&all.to_string());
         return Ok(());
     }
     let Comparison { runs, keys, results } = &comparison;
@@ -166,6 +178,9 @@ pub(super) fn compare(args: &CompareArgs) -> Done {
                 format!("{} and (1) have the same states up to epoch {both}", name(at))
             }
         });
+    }
+    if let Some(page) = page {
+        say(&format!("page     {page}"));
     }
     Ok(())
 }

@@ -38,6 +38,9 @@ pub(super) struct SweepArgs {
     /// Write the states of runs at work at most every N seconds: what a kill may cost
     #[arg(long, value_name = "N", default_value_t = 10)]
     checkpoint_seconds: u64,
+    /// Replace a sweep of that name and other content in the store; its runs stay
+    #[arg(long)]
+    replace: bool,
     #[command(flatten)]
     shared: Shared,
 }
@@ -76,8 +79,13 @@ pub(super) fn execute(args: &SweepArgs) -> Done {
     let stop = stop_flag();
     let every = Duration::from_secs(args.checkpoint_seconds);
     let keeping = Keeping { states: args.keep_states, every };
-    let options =
-        Options { backend: machine.backend(), jobs: machine.threads(), keeping, shard: args.shard };
+    let options = Options {
+        backend: machine.backend(),
+        jobs: machine.threads(),
+        keeping,
+        shard: args.shard,
+        replace: args.replace,
+    };
     let meter = Mutex::new(SweepMeter::new(shared.quiet || shared.json));
     let on_event = |event: SweepEvent<'_>| {
         let mut meter = meter.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
@@ -133,9 +141,10 @@ fn announce(shared: &Shared, plan: &SweepPlan, path: &std::path::Path) {
             "runs": plan.tasks.len()})
         .to_string());
     } else if !shared.quiet {
-        eprintln!("{}", describe(plan));
+        tell!("{}", describe(plan));
         for data in &plan.data {
-            eprintln!("{}", data.description);
+            tell!("{}", data.description);
+            data.said.iter().for_each(|line| tell!("data: {line}"));
         }
         let first = plan.points.iter().position(|planned| planned.key.is_err());
         if let Some(first) = first
@@ -143,13 +152,9 @@ fn announce(shared: &Shared, plan: &SweepPlan, path: &std::path::Path) {
         {
             let others =
                 if refused > 1 { format!(" (and {} more)", refused - 1) } else { String::new() };
-            eprintln!(
-                "warning: point {} ({}) cannot run{others}: {why}",
-                first + 1,
-                plan.words(first)
-            );
+            tell!("warning: point {} ({}) cannot run{others}: {why}", first + 1, plan.words(first));
         }
-        eprintln!("store {}", path.display());
+        tell!("store {}", path.display());
     }
 }
 
@@ -189,7 +194,9 @@ fn dry_run(args: &SweepArgs, plan: &SweepPlan, machine: Machine, path: &std::pat
     let tasks: Vec<&PlannedRun> = tasks.collect();
     let store = Store::existing(path).ok();
     let finished = |task: &&PlannedRun| {
-        store.as_ref().is_some_and(|store| matches!(store.row(&task.key), Ok(Some(_))))
+        store
+            .as_ref()
+            .is_some_and(|store| store.is_finished(&task.key).is_ok_and(|finished| finished))
     };
     let all = tasks.len();
     let todo: Vec<&PlannedRun> = tasks.into_iter().filter(|task| !finished(task)).collect();

@@ -78,9 +78,9 @@ pub(super) fn execute(args: &TraceArgs) -> Done {
     Ok(())
 }
 
-fn write(path: &Path, bytes: &[u8]) -> Done {
-    #[expect(clippy::disallowed_methods, reason = "the file the user named")]
-    std::fs::write(path, bytes).map_err(|error| Failure {
+/// Writes a file that the user named.
+pub(super) fn write(path: &Path, bytes: &[u8]) -> Done {
+    crate::lab::store::place::write_out(path, bytes).map_err(|error| Failure {
         code: 1,
         message: format!("cannot write {}: {error}", path.display()),
     })

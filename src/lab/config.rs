@@ -9,6 +9,7 @@ mod changed;
 mod check;
 mod chip;
 mod data;
+mod defaults;
 mod differs;
 mod experiment;
 pub mod file;
@@ -24,11 +25,12 @@ mod wrong;
 
 pub use absent::{Absent, EFFECTS, Effect, absent_words};
 pub use check::{Config, DataConfig, Select, TrainOn};
+pub use defaults::{SET_DEFAULTS, SetDefaults};
 pub use differs::{Difference, flat};
 pub use file::{ExperimentFile, HardwareFile};
 pub use hardware::{Model, builtin_models, load_model, model_names};
 pub use law::{Law, Setting, SettingValue};
-pub use layers::{Overlay, Sources, load, overlay, setting, setting_table};
+pub use layers::{Overlay, Sources, anchor, load, overlay, setting, setting_table};
 pub use quantity::{
     Constant, Constants, CostClass, CostTable, Kind, Per, QUANTITIES, Quantity, Standing,
 };

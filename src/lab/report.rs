@@ -19,6 +19,7 @@ mod page;
 mod scale;
 pub mod sweep;
 pub mod text;
+mod words;
 
 #[cfg(test)]
 mod sample;

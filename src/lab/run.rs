@@ -4,6 +4,7 @@
 //! one. Neither prints: callers get [`RunEvent`]s.
 
 mod classify;
+mod notes;
 mod profile;
 mod proof;
 mod report;
@@ -12,8 +13,10 @@ mod session;
 mod task;
 mod train;
 mod verify;
+mod weigh;
 
-pub use profile::{Act, Profile, profile};
+pub use notes::notes;
+pub use profile::{Act, ModeUse, Profile, profile};
 pub use proof::{records, untouched};
 pub use report::{ReportMade, report};
 pub use repriced::{Prices, Repriced, reprice, reprice_as};
@@ -23,6 +26,8 @@ pub use train::{
     Keeping, RunEvent, Trained, address_of, carry_on, configuration, evaluate, resume, train,
 };
 pub use verify::{Verdict, verify};
+pub use weigh::Memory;
+pub(crate) use weigh::weigh;
 
 use crate::chip::crossbar::kernel::Backend;
 use crate::lab::config::ConfigError;
@@ -88,6 +93,17 @@ pub enum RunError {
         /// Most.
         max: usize,
     },
+    /// Memory that the system does not have.
+    #[error(
+        "the cells of the network and a copy of its state take {wanted} of memory, and {left} are left; make \
+         network.hidden smaller, or use a machine with more memory"
+    )]
+    Memory {
+        /// What they take.
+        wanted: Memory,
+        /// What is left.
+        left: Memory,
+    },
     /// Threads that the system does not give.
     #[error("the system gives no {threads} threads ({error}); use fewer")]
     NoThreads {
@@ -118,7 +134,8 @@ pub enum RunError {
     },
     /// The data is not what the run was made with.
     #[error(
-        "the data has the hash {found}, but the run was made with {wanted}; get the same data again (`dalean data list`)"
+        "the data has the hash {found}, but the run was made with {wanted}; get the same data again (`dalean data list`), \
+         or say with --data where the files are that it was made with"
     )]
     DataChanged {
         /// Hash now.

@@ -12,8 +12,8 @@
 //!
 //! Many runs make a store: folders named by what decides their result ([`address`]), and an index ([`index`]).
 //!
-//! Every file is written beside its place and moved into it, records before the checkpoint, so that a run that is
-//! killed is loadable up to its last finished epoch.
+//! Every file is written beside its place and moved into it ([`place`]), records, which grow at their end, before the
+//! checkpoint, so that a run that is killed is loadable up to its last finished epoch.
 
 pub mod address;
 pub mod checkpoint;
@@ -21,6 +21,7 @@ pub mod folder;
 pub mod hash;
 pub mod index;
 pub mod ledger;
+pub mod place;
 pub mod record;
 
 /// Version of the arithmetic. It rises when an equation moves; `verify` refuses another.

@@ -22,12 +22,12 @@ mod table;
 pub use axis::{Axis, Choice, Value};
 pub use carry::{Carried, Options, SweepEvent, carry_out};
 pub use file::{Sample, Sweep};
-pub use merge::{Merged, merge, reindex};
+pub use merge::{Merged, Reindexed, Skipped, merge, reindex};
 pub use plan::{Estimate, Planned, PlannedRun, Shard, SweepPlan, estimate, plan};
 pub use points::Point;
 pub use report::{SweepPage, report};
 pub use row::{RESULTS, ResultColumn, ResultKind, Row, row, row_as};
-pub use sample::{Sampled, sample};
+pub use sample::{Finding, Sampled, sample};
 pub use table::{Results, find, results};
 
 use std::path::PathBuf;
@@ -74,7 +74,7 @@ pub enum SweepError {
         allowed: String,
     },
     /// A condition.
-    #[error("filter `{text}`: {error}; it must be true or false, and may use {names}")]
+    #[error("filter `{text}`: {error}it must be true or false, and may use {names}")]
     Filter {
         /// The condition.
         text: String,
@@ -83,6 +83,14 @@ pub enum SweepError {
         /// What it may use.
         names: String,
     },
+    /// Data that an earlier point could not read.
+    #[error("{0}")]
+    Unread(String),
+    /// Files that a sweep leans on are not what they were.
+    #[error(
+        "a file that the point leans on was changed since the sweep was planned; give the command again"
+    )]
+    Changed,
     /// No point is left.
     #[error("the sweep has no points: its filters refuse all {points}")]
     Empty {

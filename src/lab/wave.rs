@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! VCD        registers of one tile over cycles (docs/TILE.md); GTKWave, Surfer
-//! Perfetto   what every tile did when, one track a tile; ui.perfetto.dev, chrome://tracing
+//! Perfetto   what every part of every tile did when, one track a part; ui.perfetto.dev, chrome://tracing
 //! ```
 //!
 //! The update is found by the fast engine and played again by the cycle-by-cycle network of tiles, which has to reach
@@ -11,7 +11,7 @@
 use std::cell::RefCell;
 use std::rc::Rc;
 
-use crate::chip::engine::tick::{Network, Span, Tile, TileAt};
+use crate::chip::engine::tick::{Network, PartSpan, Span, Tile, TileAt};
 use crate::chip::engine::{Phase, Recorded};
 use crate::chip::ledger::Cycles;
 use crate::lab::config::Config;
@@ -73,7 +73,7 @@ pub fn record(
 
     let engine = before.engines()[0];
     let mut network = Network::new(&config.hardware, config.seed, engine.layers(), samples);
-    network.set_learning(engine.mantissa(), engine.potentiation_only());
+    network.set_learning(engine.mantissas(), engine.potentiation_only());
     network.set_error_unit(engine.error_unit());
     network.set_unlooked(engine.unlooked());
     let place = look.tile;
@@ -100,10 +100,11 @@ pub fn record(
         }
     }
     let spans: Vec<Span> = network.take_spans();
+    let parts: Vec<PartSpan> = network.take_parts();
     let grids: Vec<_> = (0..engine.layers().len()).map(|layer| network.grid(layer)).collect();
     let cycles = network.ledger(Phase::Training).cycles().expect("counted").clone();
     let vcd = writer.borrow_mut().finish();
-    Ok(Wave { vcd, perfetto: perfetto::text(&spans, &grids, timing.clock_khz), cycles })
+    Ok(Wave { vcd, perfetto: perfetto::text(&spans, &parts, &grids, timing.clock_khz), cycles })
 }
 
 fn samples_of(tape: &[Recorded], inputs: usize) -> usize {

@@ -80,6 +80,7 @@ impl Driver {
     /// list to extend.
     pub fn learn(&mut self, codes: &[u8], mut errors: impl FnMut(&Engine, usize, &mut Vec<i32>)) {
         let inputs = self.engine.layers()[0].spec.inputs;
+        self.engine.begin_update();
         match self.learning.mode {
             UpdateMode::Accumulate | UpdateMode::Replay => {
                 self.read(codes);

@@ -44,8 +44,8 @@ pub struct NetworkSpec {
     pub route: Option<Route>,
     /// Configured batch.
     pub batch: Batch,
-    /// Small factor of the rate.
-    pub mantissa: RateMantissa,
+    /// Small factor of the rate of each layer.
+    pub mantissas: Vec<RateMantissa>,
     /// Rate of each layer, multiplier included.
     pub rates: Vec<Positive>,
     /// How the rate falls.
@@ -66,7 +66,7 @@ pub struct NetworkPlace {
 /// A network that does not fit together, or not on the chip.
 ///
 /// ```
-/// use dalean::network::{Batch, Centre, Decay, RateMantissa, Rule, UpdateMode};
+/// use dalean::network::{Batch, Centre, Decay, Rule, UpdateMode};
 /// use dalean::{Hardware, NetworkSpec};
 ///
 /// let nothing = NetworkSpec {
@@ -76,7 +76,7 @@ pub struct NetworkPlace {
 ///     centre: Centre::None,
 ///     route: None,
 ///     batch: Batch::new(1)?,
-///     mantissa: RateMantissa::new(1)?,
+///     mantissas: vec![],
 ///     rates: vec![],
 ///     decay: Decay::Constant,
 /// };
@@ -145,10 +145,11 @@ impl NetworkSpec {
 
     /// What the rate of each layer is made of.
     fn rates(&self, hardware: &Hardware) -> impl Iterator<Item = Rate> {
-        self.layers.iter().zip(&self.rates).map(|(spec, &rate)| Rate {
+        let rates = self.rates.iter().zip(&self.mantissas);
+        self.layers.iter().zip(rates).map(|(spec, (&rate, &mantissa))| Rate {
             rate,
             batch: self.batch,
-            mantissa: self.mantissa,
+            mantissa,
             error_bits: hardware.digital.error_bits,
             activation: spec.activation,
             unit: layer::unit(spec, hardware),
@@ -181,7 +182,8 @@ impl NetworkSpec {
         let shifts = shifts.collect::<Result<_, _>>()?;
         let mut engine = Engine::new(hardware.clone(), backend, place.seed, layers);
         engine.set_potentiation_only(self.rule == Rule::Kaneko);
-        engine.set_mantissa(self.mantissa.get());
+        let mantissas: Vec<u32> = self.mantissas.iter().map(|mantissa| mantissa.get()).collect();
+        engine.set_mantissas(&mantissas);
         load_initial_levels(&mut engine, place.seed);
         let unit = ErrorUnit::new(self.centre, hardware.digital.error_bits, self.outputs());
         let learning = Learning { rule: self.rule, mode: self.mode, shifts };

@@ -243,6 +243,23 @@ impl Rate {
         k.ok_or(OutOfRange { name: "k", found, min: 0, max: SHIFT_MAX.into() })
     }
 
+    /// This rate with the mantissa whose effective rate comes nearest to it, by ratio: the least one on ties. Its own
+    /// where no shift stands for the rate with any.
+    #[must_use]
+    pub fn with_nearest_mantissa(self) -> Self {
+        let all = (RateMantissa::MIN..=RateMantissa::MAX)
+            .map(|m| Self { mantissa: RateMantissa::new(m.into()).expect("in range"), ..self });
+        let off = |rate: &Self| {
+            let off = (rate.shift_exact() - f64::from(rate.shift().ok()?)).abs();
+            // one in a million is nothing: 2 and 4 stand for the same rates as 1
+            #[expect(clippy::cast_possible_truncation, reason = "at most half a million")]
+            let millionths = libm::floor(off * 1e6 + 0.5) as i64;
+            Some(millionths)
+        };
+        let found = all.filter_map(|rate| Some((off(&rate)?, rate)));
+        found.min_by_key(|(off, _)| *off).map_or(self, |(_, rate)| rate)
+    }
+
     /// The rate that `k` and the mantissa really give: within a factor of `sqrt(2)` of the one asked for.
     ///
     /// # Errors
@@ -268,28 +285,44 @@ impl Rate {
     /// When the shift before any decay lies outside `0..=SHIFT_MAX`.
     pub fn shifts(self, decay: Decay, updates: u64) -> Result<Vec<(u64, u32)>, OutOfRange> {
         self.shift()?;
-        let exact = self.shift_exact();
-        let mut table: Vec<(u64, u32)> = Vec::new();
-        for update in 0..updates.max(1) {
-            let factor = match decay {
-                Decay::Constant => 1.0,
-                Decay::Cosine => {
-                    #[expect(clippy::cast_precision_loss, reason = "far fewer than 2^53 updates")]
-                    let t = update as f64 / updates as f64;
-                    0.5 * (1.0 + libm::cos(std::f64::consts::PI * t))
+        let mut table = vec![(0, self.shift_at(decay, 0, updates))];
+        if decay == Decay::Constant {
+            return Ok(table);
+        }
+        // k only rises, so where it does is found by halving: a training may be as long as it likes
+        let last = updates.max(1) - 1;
+        let (mut now, mut k) = table[0];
+        while self.shift_at(decay, last, updates) > k {
+            let mut next = last;
+            while next - now > 1 {
+                let middle = now + (next - now) / 2;
+                if self.shift_at(decay, middle, updates) > k {
+                    next = middle;
+                } else {
+                    now = middle;
                 }
-            };
-            let nearest = libm::floor(exact - libm::log2(factor) + 0.5);
-            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0..=30")]
-            let k = nearest.min(f64::from(SHIFT_MAX)) as u32;
-            if table.last().is_none_or(|&(_, last)| last != k) {
-                table.push((update, k));
             }
-            if decay == Decay::Constant {
-                break;
-            }
+            (now, k) = (next, self.shift_at(decay, next, updates));
+            table.push((now, k));
         }
         Ok(table)
+    }
+
+    /// `k` at one update of so many.
+    fn shift_at(self, decay: Decay, update: u64, updates: u64) -> u32 {
+        let factor = match decay {
+            Decay::Constant => 1.0,
+            Decay::Cosine => {
+                #[expect(clippy::cast_precision_loss, reason = "a share of the way")]
+                let t = update as f64 / updates.max(1) as f64;
+                0.5 * (1.0 + libm::cos(std::f64::consts::PI * t))
+            }
+        };
+        let nearest = libm::floor(self.shift_exact() - libm::log2(factor) + 0.5);
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0..=30")]
+        {
+            nearest.min(f64::from(SHIFT_MAX)) as u32
+        }
     }
 }
 
@@ -412,6 +445,30 @@ mod tests {
         assert!((23.62..23.63).contains(&effective), "{effective}");
     }
 
+    /// Rates 14 to 22 once were one rate, and nobody said so.
+    #[test]
+    fn the_nearest_mantissa_comes_within_seven_percent() {
+        let mut shifts = vec![];
+        for asked in 14..=22 {
+            let asked = rate(f64::from(asked), 6.0);
+            let near = asked.with_nearest_mantissa();
+            let ratio = near.effective().unwrap().get() / asked.rate.get();
+            assert!((0.94..1.07).contains(&ratio), "{asked:?}: {ratio}");
+            shifts.push((near.mantissa.get(), near.shift().unwrap()));
+        }
+        shifts.dedup();
+        assert!(shifts.len() >= 5, "{shifts:?}");
+        // 20 is 13.2404 with 1: 2^0.2404 too much; with 7 it is 16.0478
+        assert_eq!((shifts.contains(&(1, 13)), shifts.contains(&(7, 16))), (false, true));
+        // an exact power of two keeps the least mantissa
+        let exact = Rate { rate: rate(20.0, 6.0).effective().unwrap(), ..rate(20.0, 6.0) };
+        assert_eq!(exact.with_nearest_mantissa().mantissa.get(), 1);
+        // where 1 would need a shift below 0, more than 1 does not
+        let great = Rate { rate: Positive::new(20.0 * 32768.0).unwrap(), ..rate(20.0, 6.0) };
+        let near = great.with_nearest_mantissa();
+        assert_eq!((great.shift().is_err(), near.shift().is_ok()), (true, true));
+    }
+
     #[test]
     fn shifts_outside_0_to_30_are_refused_with_what_they_would_be() {
         // a factor of 2^k moves the shift by k; 20 at 13.2404
@@ -427,6 +484,28 @@ mod tests {
         // 13.2404 - log2( (1 + cos(pi t / 1000)) / 2 ) passes 13.5, 14.5 and 15.5 there
         assert_eq!(table[..4], [(0, 13), (267, 14), (553, 15), (698, 16)]);
         assert!(table.is_sorted() && table.last().unwrap().1 <= SHIFT_MAX);
+    }
+
+    #[test]
+    fn a_schedule_of_any_length_is_made_at_once_and_is_the_one_counted_update_by_update() {
+        for (start, alpha) in [(20.0, 6.0), (3.7, 4.0), (900.0, 1.0), (0.04, 9.0)] {
+            let rate = rate(start, alpha);
+            for updates in [1, 2, 3, 7, 100, 1_199, 20_000] {
+                let mut wanted: Vec<(u64, u32)> = vec![];
+                for update in 0..updates {
+                    let k = rate.shift_at(Decay::Cosine, update, updates);
+                    if wanted.last().is_none_or(|&(_, last)| last != k) {
+                        wanted.push((update, k));
+                    }
+                }
+                assert_eq!(rate.shifts(Decay::Cosine, updates).unwrap(), wanted, "{updates}");
+            }
+            // it once took an hour and a signal did not end it
+            for updates in [0, u64::from(u32::MAX) * 120, u64::MAX] {
+                let table = rate.shifts(Decay::Cosine, updates).unwrap();
+                assert!(table.is_sorted() && (1..=31).contains(&table.len()), "{updates}");
+            }
+        }
     }
 
     #[test]

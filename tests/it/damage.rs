@@ -5,17 +5,20 @@
 
 use std::collections::BTreeMap;
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use dalean::chip::crossbar::kernel::Backend;
 use dalean::lab::config::{Sources, load};
 use dalean::lab::data::DataRoot;
 use dalean::lab::run::{self, Machine, RunError, RunEvent, Verdict};
 use dalean::lab::store::hash;
+use dalean::lab::store::index::Store;
+use dalean::lab::sweep::{Sampled, reindex, sample};
 use safetensors::SafeTensors;
 use serde_json::Value;
 
 use super::golden_run::EVERYTHING;
+use super::program::{dalean, only_run, run as run_program};
 
 fn machine() -> Machine {
     Machine::new(Backend::best(), 1).unwrap()
@@ -52,7 +55,7 @@ fn made(finished: bool) -> Files {
         Ok(_) => assert!(finished),
         Err(error) => assert!(matches!(error, RunError::Stopped { .. }) && !finished, "{error}"),
     }
-    files(&work.path().join("xor-ed-seed1"))
+    files(&only_run(work.path()))
 }
 
 /// Places of everything that is no list or table, as JSON pointers, and of lists and tables that are empty.
@@ -289,6 +292,143 @@ fn every_field_of_a_finished_run_is_verified() {
     assert!(!is_found(work.path(), &with(&whole, "timing.json", "{}")), "seconds prove nothing");
     println!("{count} changes, all found");
     assert!(count > 3000, "{count}");
+}
+
+#[test]
+fn a_record_more_behind_the_last_one_is_found() {
+    let work = tempfile::tempdir().unwrap();
+    let whole = made(true);
+    let metrics = String::from_utf8(whole["metrics.jsonl"].clone()).unwrap();
+    let last = metrics.lines().last().unwrap();
+    for more in [format!("{last}\n"), "{}".into(), "\n".into()] {
+        let files = with(&whole, "metrics.jsonl", format!("{metrics}{more}"));
+        assert!(is_found(work.path(), &files), "{more}");
+    }
+}
+
+/// A store of two runs and the folder of the first.
+fn store_of_two(place: &Path) -> PathBuf {
+    let file = place.with_extension("toml");
+    fs::write(&file, STORED).unwrap();
+    let ran = run_program(
+        dalean().arg("sweep").arg(&file).args(["--keep-states", "--json", "--store"]).arg(place),
+    );
+    assert_eq!(ran.code, Some(0), "{ran:?}");
+    let store = Store::existing(place).unwrap();
+    let (key, ..) = store.rows().unwrap().swap_remove(0);
+    store.folder(&key)
+}
+
+const STORED: &str = "base.data.set = 'xor'\nbase.network.hidden = [3]\nbase.learning.epochs = 1\n\
+                      base.learning.batch = 2\nbase.learning.select = 'best_validation'\n\
+                      [[axis]]\nkey = 'seed'\nname = 'draw'\nvalues = [1, 2]\n";
+
+/// Whether doing all runs of a store again shows that something is wrong.
+fn is_found_in(store: &Path) -> bool {
+    let store = Store::existing(store).unwrap();
+    let mut wrong = 0;
+    let mut look = |_: usize, sampled: &Sampled| wrong += usize::from(!sampled.finding.holds());
+    let outcome = sample(&store, 9, 1, &root(), machine(), &mut look, &mut |_| true);
+    wrong > 0 || outcome.is_err()
+}
+
+/// A copy of a folder and all that is in it.
+fn copy_all(from: &Path, to: &Path) {
+    fs::create_dir_all(to).unwrap();
+    for entry in fs::read_dir(from).unwrap() {
+        let entry = entry.unwrap();
+        let place = to.join(entry.file_name());
+        if entry.file_type().unwrap().is_dir() {
+            copy_all(&entry.path(), &place);
+        } else {
+            fs::copy(entry.path(), place).unwrap();
+        }
+    }
+}
+
+#[test]
+fn every_forgery_is_found_in_a_store_after_its_index_is_made_again_and_after_it_has_moved() {
+    let work = tempfile::tempdir().unwrap();
+    let place = work.path().join("store");
+    let folder = store_of_two(&place);
+    let inside = folder.strip_prefix(&place).unwrap().to_owned();
+    let whole = files(&folder);
+    assert!(!is_found_in(&place), "an untouched store");
+    let moved = work.path().join("elsewhere").join("store");
+    copy_all(&place, &moved);
+    assert!(!is_found_in(&moved), "an untouched store that has moved");
+    let index = fs::read(place.join("index.sqlite")).unwrap();
+
+    let text = |name: &str| String::from_utf8(whole[name].clone()).unwrap();
+    let mut forgeries: Vec<(String, Files)> = Vec::new();
+    for (what, receipt) in changed(&text("receipt.json")) {
+        forgeries.push((format!("receipt {what}"), with(&whole, "receipt.json", receipt)));
+    }
+    let metrics = text("metrics.jsonl");
+    let last = metrics.lines().last().unwrap();
+    for (what, other) in changed(last) {
+        let metrics = metrics.replace(last, &other);
+        if says_the_same(last, &what) {
+            continue;
+        }
+        forgeries.push((format!("record {what}"), with(&whole, "metrics.jsonl", metrics.clone())));
+        let forged = forged(&whole, "metrics.jsonl", "/metrics", metrics);
+        forgeries.push((format!("record {what}, forged"), forged));
+    }
+    for (what, ledger) in changed(&text("ledger.json")) {
+        if !says_the_same(&text("ledger.json"), &what) {
+            let forged = forged(&whole, "ledger.json", "/ledger", ledger);
+            forgeries.push((format!("ledger {what}, forged"), forged));
+        }
+    }
+    for (what, bytes) in changed_checkpoints(&whole["checkpoint.safetensors"], false) {
+        let forged = forged(&whole, "checkpoint.safetensors", "/checkpoint", bytes);
+        forgeries.push((format!("checkpoint {what}, forged"), forged));
+    }
+    let mut flipped = whole["checkpoint.safetensors"].clone();
+    let middle = flipped.len() / 2;
+    flipped[middle] ^= 1;
+    forgeries.push(("a flipped byte".into(), with(&whole, "checkpoint.safetensors", flipped)));
+    let config = text("config.toml").replace("batch = 2", "batch = 1");
+    assert_ne!(config, text("config.toml"));
+    forgeries.push(("config".into(), with(&whole, "config.toml", config)));
+    for name in
+        ["config.toml", "receipt.json", "metrics.jsonl", "ledger.json", "checkpoint.safetensors"]
+    {
+        let mut without = whole.clone();
+        without.remove(name);
+        forgeries.push((format!("{name} missing"), without));
+    }
+
+    let mut count = 0;
+    for (number, (what, files)) in forgeries.iter().enumerate() {
+        // every one in the store, and every few on the longer ways
+        lay(&folder, files);
+        assert!(is_found_in(&place), "not found in the store: {what}");
+        count += 1;
+        if number % 7 != 0 && !what.ends_with("missing") && !what.starts_with("config") {
+            continue;
+        }
+        let made = reindex(&mut Store::with_runs(&place).unwrap(), &mut |_, _| {}).unwrap();
+        let told = !made.damaged.is_empty() || made.unfinished + made.forgotten > 0;
+        assert!(told || is_found_in(&place), "not found after `store index`: {what}");
+        // who asks the store again finds it still, unless there is no receipt that could claim anything
+        let gone = what.starts_with("receipt.json missing");
+        assert!(gone || is_found_in(&place), "hidden by `store index`: {what}");
+        fs::write(place.join("index.sqlite"), &index).unwrap();
+        lay(&moved.join(&inside), files);
+        assert!(is_found_in(&moved), "not found after the store has moved: {what}");
+        let alone = work.path().join("alone");
+        lay(&alone, files);
+        let verdict = run::verify(&alone, &root(), machine(), None, &mut |_| true);
+        assert!(
+            !matches!(verdict, Ok(Verdict::Same { .. })),
+            "not found in a moved folder: {what}"
+        );
+        count += 3;
+    }
+    println!("{} forgeries, found {count} times", forgeries.len());
+    assert!(count > 500, "{count}");
 }
 
 #[test]

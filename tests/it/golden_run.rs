@@ -12,7 +12,7 @@ use dalean::lab::data::DataRoot;
 use dalean::lab::run::{self, Machine, Verdict};
 use dalean::lab::store::folder;
 
-use super::program::{dalean, run};
+use super::program::{dalean, only_run, run};
 
 /// Exclusive or, on a chip with everything that has state.
 pub(crate) const EVERYTHING: &str = "
@@ -52,7 +52,7 @@ fn additions_move_no_hash_no_address_and_no_verdict() {
     let root = DataRoot::new("no such folder");
     let fresh = load(&Sources { experiment: Some(("it", EVERYTHING)), ..Sources::default() });
     let outcome = run::train(&fresh.unwrap(), &root, work.path(), machine(), &mut |_| true);
-    let made = work.path().join("xor-ed-seed1");
+    let made = only_run(work.path());
     if std::env::var_os("UPDATE_EXPECT").is_some() && cfg!(not(feature = "grown")) {
         for name in ["lock", "report.html", "timing.json"] {
             fs::remove_file(made.join(name)).unwrap();
@@ -87,10 +87,16 @@ fn a_corrected_source_finds_the_run_again() {
     let work = tempfile::tempdir().unwrap();
     let store = work.path().join("store");
     let sweep = |source: &str, typical: &str| {
+        // a corrected file is another sweep of that name, which has to be said
         let file = work.path().join("sweep.toml");
         let text = SWEEP.replace("SOURCE", source).replace("TYPICAL", typical);
         fs::write(&file, text).unwrap();
-        let ran = run(dalean().arg("sweep").arg(&file).arg("--store").arg(&store).arg("--json"));
+        let ran = run(dalean()
+            .arg("sweep")
+            .arg(&file)
+            .arg("--store")
+            .arg(&store)
+            .args(["--json", "--replace"]));
         assert_eq!(ran.code, Some(0), "{ran:?}");
         ran
     };

@@ -116,7 +116,8 @@ fn a_finished_run_is_priced_again_with_its_own_and_with_another_chip() {
     };
     assert!(why("conversions").contains("drive.dac_bits") && why("time").contains("tile.rows"));
     assert!(why("pulses_attempted").contains("cell.level_bits"));
-    assert!(other["seconds"].is_null() && numbers(&other["joules"])[1] > 0.0);
+    assert!(other["seconds"].is_null() && other["joules"].is_null());
+    assert!(numbers(&other["joules_at_least"])[1] > 0.0);
     assert!(other["by_component"].as_array().unwrap().iter().any(|one| one["name"] == "multiply"));
 }
 
@@ -124,7 +125,8 @@ fn a_finished_run_is_priced_again_with_its_own_and_with_another_chip() {
 fn a_profile_adds_up() {
     let ran = run(dalean().args(["profile", SMALL, "--hw", "isaac", "--json"]));
     assert_eq!(ran.code, Some(0), "{ran:?}");
-    let acts = lines(&ran.stdout);
+    let acts: Vec<_> =
+        lines(&ran.stdout).into_iter().filter(|one| one["event"] == "profile").collect();
     let names: Vec<_> = acts.iter().map(|act| act["act"].as_str().unwrap()).collect();
     assert_eq!(names, ["training step", "inference"]);
     for act in &acts {
@@ -137,11 +139,13 @@ fn a_profile_adds_up() {
         }
         assert!(act["operations_per_second"].as_f64().unwrap() > 0.0);
     }
-    // 64 x 24 cells in four arrays, 24 x 10 in two; a training step reads and accumulates a batch of 16
-    let macs = 4 * 64 * 24 + 2 * 24 * 10;
-    assert_eq!((&acts[1]["macs_read"], &acts[1]["macs_accumulated"]), (&macs.into(), &0.into()));
-    assert_eq!(acts[0]["macs_read"], 16 * macs);
-    assert_eq!(acts[0]["macs_accumulated"], 16 * macs);
+    // 64 x 24 cells in four arrays, 24 x 10 in two, a pair of cells a weight; a training step reads and accumulates a
+    // batch of 16
+    let macs = f64::from((4 * 64 * 24 + 2 * 24 * 10) / 2);
+    assert_eq!(acts[1]["macs_read"], macs);
+    assert_eq!(acts[1]["macs_accumulated"], 0.0);
+    assert_eq!(acts[0]["macs_read"], 16.0 * macs);
+    assert_eq!(acts[0]["macs_accumulated"], 16.0 * macs);
     // and for people
     let ran = run(dalean().args(["profile", SMALL, "--set", "hw.timing.lanes=1"]));
     assert_eq!(ran.code, Some(0), "{ran:?}");

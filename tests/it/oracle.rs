@@ -151,7 +151,7 @@ fn experiment(s: &Value) -> Experiment {
         },
         route: Some(Route::Modulo { taps, shift }),
         batch: Batch::new(int(&s["batch"])).unwrap(),
-        mantissa: RateMantissa::new(int(&s["mantissa"])).unwrap(),
+        mantissas: vec![RateMantissa::new(int(&s["mantissa"])).unwrap(); widths.len() - 1],
         rates: s["rate"].as_array().unwrap().iter().map(positive).collect(),
         decay: Decay::Constant,
     };

@@ -77,3 +77,11 @@ pub(crate) fn finished(command: &mut Command) -> (PathBuf, Value) {
     assert_eq!(done["event"], "done");
     (PathBuf::from(done["run"].as_str().unwrap()), done)
 }
+
+/// The one folder below `out`: that of its only run, whatever its name.
+pub(crate) fn only_run(out: &Path) -> PathBuf {
+    let folders = std::fs::read_dir(out).unwrap().map(|entry| entry.unwrap().path());
+    let folders: Vec<PathBuf> = folders.filter(|path| path.is_dir()).collect();
+    let [one] = &folders[..] else { panic!("one run in {folders:?}") };
+    one.clone()
+}

@@ -92,7 +92,13 @@ fn a_sweep_fills_its_table_and_is_not_done_again() {
     let more = std::fs::read_to_string(SWEEP).unwrap().replace("[2, 4, 8]", "[2, 4, 6, 8]");
     let file = store.path().join("more.toml");
     std::fs::write(&file, more).unwrap();
-    let grown = run(dalean().arg("sweep").arg(&file).args(["--json", "--store"]).arg(store.path()));
+    let mut grow = dalean();
+    grow.arg("sweep").arg(&file).args(["--json", "--store"]).arg(store.path());
+    // it is another sweep of that name, and nothing is replaced unasked
+    let ran = run(&mut grow);
+    assert!(ran.code == Some(1) && ran.stderr.contains("another sweep `small`"), "{ran:?}");
+    assert_eq!(self::table(store.path()), table);
+    let grown = run(grow.arg("--replace"));
     assert_eq!((events(&grown, "run").len(), grown.last()["finished"].as_u64()), (4, Some(16)));
 }
 
@@ -268,12 +274,88 @@ fn a_sample_of_a_store_is_done_again_and_lies_are_found() {
     drop(index);
     let ran = verify("1");
     assert_eq!(ran.code, Some(4), "{ran:?}");
-    assert!(ran.stderr.contains("the row of run"), "{ran:?}");
+    // it is the index that lies, and not this machine
+    let told = "`test_accuracy` differs: the index says 1.";
+    assert!(ran.stderr.contains(told) && ran.stderr.contains("its folder gives 0."), "{ran:?}");
     // what it claims does not come over: rows are read off the folders
     let other = store.path().join("other");
     let ran = run(dalean().args(["store", "merge", "--json"]).args([&other, store.path()]));
     assert_eq!(ran.last()["runs"], RUNS, "{ran:?}");
     assert_eq!(table(&other), honest);
+}
+
+/// The folder of the first run of a table.
+fn first_run(store: &Path, table: &str) -> (String, std::path::PathBuf) {
+    let key = table.lines().nth(1).unwrap().rsplit(',').nth(1).unwrap();
+    (key.to_owned(), store.join("runs").join(&key[..2]).join(key))
+}
+
+#[test]
+fn a_store_does_not_believe_in_runs_whose_folders_are_gone() {
+    let (store, _, wanted) = undisturbed();
+    let (key, folder) = first_run(store.path(), &wanted);
+    std::fs::remove_dir_all(&folder).unwrap();
+    let list = run(dalean().args(["store", "list", "--json"]).arg(store.path()));
+    assert_eq!(list.last()["finished"], RUNS - 1, "{list:?}");
+    assert!(list.stderr.contains("their folders are gone"), "{list:?}");
+    let ran = run(dalean().arg("export").arg(store.path()));
+    assert!(ran.stderr.contains("1 points were finished, but their folders are gone"), "{ran:?}");
+    assert_eq!(ran.stdout.lines().nth(1).unwrap().matches(",lost,").count(), 1, "{ran:?}");
+    let dry = run(sweep(store.path()).arg("--dry-run")).last();
+    assert_eq!(dry["todo"], 1, "{dry}");
+    let verify = run(dalean().arg("verify").arg(store.path()).args(["--sample", "99"]));
+    assert!(verify.code == Some(1) && verify.stderr.contains(&key), "{verify:?}");
+    let ran = run(&mut sweep(store.path()));
+    let done: Vec<_> = events(&ran, "run");
+    assert_eq!((ran.code, done.len(), &done[0]["key"]), (Some(0), 1, &key.into()), "{ran:?}");
+    assert_eq!(table(store.path()), wanted);
+    // and an index that is made again forgets them
+    std::fs::remove_dir_all(&folder).unwrap();
+    let ran = run(dalean().args(["store", "index", "--json"]).arg(store.path()));
+    assert_eq!(
+        (&ran.last()["finished"], &ran.last()["forgotten"]),
+        (&(RUNS - 1).into(), &1.into())
+    );
+    // what is no store is not made one by asking for its index
+    let typo = store.path().join("typo");
+    let ran = run(dalean().args(["store", "index"]).arg(&typo));
+    assert!(ran.code == Some(1) && ran.stderr.contains("is no store"), "{ran:?}");
+    assert!(!typo.exists());
+}
+
+#[test]
+fn a_merge_leaves_what_is_broken_behind_and_takes_the_rest() {
+    let (store, _, wanted) = undisturbed();
+    let rows: Vec<&str> = wanted.lines().skip(1).collect();
+    let folder = |at: usize| {
+        let key = rows[at].rsplit(',').nth(1).unwrap();
+        store.path().join("runs").join(&key[..2]).join(key)
+    };
+    std::fs::write(folder(0).join("metrics.jsonl"), "").unwrap();
+    std::fs::remove_file(folder(1).join("config.toml")).unwrap();
+    std::fs::write(folder(2).join("somebody's.txt"), "not of the run").unwrap();
+    let mut broken = 2;
+    #[cfg(unix)]
+    {
+        let far = store.path().join("far.toml");
+        std::fs::copy(folder(3).join("config.toml"), &far).unwrap();
+        std::fs::remove_file(folder(3).join("config.toml")).unwrap();
+        std::os::unix::fs::symlink(&far, folder(3).join("config.toml")).unwrap();
+        std::fs::remove_file(folder(4).join("report.html")).unwrap();
+        let made = Command::new("mkfifo").arg(folder(4).join("report.html")).status();
+        assert!(made.unwrap().success());
+        broken += 2;
+    }
+    let into = tempfile::tempdir().unwrap();
+    let ran = run(dalean().args(["store", "merge", "--json"]).args([into.path(), store.path()]));
+    assert_eq!(ran.code, Some(1), "{ran:?}");
+    let done: Value = serde_json::from_str(ran.stdout.lines().next().unwrap()).unwrap();
+    assert_eq!(done["runs"], RUNS - broken, "{ran:?}");
+    assert_eq!(done["skipped"].as_array().unwrap().len(), broken);
+    assert!(ran.stderr.contains("no plain file"), "{ran:?}");
+    let key = rows[2].rsplit(',').nth(1).unwrap();
+    let copied = into.path().join("runs").join(&key[..2]).join(key);
+    assert!(copied.join("receipt.json").exists() && !copied.join("somebody's.txt").exists());
 }
 
 #[test]
@@ -298,9 +380,7 @@ fn a_full_disk_stops_a_sweep_that_goes_on_later() {
     let (_, _, wanted) = undisturbed();
     let store = tempfile::tempdir().unwrap();
     for room in [1, 9, 25] {
-        let line = format!(
-            "ulimit -f {room}; trap '' XFSZ; exec \"$0\" sweep \"$2\" --json --store \"$1\""
-        );
+        let line = format!("ulimit -f {room}; exec \"$0\" sweep \"$2\" --json --store \"$1\"");
         let mut command = Command::new("bash");
         command.arg("-c").arg(line).arg(env!("CARGO_BIN_EXE_dalean")).arg(store.path()).arg(SWEEP);
         let ran = run(&mut command);

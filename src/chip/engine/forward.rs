@@ -108,6 +108,7 @@ impl Engine {
             }
             self.load_constant(layer + 1);
             self.note_currents(layer);
+            self.note_said(layer);
             self.charge_forward(layer);
             self.time(|schedule, cycles| schedule.read(cycles, layer, samples));
             return self.charge_seen(layer, total);

@@ -8,7 +8,7 @@
 mod network;
 mod tile;
 
-pub use network::{Network, Span, TileAt};
+pub use network::{Network, PartSpan, Span, TileAt};
 pub use tile::{
     BankEvents, Command, Launch, More, Tile, TileAdc, TileConfig, TileEvents, TileSize,
 };

@@ -74,7 +74,7 @@ impl Engine {
             };
             let chance = |drive: i64, gate: i64| chances(drive, gate, shift, slots_log2);
             let drives = self.sample_drives(layer, pathway.source, sample);
-            let mantissa = i64::from(self.mantissa);
+            let mantissa = i64::from(self.mantissas[layer]);
             let rows = drives.into_iter().map(|x| chance(i64::from(x) * mantissa, 0)[0]);
             let rows = trains(place(Site::RowTrain), &rows.collect::<Vec<_>>(), slots);
             let gates: Vec<i64> =

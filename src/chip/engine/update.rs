@@ -146,7 +146,7 @@ impl Engine {
         let (write, window) = (self.hardware.write.clone(), self.hardware.cell.window);
         let base = kernel::WriteLaw {
             shift: shift + wiring.shift_extra(),
-            mantissa: i32::try_from(self.mantissa).expect("1..=15"),
+            mantissa: i32::try_from(self.mantissas[layer]).expect("1..=15"),
             negate: false,
             increment_max: i32::try_from(write.increment_max.get()).expect("1..=127"),
             groups: u16::MAX,

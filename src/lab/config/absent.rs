@@ -39,7 +39,7 @@ macro_rules! effects {
 /// The effects: writes, storage, reads, and what surrounds the tiles.
 #[rustfmt::skip]
 pub const EFFECTS: &[Effect] = effects![
-    Any "write_nonlinearity", "steps that depend on level and direction", "a pulse moves a cell by exactly one level, or by none at an end of its window";
+    Any "write_nonlinearity", "steps that depend on level and direction", "pulses move a cell by exactly the levels asked for, inside its window";
     Any "unidirectional", "cells that move in small steps one way only", "steps up and down are alike";
     Any "cycle_to_cycle", "steps that vary from pulse to pulse", "every pulse does the same";
     Any "device_to_device", "cells that differ in step, range and response", "all cells are alike";
@@ -54,8 +54,8 @@ pub const EFFECTS: &[Effect] = effects![
     Any "on_off", "a lowest level that still conducts", "level 0 conducts nothing";
     Electronic "ir_drop", "voltage lost along wires, sneak currents", "wires have no resistance";
     Any "settling", "currents that have not settled when they are sampled", "a read has settled after the cycles the model gives";
-    Any "converter_errors", "offset, gain error, non-linearity and noise of converters and drivers", "they are exact but for bits and range";
-    Any "temperature", "temperature and supply that vary", "both are constant";
+    Any "converter_errors", "offset, gain error, non-linearity and noise of converters and drivers", "converters and drivers are exact but for bits and range";
+    Any "temperature", "temperature and supply that vary", "temperature and supply are constant";
     Optical "loss", "light lost in couplers, crossings and cells", "no light is lost";
     Optical "wavelength_crosstalk", "colours that leak into one another", "colours do not leak";
     Optical "thermal_crosstalk", "heaters that warm their neighbours", "a heater warms its own cell only";
@@ -95,11 +95,12 @@ impl Absent {
     }
 }
 
-/// `22 effects of real chips, 5 of them with figures of this chip`.
+/// `19 effects of real chips are not simulated, 5 with figures of this one`.
 #[must_use]
 pub fn absent_words(absent: &[Absent]) -> String {
     let figures = absent.iter().filter(|one| one.chip.is_some()).count();
-    let mut text = format!("{} effects of real chips are not simulated", absent.len());
+    let (noun, verb) = if absent.len() == 1 { ("effect", "is") } else { ("effects", "are") };
+    let mut text = format!("{} {noun} of real chips {verb} not simulated", absent.len());
     if figures > 0 {
         text += &format!(", {figures} with figures of this one");
     }
@@ -109,7 +110,7 @@ pub fn absent_words(absent: &[Absent]) -> String {
 impl Config {
     /// What real chips of this kind do and a run does not: the program's list, with what the model says of its own.
     #[must_use]
-    pub fn absent(&self) -> Vec<Absent> {
+    pub(crate) fn absent(&self) -> Vec<Absent> {
         let drive = self.resolved.hw.as_ref().and_then(|hw| hw.drive.as_ref());
         let optical = drive.is_some_and(|drive| drive.mode.as_deref() == Some("amplitude"));
         let has = |effect: &&Effect| match (effect.of, effect.key) {

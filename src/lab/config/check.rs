@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use std::fmt::Display;
 
 use super::changed::{self, UnderModel};
+use super::defaults::SetDefaults;
 use super::file::{ChipFile, DataFile, ExperimentFile, LearningFile, NetworkFile, PerLayer};
 use super::hardware::check_marks;
 use super::law::{kind_of, settings};
@@ -16,7 +17,7 @@ use crate::learn::error::Centre;
 use crate::learn::route::Route;
 use crate::learn::rule::{Rule, UpdateMode};
 use crate::num::fixed::{Batch, OutOfRange, RateMantissa};
-use crate::num::tables::{Activation, Decay, Positive};
+use crate::num::tables::{Activation, Decay, Positive, Rate, Unit};
 
 mod learning;
 mod network;
@@ -55,7 +56,7 @@ pub type DataConfig = DataFile;
 /// let config = Config::load(&Sources { experiment: Some(("mine", text)), ..Sources::default() })?;
 /// assert_eq!((config.seed(), config.hardware().cell.level_bits.get()), (7, 5));
 /// // every default is written out, and read back as the same
-/// assert!(config.to_toml().contains("epochs = 20"));
+/// assert!(config.to_toml().contains("epochs = 40"));
 /// # Ok::<(), dalean::ConfigError>(())
 /// ```
 #[derive(Debug, Clone)]
@@ -86,8 +87,8 @@ pub struct Config {
     pub(crate) route: Option<Route>,
     /// Samples of an update.
     pub(crate) batch: Batch,
-    /// Small factor of the rate.
-    pub(crate) mantissa: RateMantissa,
+    /// Small factor of the rate of each layer.
+    pub(crate) mantissas: Vec<RateMantissa>,
     /// Rate of each layer.
     pub(crate) rates: Vec<Positive>,
     /// How the rate falls.
@@ -154,13 +155,14 @@ pub(super) fn per_layer<T: Clone + PartialEq>(
     match value.get_or_insert(PerLayer::All(default)) {
         PerLayer::All(one) => Ok(vec![one.clone(); layers]),
         PerLayer::Each(list) if list.len() == layers => Ok(list.clone()),
-        PerLayer::Each(list) => {
-            let found = format!("has {} numbers", list.len());
-            let allowed =
-                format!("there are {layers} layers (hidden and output); give {layers}, or one");
-            Err(wrong(key, found, allowed))
-        }
+        PerLayer::Each(list) => Err(one_a_layer(key, list.len(), layers)),
     }
+}
+
+/// A list that has not one number a layer.
+pub(super) fn one_a_layer(key: &str, found: usize, layers: usize) -> ConfigError {
+    let allowed = format!("there are {layers} layers (hidden and output); give {layers}, or one");
+    wrong(key, format!("has {found} numbers"), allowed)
 }
 
 pub(super) fn positive(key: &str, value: f64) -> Result<Positive, ConfigError> {
@@ -180,25 +182,39 @@ pub(super) fn config(mut file: ExperimentFile, model: &UnderModel) -> Result<Con
     let hardware_name = hw.name.get_or_insert_with(|| "unnamed".into()).clone();
     let not_simulated = hw.not_simulated.clone().unwrap_or_default();
     let data = data::resolve(file.data.get_or_insert_with(DataFile::default))?;
+    let defaults = SetDefaults::of(&data);
     let network = file.network.get_or_insert_with(NetworkFile::default);
     let learning = file.learning.get_or_insert_with(LearningFile::default);
-    let hidden = network.hidden.get_or_insert_with(|| vec![256]).clone();
+    let hidden = network.hidden.get_or_insert_with(|| defaults.hidden.to_vec()).clone();
     let Learning {
         kind,
         mode,
         centre,
         route,
         batch,
-        mantissa,
         rates,
         decay,
         epochs,
         shift_pixels,
         train_on,
         select,
-    } = learning::resolve(learning, hidden.len() + 1)?;
+    } = learning::resolve(learning, &hidden, defaults)?;
     let Network { activations, weight_max_log2, bias_rows, gain_64ths } =
-        network::resolve(network, hidden.len() + 1, kind)?;
+        network::resolve(network, hidden.len() + 1, kind, defaults)?;
+    let asked = rates.iter().zip(activations.iter().zip(&weight_max_log2));
+    let asked = asked.map(|(&rate, (&activation, &weight_max_log2))| Rate {
+        rate,
+        batch,
+        mantissa: RateMantissa::new(1).expect("in range"),
+        error_bits: hardware.digital.error_bits,
+        activation,
+        unit: Unit {
+            weight_max_log2,
+            level_bits: hardware.cell.level_bits,
+            drive_bits: hardware.drive.bits,
+        },
+    });
+    let mantissas = learning::mantissas(learning, &asked.collect::<Vec<_>>())?;
     #[cfg(feature = "grown")]
     file.learning.get_or_insert_default().grown.get_or_insert(0);
     Ok(Config {
@@ -215,7 +231,7 @@ pub(super) fn config(mut file: ExperimentFile, model: &UnderModel) -> Result<Con
         centre,
         route,
         batch,
-        mantissa,
+        mantissas,
         rates,
         decay,
         epochs,

@@ -10,6 +10,7 @@
 //! differences make another name.
 
 use super::changed::UnderModel;
+use super::defaults::FOLLOWING;
 use super::file::ExperimentFile;
 use super::hardware::{model_file, model_names, model_text};
 use super::{Config, check, keys, layers};
@@ -91,10 +92,23 @@ impl Config {
             .map(|config| config.resolved)
     }
 
+    /// The same with everything else that is said, but for keys whose default follows from it.
+    fn following(&self) -> Option<ExperimentFile> {
+        let mut file = self.resolved.clone();
+        let learning = file.learning.as_mut()?;
+        (learning.rate, learning.rate_multipliers, learning.centre) = (None, None, None);
+        check::config(file, &UnderModel::default()).ok().map(|config| config.resolved)
+    }
+
     /// Keys whose value is another than by saying nothing but data, rule and chip; the seed aside.
     #[must_use]
-    pub fn differences(&self) -> Vec<Difference> {
-        let silent = self.silent().map(|file| lines_of(&file)).unwrap_or_default();
+    pub(crate) fn differences(&self) -> Vec<Difference> {
+        let mut silent = self.silent().map(|file| lines_of(&file)).unwrap_or_default();
+        if let Some(file) = self.following() {
+            let follows = |key: &str| FOLLOWING.contains(&key);
+            silent.retain(|(key, _)| !follows(key));
+            silent.extend(lines_of(&file).into_iter().filter(|(key, _)| follows(key)));
+        }
         let all = lines_of(&self.resolved).into_iter();
         let others = all
             .filter(|(key, _)| !["seed", "hw.name"].contains(&&**key) && !key.starts_with("data."));
@@ -108,7 +122,7 @@ impl Config {
 
     /// Name of the folder of its runs: says data, rule, what differs from saying nothing, and the seed.
     #[must_use]
-    pub fn run_name(&self) -> String {
+    pub(crate) fn run_name(&self) -> String {
         let mut parts = vec![clean(&self.data_name(), WORD_MAX), clean(self.rule_name(), WORD_MAX)];
         if self.model_name() != "ideal" {
             parts.push(clean(self.model_name(), WORD_MAX));
@@ -132,7 +146,7 @@ impl Config {
 
     /// What differs from saying nothing, for headings: `level_bits 4, rate 5, seed 2`; empty when nothing does.
     #[must_use]
-    pub fn differences_text(&self) -> String {
+    pub(crate) fn differences_text(&self) -> String {
         let differences = self.differences();
         let mut words: Vec<String> = differences.iter().map(Difference::text).collect();
         let more = words.len().saturating_sub(SHOWN_MAX);
@@ -168,7 +182,7 @@ impl Difference {
 
     /// `level-bits4`, `hidden64x32`, `overlap`, `no-overlap`.
     fn word(&self) -> String {
-        let key = clean(&self.key_short(), usize::MAX);
+        let key = clean(&self.key_short().replace('.', "-"), usize::MAX);
         match &*self.value {
             "true" => key,
             "false" => format!("no-{key}"),
@@ -222,7 +236,11 @@ mod tests {
             (&["hw.model=reram", "hw.cell.level_bits=7"], "optdigits-ed-reram-seed1"),
             (&["hw.model=reram", "hw.adc.bits=4"], "optdigits-ed-reram-adc-bits4-seed1"),
             (&["network.hidden=[64, 32]"], "optdigits-ed-hidden64x32-seed1"),
-            (&["network.alpha=[6, 6]"], "optdigits-ed-seed1"),
+            (&["network.hidden=[1024]"], "optdigits-ed-hidden1024-seed1"),
+            (&["learning.batch=1"], "optdigits-ed-batch1-seed1"),
+            (&["learning.mode=online"], "optdigits-ed-mode-online-seed1"),
+            (&["learning.batch=8", "learning.rate=18"], "optdigits-ed-batch8-rate18.0-seed1"),
+            (&["network.alpha=[4, 4]"], "optdigits-ed-seed1"),
             (&["learning.rule=dfa"], "optdigits-dfa-seed1"),
             (&["learning.rule=kaneko", "data.set=xor"], "xor-kaneko-seed1"),
             (&["learning.rate=0.5"], "optdigits-ed-rate0.5-seed1"),

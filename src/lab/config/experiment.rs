@@ -84,7 +84,7 @@ impl Config {
             centre: self.centre,
             route: self.route,
             batch: self.batch,
-            mantissa: self.mantissa,
+            mantissas: self.mantissas.clone(),
             rates: self.rates.clone(),
             decay: self.decay,
         }
@@ -94,6 +94,12 @@ impl Config {
     #[must_use]
     pub fn rule_name(&self) -> &str {
         self.resolved.learning.as_ref().and_then(|l| l.rule.as_deref()).unwrap_or("ed")
+    }
+
+    /// The mode of writing a batch as it was written.
+    #[must_use]
+    pub(crate) fn mode_name(&self) -> &str {
+        self.resolved.learning.as_ref().and_then(|l| l.mode.as_deref()).unwrap_or("accumulate")
     }
 
     /// What may go wrong with these numbers, before anything runs.

@@ -19,6 +19,18 @@ pub enum PerLayer<T> {
     Each(Vec<T>),
 }
 
+/// `rate_mantissa = 3`, `[3, 5]` or `"auto"`.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(untagged, expecting = "a whole number, a list with one a layer, or \"auto\"")]
+pub enum MantissaFile {
+    /// By name.
+    Named(String),
+    /// The same in every layer.
+    All(i64),
+    /// Input to output.
+    Each(Vec<i64>),
+}
+
 /// Structures of optional keys that refuse unknown ones. What stands above a key is its meaning, for `dalean keys` too.
 macro_rules! keys {
     ($($(#[doc = $doc:literal])* $name:ident {
@@ -66,28 +78,46 @@ keys! {
         set: String,
         /// `idx`, `npz`, `csv`: own files.
         format: String,
-        /// Training examples (IDX: images).
+        /// File of the training examples; paths in a file are relative to that file.
         train: String,
-        /// IDX labels of the training examples.
+        /// IDX, NPZ: file of the training labels, where they have one of their own.
         train_labels: String,
-        /// Validation examples; default: every 12th training example.
+        /// File of the validation examples; default: every 12th training example.
         validation: String,
-        /// IDX labels of the validation examples.
+        /// IDX, NPZ: file of their labels.
         validation_labels: String,
-        /// Test examples.
+        /// File of the test examples; default: every 6th example of the training file.
         test: String,
-        /// IDX labels of the test examples.
+        /// IDX, NPZ: file of their labels.
         test_labels: String,
-        /// Greatest value; default: the greatest training value, or 255 for floats.
+        /// Greatest value; default: the greatest training value, or 255 for fractions.
         full_scale: u8,
-        /// Number of classes; default: greatest label + 1.
+        /// Number of classes; default: as many as there are different labels.
         classes: usize,
-        /// CSV: `first`, `last`, a number from 0, or a header.
+        /// CSV: `first`, `last`, a number from 0, or a header; default: told from the table, and said.
         label_column: String,
-        /// NPZ: name of the array of examples (default `x`).
+        /// CSV: columns left out, each a number from 0 or a header; default: those without a name that number the rows.
+        ignore_columns: Vec<String>,
+        /// CSV: whether the first line names the columns; default: told from the table.
+        header: bool,
+        /// CSV: `,`, `;`, `tab`, `|`; default: what cuts the first lines alike.
+        separator: String,
+        /// NPZ: name of the array of examples of every part (default: known names, such as `x` or `x_train`).
         examples_array: String,
-        /// NPZ: name of the array of labels (default `y`).
+        /// NPZ: name of the array of labels of every part.
         labels_array: String,
+        /// NPZ: array of the training examples.
+        train_array: String,
+        /// NPZ: array of the training labels.
+        train_labels_array: String,
+        /// NPZ: array of the validation examples; in the training file, unless `validation` names another.
+        validation_array: String,
+        /// NPZ: array of the validation labels.
+        validation_labels_array: String,
+        /// NPZ: array of the test examples; in the training file, unless `test` names another.
+        test_array: String,
+        /// NPZ: array of the test labels.
+        test_labels_array: String,
     }
     /// `[network]`.
     NetworkFile {
@@ -124,8 +154,8 @@ keys! {
         rate: f64,
         /// Factor of the rate of each layer.
         rate_multipliers: PerLayer<f64>,
-        /// Small factor beside the shift.
-        rate_mantissa: i64,
+        /// Small factor beside the shift of each layer.
+        rate_mantissa: MantissaFile,
         /// How the rate falls over the run.
         decay: String,
         /// What is subtracted from errors.
@@ -182,7 +212,7 @@ keys! {
         constants_for: Settings,
         /// Ways to use the chip, for `hw peak --modes` (model files): name and settings.
         modes: BTreeMap<String, Vec<String>>,
-        /// What the chip does and this program does not simulate: printed with every report.
+        /// What the chip has of what this program does not simulate, by the names that `dalean hw show` lists.
         not_simulated: BTreeMap<String, String>,
     }
     /// `[cell]`.

@@ -69,6 +69,7 @@ const FROZEN: &[(&str, &str)] = &[
     ("timing.verify", "false"),
     ("timing.active_max", "any"),
     ("timing.slices", "alike"),
+    ("layer.mantissa", "1"),
 ];
 
 /// Key and word.
@@ -94,7 +95,7 @@ impl Config {
 fn classify(experiment: &Experiment, train_on: TrainOn, select: Select) -> Vec<Given> {
     // without `..`, here and below: what a run is given is listed or does not compile
     let Experiment { seed, hardware, network, epochs, augment } = experiment;
-    let NetworkSpec { layers, rule, mode, centre, route, batch, mantissa, rates, decay } = network;
+    let NetworkSpec { layers, rule, mode, centre, route, batch, mantissas, rates, decay } = network;
     let mut list = List::default();
     list.put("task", "classify");
     list.put("seed", seed);
@@ -139,7 +140,17 @@ fn classify(experiment: &Experiment, train_on: TrainOn, select: Select) -> Vec<G
         },
     );
     list.put("learning.batch", batch.get());
-    list.put("learning.mantissa", mantissa.get());
+    // one of all layers has the name it had before there was one a layer
+    match mantissas.first() {
+        Some(first) if mantissas.iter().all(|one| one == first) => {
+            list.put("learning.mantissa", first.get());
+        }
+        _ => {
+            for (number, mantissa) in mantissas.iter().enumerate() {
+                list.put(&format!("layer{number}.mantissa"), mantissa.get());
+            }
+        }
+    }
     list.put(
         "learning.decay",
         match decay {

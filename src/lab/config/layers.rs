@@ -1,9 +1,11 @@
 //! Laying texts over one another: built-in defaults, hardware model, experiment file, a sweep's keys, `--set`, `--hw`.
 
+use std::path::Path;
+
 use super::changed::{self, UnderModel};
 use super::file::{ExperimentFile, HardwareFile};
 use super::wrong::text_error;
-use super::{Config, ConfigError, check, hardware};
+use super::{Config, ConfigError, check, data, hardware};
 
 /// Where a configuration comes from, weakest first.
 ///
@@ -24,7 +26,7 @@ use super::{Config, ConfigError, check, hardware};
 /// ```
 #[derive(Debug, Clone, Default)]
 pub struct Sources<'a> {
-    /// Name and text of the experiment file.
+    /// Name and text of the experiment file; paths in it are relative to the folder of that name.
     pub experiment: Option<(&'a str, &'a str)>,
     /// What a sweep sets, weakest first.
     pub overlays: &'a [Overlay<'a>],
@@ -53,7 +55,8 @@ pub fn load(sources: &Sources<'_>) -> Result<Config, ConfigError> {
     let mut table = toml::Table::new();
     if let Some((name, text)) = sources.experiment {
         let _: ExperimentFile = parse(name, text)?;
-        let mut own = named(parse(name, text)?);
+        let mut own = expanded(parse(name, text)?);
+        anchor(&mut own, Path::new(name).parent().unwrap_or(Path::new("")));
         changed::mark(&mut own, name, false);
         overlay(&mut table, own);
     }
@@ -61,7 +64,7 @@ pub fn load(sources: &Sources<'_>) -> Result<Config, ConfigError> {
         let mut own = (*over).clone();
         changed::spread(&mut own);
         let _: ExperimentFile = table_of(place, &own)?;
-        let mut own = named(own);
+        let mut own = expanded(own);
         // a file may cite; what is set on the way in is assumed
         changed::mark(&mut own, place, *place == "--set");
         overlay(&mut table, own);
@@ -70,7 +73,7 @@ pub fn load(sources: &Sources<'_>) -> Result<Config, ConfigError> {
         match taken_back(setting)? {
             Some(keys) => remove(&mut table, &keys),
             None => {
-                let mut own = named(setting_table(setting)?);
+                let mut own = expanded(setting_table(setting)?);
                 changed::mark(&mut own, "--set", true);
                 overlay(&mut table, own);
             }
@@ -92,6 +95,7 @@ pub fn load(sources: &Sources<'_>) -> Result<Config, ConfigError> {
         Some(toml::Value::Table(hw)) => hw,
         _ => toml::Table::new(),
     };
+    named(&own)?;
     let name = own.get("model").and_then(toml::Value::as_str).unwrap_or("ideal").to_owned();
     // a resolved configuration holds its model's numbers itself
     let mut before = None;
@@ -112,12 +116,47 @@ pub fn load(sources: &Sources<'_>) -> Result<Config, ConfigError> {
 }
 
 /// A text as what it says: `hw = "reram"` is `hw.model = "reram"`.
-fn named(mut over: toml::Table) -> toml::Table {
+fn expanded(mut over: toml::Table) -> toml::Table {
     if let Some(hw @ toml::Value::String(_)) = over.get_mut("hw") {
         let name = hw.clone();
         *hw = toml::Value::Table(toml::Table::from_iter([("model".to_owned(), name)]));
     }
     over
+}
+
+/// Makes paths that a file in `folder` names relative to where the program runs: those of data and of a hardware model.
+pub fn anchor(table: &mut toml::Table, folder: &Path) {
+    data::anchor(table, folder);
+    let model = match table.get_mut("hw") {
+        Some(toml::Value::Table(hw)) => hw.get_mut("model"),
+        model => model,
+    };
+    if let Some(toml::Value::String(model)) = model
+        && !hardware::model_names().contains(&&**model)
+    {
+        *model = folder.join(&*model).display().to_string();
+    }
+}
+
+/// Whether `hw.name` stands where it means something: in a chip that is written out, as resolved configurations have it.
+/// Elsewhere it would switch the model off, which nobody asked for.
+fn named(hw: &toml::Table) -> Result<(), ConfigError> {
+    let Some(name) = hw.get("name") else { return Ok(()) };
+    let model = hw.get("model");
+    let missing =
+        ["cell", "tile", "drive", "adc", "write"].iter().find(|table| !hw.contains_key(**table));
+    let allowed = match (model, missing) {
+        (None, None) => return Ok(()),
+        (Some(model), _) => format!(
+            "it names a chip that is written out, and would switch the model {model} off: take one of the two out \
+             (--set hw.name=default), or give the model file that name"
+        ),
+        (None, Some(table)) => format!(
+            "it names a chip that is written out, but there is no [hw.{table}]: take the key out, or write a model file and \
+             use it with --hw FILE"
+        ),
+    };
+    Err(ConfigError::Value { key: "hw.name".into(), found: format!("is {name}"), allowed })
 }
 
 /// A table as what its keys mean.
@@ -289,7 +328,10 @@ mod tests {
             (&["hw.write.dither_bits=0", "hw.write.dither=per_cell"], "hw.write.dither"),
             (&["data.label_column=last"], "data.label_column"),
             (&["data.format=csv", "data.train=a", "data.train_labels=b"], "data.train_labels"),
-            (&["data.format=idx", "data.test_labels=b"], "data.test_labels"),
+            (
+                &["data.format=idx", "data.train=a", "data.train_labels=b", "data.test_labels=b"],
+                "data.test_labels",
+            ),
             (&["data.format=idx", "data.labels_array=b"], "data.labels_array"),
         ] {
             let error = with(settings).unwrap_err().to_string();

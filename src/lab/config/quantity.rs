@@ -309,9 +309,9 @@ pub struct Constant {
 }
 
 impl Constant {
-    /// The law that brought it to the chip's setting, if one did.
+    /// Which law brought it to this setting, if one did.
     #[must_use]
-    pub fn scaled_by(&self) -> Option<&str> {
+    pub fn scaled(&self) -> Option<&str> {
         match &self.standing {
             Standing::Scaled(law) => Some(law),
             Standing::Stated | Standing::NotHere(_) => None,

@@ -24,7 +24,7 @@ pub fn template(name: &str) -> String {
         text += "kind = \"assumed\"                  # measured, fitted or assumed\n";
     }
     text += &numbers();
-    text += "\n# What the chip does and this program does not simulate, in words: printed with every report.\n\
+    text += "\n# Figures of this chip for what this program does not simulate (dalean hw show lists it): they stand beside every result.\n\
              [not_simulated]\n# drift = \"levels lose 2 % a day\"\n";
     text
 }
@@ -105,7 +105,7 @@ impl Config {
     /// # Panics
     /// Never: every key has a TOML form.
     #[must_use]
-    pub fn hardware_toml(&self, name: &str) -> String {
+    pub(crate) fn hardware_toml(&self, name: &str) -> String {
         let ChipFile(mut hw) = self.resolved.hw.clone().unwrap_or_default();
         hw.name = Some(name.to_owned());
         complete(&mut hw);

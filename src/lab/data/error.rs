@@ -3,9 +3,11 @@
 use std::{io, path::PathBuf};
 
 use super::{
+    arrays::{self, PartName},
     csv::CsvError,
     fetch::FetchError,
     idx::IdxError,
+    labels::LabelsError,
     npz::NpzError,
     source::{ImageShape, NamedSet},
 };
@@ -81,6 +83,15 @@ pub enum DataError {
         /// Why it failed.
         source: io::Error,
     },
+    /// A file of one's own that is not there.
+    #[error(
+        "cannot open {path}: there is no such file; check the path, which in a file is relative to that file (of a run, \
+         --data says where its data are now)", path = .path.display()
+    )]
+    NotThere {
+        /// The file.
+        path: PathBuf,
+    },
     /// A file too large to be read.
     #[error("{path} has {found} bytes, allowed are {limit}; cut it into parts", path = .path.display())]
     TooLarge {
@@ -143,11 +154,139 @@ pub enum DataError {
         /// Values of the training part.
         wanted: usize,
     },
-    /// Values or labels outside what was stated.
+    /// Labels that are no classes.
+    #[error("{path}: {source}", path = .path.display())]
+    Classless {
+        /// The training file.
+        path: PathBuf,
+        /// What is wrong.
+        source: LabelsError,
+    },
+    /// Values above the full scale.
     #[error(
-        "{path}: {source}; raise `full_scale` or `classes`, or mend the file",
+        "{path}: the {part} values reach {found}, above the full scale, {full_scale} ({}); say data.full_scale = \
+         {found}", if *.stated { "as stated" } else { "the greatest training value" }, path = .path.display()
+    )]
+    Bright {
+        /// The file.
+        path: PathBuf,
+        /// Which part.
+        part: &'static str,
+        /// Greatest value.
+        found: u8,
+        /// Full scale.
+        full_scale: u8,
+        /// Whether it was stated.
+        stated: bool,
+    },
+    /// Parts of two scales.
+    #[error(
+        "the training values are {train} and the {part} values {other} ({path}): two scales in one set; save both \
+         alike, or if they belong together, say with data.full_scale = {full_scale} what the brightest is",
         path = .path.display()
     )]
+    Scales {
+        /// The file of the other part.
+        path: PathBuf,
+        /// Which part.
+        part: &'static str,
+        /// What the training values are.
+        train: String,
+        /// What the others are.
+        other: String,
+        /// A full scale that joins them.
+        full_scale: u8,
+    },
+    /// Examples that are all the same.
+    #[error(
+        "{path}: all {examples} training examples have the same values, so there is nothing to learn from; check the \
+         file and what is read of it", path = .path.display()
+    )]
+    Constant {
+        /// The training file.
+        path: PathBuf,
+        /// How many there are.
+        examples: usize,
+    },
+    /// A class that lost its training examples to the parts that were cut off.
+    #[error(
+        "{path}: the class `{class}` has too few examples: those there are went to the {part} part, which is cut \
+         from the file; add examples, name a file for data.{part}, or say data.classes = {classes} if it is meant",
+        path = .path.display()
+    )]
+    Thin {
+        /// The training file.
+        path: PathBuf,
+        /// Name of the class.
+        class: String,
+        /// The part that has them.
+        part: &'static str,
+        /// Number of classes.
+        classes: usize,
+    },
+    /// Two parts that are the same.
+    #[error(
+        "the {one} and the {other} part are the same {what}, so the score would be one of examples that were learnt; \
+         give each part a file or array of its own (data.{other_key}_array in an archive), or take data.{other_key} \
+         out, and it is cut from the training file"
+    )]
+    SamePart {
+        /// One part.
+        one: &'static str,
+        /// The other.
+        other: &'static str,
+        /// As a key.
+        other_key: &'static str,
+        /// What is the same.
+        what: String,
+    },
+    /// Arrays whose names say nothing.
+    #[error(
+        "{path} has {}, and no known names among them tell the {} {what}; say {}", names(.there), .part.word(),
+        array_keys(.part.key(), .what), path = .path.display()
+    )]
+    Arrays {
+        /// The archive.
+        path: PathBuf,
+        /// Which part was looked for.
+        part: PartName,
+        /// What was looked for.
+        what: &'static str,
+        /// Names there.
+        there: Vec<String>,
+    },
+    /// A column to be left out that no table has.
+    #[error(
+        "no table has the column `{name}` that data.ignore_columns leaves out; mend the name or take it out"
+    )]
+    NoColumn {
+        /// Its name.
+        name: String,
+    },
+    /// One file for a set of several.
+    #[error(
+        "{path} is one file, but the data are several ({}); give the folder that holds them", .names.join(", "),
+        path = .path.display()
+    )]
+    Several {
+        /// What was given.
+        path: PathBuf,
+        /// Names of the files.
+        names: Vec<String>,
+    },
+    /// A file for a known set.
+    #[error(
+        "the data are the set `{set}`, not files of one's own, so {path} cannot stand for them; leave --data out, and \
+         give the folder of sets with --data-dir", path = .path.display()
+    )]
+    NotOwn {
+        /// The set.
+        set: NamedSet,
+        /// What was given.
+        path: PathBuf,
+    },
+    /// Values and labels that make no examples.
+    #[error("{path}: {source}", path = .path.display())]
     Examples {
         /// The file.
         path: PathBuf,
@@ -155,10 +294,12 @@ pub enum DataError {
         source: ExamplesError,
     },
     /// A full scale of 0.
-    #[error("`full_scale` is 0, allowed are 1 to 255; leave it out to take the greatest value")]
+    #[error(
+        "`data.full_scale` is 0, allowed are 1 to 255; leave it out to take the greatest value"
+    )]
     FullScale,
     /// A number of classes that bytes cannot number.
-    #[error("`classes` is {found}, allowed are 1 to 256; leave it out to count the labels")]
+    #[error("`data.classes` is {found}, allowed are 2 to 256; leave it out to count the labels")]
     Classes {
         /// The number.
         found: usize,
@@ -200,6 +341,22 @@ impl DataError {
     ) -> impl FnOnce(io::Error) -> Self {
         let path = path.into();
         move |source| Self::Io { doing, path, source }
+    }
+}
+
+fn names(there: &[String]) -> String {
+    let mut some: Vec<String> = there.iter().take(12).map(|name| arrays::shown(name)).collect();
+    if there.len() > some.len() {
+        some.push("...".into());
+    }
+    if some.is_empty() { "no arrays".into() } else { format!("the arrays {}", some.join(", ")) }
+}
+
+fn array_keys(part: &str, what: &str) -> String {
+    match what {
+        "examples" => format!("data.{part}_array"),
+        "labels" => format!("data.{part}_labels_array"),
+        _ => format!("data.{part}_array and data.{part}_labels_array"),
     }
 }
 

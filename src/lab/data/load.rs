@@ -21,13 +21,13 @@ use super::{
     error::DataError,
     idx,
     md5::md5_hex,
-    own,
+    own::{self, Told},
     source::{DataRoot, ImageShape, NamedSet, ParityBits, Source},
 };
 use crate::task::classify::{Examples, Split};
 
 /// Greatest size of a file: 2^32 bytes.
-const FILE_BYTES_MAX: u64 = 1 << 32;
+pub(crate) const FILE_BYTES_MAX: u64 = 1 << 32;
 
 /// A data set, ready for a run: parts of one kind, and their hash. Copies share their examples.
 #[derive(Debug, Clone)]
@@ -41,6 +41,12 @@ pub struct Data {
     pub(crate) hash: String,
     /// How to show an example as a picture.
     pub(crate) image: Option<ImageShape>,
+    /// What the classes are called, where it is not by their numbers.
+    pub(crate) names: Vec<String>,
+    /// How files of one's own were read, as far as nobody had said it.
+    pub(crate) said: Vec<String>,
+    /// The same as keys of a configuration.
+    pub(crate) told: Told,
 }
 
 impl Data {
@@ -90,6 +96,18 @@ impl Data {
         &self.hash
     }
 
+    /// What the classes are called, where it is not by their numbers: words, or numbers other than 0, 1, 2, ...
+    #[must_use]
+    pub fn class_names(&self) -> &[String] {
+        &self.names
+    }
+
+    /// How files of one's own were read, as far as nobody had said it: one sentence each.
+    #[must_use]
+    pub fn said(&self) -> &[String] {
+        &self.said
+    }
+
     /// How to show an example as a picture.
     #[must_use]
     pub const fn image(&self) -> Option<ImageShape> {
@@ -104,11 +122,17 @@ impl Data {
 pub fn load(source: &Source, root: &DataRoot) -> Result<Data, DataError> {
     match source {
         Source::Named(set) => named(*set, root),
-        Source::Files(files) => own::load(files),
+        Source::Files(files) => match root.files() {
+            None => own::load(files),
+            Some(place) => own::load(&files.moved(place)?),
+        },
     }
 }
 
 fn named(set: NamedSet, root: &DataRoot) -> Result<Data, DataError> {
+    if let Some(place) = root.files() {
+        return Err(DataError::NotOwn { set, path: place.into() });
+    }
     let xor = ParityBits::new(2).expect("2 bits are enough");
     let (split, image, note) = match set {
         NamedSet::Xor => (builtin::parity(xor), None, "; all parts are the same"),
@@ -144,7 +168,8 @@ pub(crate) fn finish(name: &str, split: Split, image: Option<ImageShape>, note: 
         train.full_scale(),
         train.classes(),
     );
-    Data { description, hash: content_hash(&split), image, split }
+    let (names, said, told) = Default::default();
+    Data { description, hash: content_hash(&split), image, split, names, said, told }
 }
 
 /// The hash of a split.
@@ -225,7 +250,12 @@ fn checked(entry: &CatalogEntry, file: &CatalogFile, path: &Path) -> Result<Vec<
 
 /// Reads a whole file of the user's own.
 pub(crate) fn read_own(path: &Path) -> Result<Vec<u8>, DataError> {
-    read_file(path, FILE_BYTES_MAX)
+    match read_file(path, FILE_BYTES_MAX) {
+        Err(DataError::Io { source, .. }) if source.kind() == io::ErrorKind::NotFound => {
+            Err(DataError::NotThere { path: path.to_owned() })
+        }
+        read => read,
+    }
 }
 
 fn read_file(path: &Path, limit: u64) -> Result<Vec<u8>, DataError> {

@@ -1,10 +1,11 @@
-//! NPZ: a zip archive of NumPy arrays, one `NAME.npy` each.
+//! NPZ: a zip archive of NumPy arrays, one `NAME.npy` each. A file of one array alone, `.npy`, is an archive of one
+//! without a name.
 
 use std::io::{Cursor, Read};
 
 use super::{
     inflate::read_up_to,
-    npy::{self, BYTES_MAX, Floats, NpyArray, NpyError},
+    npy::{BYTES_MAX, NpyError},
 };
 
 /// Greatest length of a header before the elements, beyond which a file is refused.
@@ -49,7 +50,7 @@ pub enum NpzError {
         source: std::io::Error,
     },
     /// The array itself.
-    #[error("array `{name}` {source}")]
+    #[error("{} {source}", if .name.is_empty() { "the array".into() } else { format!("array `{name}`") })]
     Array {
         /// Name of the array.
         name: String,
@@ -65,51 +66,86 @@ fn list(names: &[String]) -> String {
     }
 }
 
-/// Reads the array `name` out of an archive.
-///
-/// # Errors
-/// When the bytes are no archive, the array is not there or [`npy::read`] refuses it.
-pub fn read(bytes: &[u8], name: &str, floats: Floats) -> Result<NpyArray, NpzError> {
-    read_limited(bytes, name, floats, BYTES_MAX)
+/// An archive, opened.
+#[derive(Debug)]
+pub enum Archive<'a> {
+    /// Arrays by name.
+    Zip(Box<zip::ZipArchive<Cursor<&'a [u8]>>>),
+    /// One array.
+    Single(&'a [u8]),
 }
 
-/// As [`read`], with at most `limit` bytes of elements.
-///
-/// # Errors
-/// As [`read`].
-pub fn read_limited(
-    bytes: &[u8],
-    name: &str,
-    floats: Floats,
-    limit: u64,
-) -> Result<NpyArray, NpzError> {
-    let mut archive = zip::ZipArchive::new(Cursor::new(bytes))?;
-    if archive.len() > ARRAYS_MAX {
-        return Err(NpzError::Arrays { found: archive.len() });
+/// What the only array of a `.npy` file is called.
+pub const SINGLE: &str = "";
+
+impl<'a> Archive<'a> {
+    /// Opens an archive.
+    ///
+    /// # Errors
+    /// When the bytes are none.
+    pub fn open(bytes: &'a [u8]) -> Result<Self, NpzError> {
+        if bytes.starts_with(b"\x93NUMPY") {
+            return Ok(Self::Single(bytes));
+        }
+        let archive = zip::ZipArchive::new(Cursor::new(bytes))?;
+        if archive.len() > ARRAYS_MAX {
+            return Err(NpzError::Arrays { found: archive.len() });
+        }
+        Ok(Self::Zip(Box::new(archive)))
     }
-    let file_name = format!("{name}.npy");
-    let Some(at) = archive.index_for_name(&file_name).or_else(|| archive.index_for_name(name))
-    else {
-        let mut there: Vec<String> = archive
-            .file_names_raw()
-            .map(|n| n.strip_suffix(b".npy").unwrap_or(n).escape_ascii().to_string())
-            .collect();
-        there.sort();
-        return Err(NpzError::Name { wanted: name.to_owned(), there });
-    };
-    let name = || name.to_owned();
-    let limit = limit.saturating_add(HEADER_MAX);
-    let mut file = archive.by_index(at)?;
-    if file.size() > limit {
-        return Err(NpzError::Size { name: name(), limit });
+
+    /// Names of its arrays, sorted, without `.npy`.
+    #[must_use]
+    pub fn names(&self) -> Vec<String> {
+        match self {
+            Self::Zip(archive) => {
+                let name =
+                    |n: &[u8]| n.strip_suffix(b".npy").unwrap_or(n).escape_ascii().to_string();
+                let mut names: Vec<String> = archive.file_names_raw().map(name).collect();
+                names.sort();
+                names
+            }
+            Self::Single(_) => vec![SINGLE.to_owned()],
+        }
     }
-    // The size in the directory may lie, so what arrives is counted too.
-    let array =
-        read_up_to(&mut file, limit).map_err(|source| NpzError::Unpack { name: name(), source })?;
-    if file.read(&mut [0]).is_ok_and(|n| n > 0) {
-        return Err(NpzError::Size { name: name(), limit });
+
+    /// The bytes of an array, header and elements.
+    ///
+    /// # Errors
+    /// When it is not there, or cannot be unpacked.
+    pub fn read(&mut self, name: &str) -> Result<Vec<u8>, NpzError> {
+        self.read_limited(name, BYTES_MAX)
     }
-    npy::read(&array, floats).map_err(|source| NpzError::Array { name: name(), source })
+
+    /// As [`Archive::read`], with at most `limit` bytes of elements.
+    ///
+    /// # Errors
+    /// As [`Archive::read`].
+    pub fn read_limited(&mut self, name: &str, limit: u64) -> Result<Vec<u8>, NpzError> {
+        let missing = |there| Err(NpzError::Name { wanted: name.to_owned(), there });
+        let archive = match self {
+            Self::Single(bytes) if name == SINGLE => return Ok(bytes.to_vec()),
+            Self::Single(_) => return missing(vec!["one array without a name".into()]),
+            Self::Zip(archive) => archive,
+        };
+        let at = archive.index_for_name(&format!("{name}.npy"));
+        let Some(at) = at.or_else(|| archive.index_for_name(name)) else {
+            return missing(self.names());
+        };
+        let name = || name.to_owned();
+        let limit = limit.saturating_add(HEADER_MAX);
+        let mut file = archive.by_index(at)?;
+        if file.size() > limit {
+            return Err(NpzError::Size { name: name(), limit });
+        }
+        // the size in the directory may lie, so what arrives is counted too
+        let array = read_up_to(&mut file, limit)
+            .map_err(|source| NpzError::Unpack { name: name(), source })?;
+        if file.read(&mut [0]).is_ok_and(|n| n > 0) {
+            return Err(NpzError::Size { name: name(), limit });
+        }
+        Ok(array)
+    }
 }
 
 #[cfg(test)]
@@ -120,7 +156,15 @@ mod tests {
     use zip::{CompressionMethod, ZipWriter, write::SimpleFileOptions};
 
     use super::*;
-    use crate::lab::data::npy::tests::file as npy;
+    use crate::lab::data::npy::{self, tests::file as npy};
+
+    /// What is left of reading the array `x` as bytes.
+    fn read(bytes: &[u8], name: &str, limit: u64) -> Result<Vec<u8>, NpzError> {
+        let array = Archive::open(bytes)?.read_limited(name, limit)?;
+        let read = npy::values(&array, 16);
+        let failed = |source| NpzError::Array { name: name.into(), source };
+        read.map(|array| array.data).map_err(failed)
+    }
 
     pub(crate) fn archive(arrays: &[(&str, &[u8])], method: CompressionMethod) -> Vec<u8> {
         let mut zip = ZipWriter::new(Cursor::new(Vec::new()));
@@ -139,12 +183,14 @@ mod tests {
         );
         for method in [CompressionMethod::Stored, CompressionMethod::Deflated] {
             let bytes = archive(&[("x.npy", &x), ("y.npy", &y)], method);
-            let array = read(&bytes, "x", Floats::Refuse).unwrap();
-            assert_eq!((array.dims, array.data), (vec![2, 2], vec![1, 2, 3, 4]));
-            assert_eq!(read(&bytes, "y", Floats::Refuse).unwrap().data, [0]);
-            let missing = read(&bytes, "z", Floats::Refuse).unwrap_err().to_string();
+            assert_eq!(read(&bytes, "x", 1 << 20).unwrap(), [1, 2, 3, 4]);
+            assert_eq!(read(&bytes, "y", 1 << 20).unwrap(), [0]);
+            let missing = read(&bytes, "z", 1 << 20).unwrap_err().to_string();
             assert_eq!(missing, "has no array `z`; there are `x`, `y`");
         }
+        assert_eq!(Archive::open(&x).unwrap().names(), [SINGLE]);
+        assert_eq!(read(&x, SINGLE, 1 << 20).unwrap(), [1, 2, 3, 4]);
+        assert!(read(&x, "x", 1 << 20).is_err());
     }
 
     #[test]
@@ -152,15 +198,15 @@ mod tests {
         let zeros = npy("'|u1'", "False", "(1000000,)", &[0; 1_000_000]);
         let bytes = archive(&[("x.npy", &zeros)], CompressionMethod::Deflated);
         assert!(bytes.len() < 10_000);
-        let bomb = read_limited(&bytes, "x", Floats::Refuse, 100_000);
+        let bomb = read(&bytes, "x", 100_000);
         assert!(matches!(bomb, Err(NpzError::Size { .. })));
         for cut in [0, 10, bytes.len() / 2, bytes.len() - 1] {
-            assert!(matches!(read(&bytes[..cut], "x", Floats::Refuse), Err(NpzError::Zip(_))));
+            assert!(matches!(read(&bytes[..cut], "x", 1 << 20), Err(NpzError::Zip(_))));
         }
         let stored = archive(&[("x.npy", &zeros)], CompressionMethod::Stored);
         let mut flipped = stored.clone();
         flipped[500_000] ^= 1;
-        assert!(matches!(read(&flipped, "x", Floats::Refuse), Err(NpzError::Unpack { .. })));
+        assert!(matches!(read(&flipped, "x", 1 << 20), Err(NpzError::Unpack { .. })));
     }
 
     proptest! {
@@ -170,8 +216,8 @@ mod tests {
             let mut bytes = archive(&[("x.npy", &x)], CompressionMethod::Deflated);
             let at = at.index(bytes.len());
             bytes[at] = to;
-            if let Ok(array) = read_limited(&bytes, "x", Floats::Scale(16), 1 << 16) {
-                prop_assert_eq!(array.dims.iter().product::<usize>(), array.data.len());
+            if let Ok(values) = read(&bytes, "x", 1 << 16) {
+                prop_assert!(values.len() < 1 << 16);
             }
         }
     }

@@ -3,10 +3,12 @@
 
 use std::{fs, io::Write, path::PathBuf};
 
+use super::parts::planes;
 use super::*;
+use crate::lab::data::csv::Reading;
 use crate::lab::data::{
     npy::tests::file as npy,
-    source::{DataRoot, Source},
+    source::{DataRoot, PartFile, Source},
 };
 
 struct Files(tempfile::TempDir);
@@ -23,7 +25,7 @@ impl Files {
     }
 
     fn csv(&self, name: &str, text: &str) -> PartFile {
-        PartFile::Csv { path: self.put(name, text.as_bytes()), label: csv::LabelColumn::First }
+        table(self.put(name, text.as_bytes()))
     }
 
     fn idx(&self, name: &str, dims: &[u8], values: &[u8], labels: &[u8]) -> PartFile {
@@ -51,6 +53,11 @@ impl Files {
     }
 }
 
+fn table(path: PathBuf) -> PartFile {
+    let label = Some(crate::lab::data::csv::ColumnKey::First);
+    PartFile::Csv { path, reading: Reading { label, ..Reading::default() } }
+}
+
 fn only(train: PartFile) -> FileSet {
     FileSet { train, validation: None, test: None, full_scale: None, classes: None, image: None }
 }
@@ -61,7 +68,7 @@ fn loaded(files: FileSet) -> Result<Data, String> {
 }
 
 fn rows(count: u8) -> String {
-    (0..count).map(|e| format!("{},{e},{}\n", e / 12, 2 * e)).collect()
+    (0..count).map(|e| format!("{},{},{}\n", e / 12, e + 2, 2 * e)).collect()
 }
 
 #[test]
@@ -71,8 +78,8 @@ fn one_table_is_cut_evenly_even_when_sorted_by_class() {
     let Split { train, validation, test } = &set.split;
     assert_eq!((train.len(), validation.len(), test.len()), (28, 2, 6));
     assert_eq!(test.labels(), [0, 0, 1, 1, 2, 2]);
-    assert_eq!((test.values(0), train.full_scale(), train.classes()), (&[5, 10][..], 70, 3));
-    assert_eq!(validation.values(0), [13, 26]);
+    assert_eq!((test.values(0), train.full_scale(), train.classes()), (&[7, 10][..], 70, 3));
+    assert_eq!(validation.values(0), [15, 26]);
     assert!(set.description.ends_with(
         "all.csv: 28 training, 2 validation, 6 test examples of 2 values 0 to 70, 3 classes; test is \
          every 6th example of the file; validation is every 12th example of the training part"
@@ -89,8 +96,9 @@ fn parts_of_three_formats_make_one_split() {
     ]);
     let set = loaded(FileSet {
         validation: Some(files.csv("v.csv", "label,a,b\n1,3,4\n")),
-        test: Some(PartFile::Npz { path, values: "x".into(), labels: "y".into() }),
+        test: Some(PartFile::Npz { path, labels_path: None, values: None, labels: None }),
         full_scale: Some(16),
+        classes: Some(3),
         ..only(files.idx("t", &[2, 1, 2], &[1, 2, 3, 4], &[0, 1]))
     })
     .unwrap();
@@ -103,12 +111,14 @@ fn parts_of_three_formats_make_one_split() {
 
 #[test]
 fn colours_side_by_side_become_planes() {
+    let values: Vec<u8> = (0..12).collect();
+    assert_eq!(planes(&values, 12, 3), [0, 3, 6, 9, 1, 4, 7, 10, 2, 5, 8, 11]);
     let files = Files::new();
-    let values: Vec<u8> = (0..24).collect();
-    let part = files.idx("t", &[2, 2, 2, 3], &values, &[0, 1]);
-    let OwnPart { values, image, .. } = read_part(&part, 255).unwrap();
-    assert_eq!(values[..12], [0, 3, 6, 9, 1, 4, 7, 10, 2, 5, 8, 11]);
-    assert_eq!(image, Some(ImageShape { height: 2, width: 2, channels: 3 }));
+    let values: Vec<u8> = (0..240).collect();
+    let labels: Vec<u8> = (0..20).map(|e| e % 2).collect();
+    let set = loaded(only(files.idx("t", &[20, 2, 2, 3], &values, &labels))).unwrap();
+    assert_eq!(set.split.train.values(0)[..4], [0, 3, 6, 9]);
+    assert_eq!(set.image, Some(ImageShape { height: 2, width: 2, channels: 3 }));
 }
 
 #[test]
@@ -116,34 +126,120 @@ fn every_mistake_names_the_file_and_the_way_out() {
     let files = Files::new();
     let train = || files.csv("train.csv", &rows(36));
     let other = |name, text| Some(files.csv(name, text));
-    let gone =
-        PartFile::Csv { path: files.0.path().join("gone.csv"), label: csv::LabelColumn::Last };
-    let folder = PartFile::Csv { path: files.0.path().to_owned(), label: csv::LabelColumn::Last };
+    let gone = table(files.0.path().join("gone.csv"));
+    let folder = table(files.0.path().to_owned());
     let image = Some(ImageShape { height: 3, width: 3, channels: 1 });
     let cases = [
         (only(gone), "cannot open", "check the path"),
         (only(folder), "cannot read", "directory"),
         (
             FileSet { test: other("narrow.csv", "0,1\n"), ..only(train()) },
-            "narrow.csv has 1 values",
-            "has 2",
+            "narrow.csv has 2 columns",
+            "the training part has 3",
         ),
         (
             FileSet { test: other("bright.csv", "0,1,99\n"), ..only(train()) },
-            "bright.csv: example 0 holds the value 99",
-            "raise `full_scale`",
+            "bright.csv: the test values reach 99, above the full scale, 70",
+            "say data.full_scale = 99",
         ),
-        (FileSet { classes: Some(2), ..only(train()) }, "the label 2", "raise"),
-        (FileSet { classes: Some(257), ..only(train()) }, "`classes` is 257", "1 to 256"),
-        (FileSet { full_scale: Some(0), ..only(train()) }, "`full_scale` is 0", "1 to 255"),
+        (FileSet { full_scale: Some(9), ..only(train()) }, "reach 70", "9 (as stated)"),
+        (FileSet { classes: Some(2), ..only(train()) }, "no 2 classes", "say data.classes = 3"),
+        (FileSet { classes: Some(257), ..only(train()) }, "`data.classes` is 257", "2 to 256"),
+        (FileSet { full_scale: Some(0), ..only(train()) }, "`data.full_scale` is 0", "1 to 255"),
         (FileSet { image, ..only(train()) }, "3 x 3 x 1", "examples of 2 values"),
-        (only(files.csv("few.csv", &rows(5))), "few.csv has 5 examples", "at least 6"),
-        (only(files.csv("bad.csv", "0,x1\n0,1\n0\n")), "bad.csv line 1", "if the line is a header"),
+        (
+            only(files.csv("few.csv", "0,7\n1,2\n0,3\n1,4\n0,5\n")),
+            "few.csv has 5 examples",
+            "at least 6",
+        ),
+        (
+            only(files.csv("bad.csv", "0,x1\n0,1\n0\n")),
+            "bad.csv line 3 has 1 fields",
+            "complete the line",
+        ),
         (only(files.idx("i", &[3, 1], &[0; 3], &[0; 2])), "shape [2]", "3 examples need"),
-        (only(files.idx("j", &[3], &[0; 3], &[0; 3])), "j-values has 3 examples", "at least 6"),
+        (
+            only(files.idx("j", &[3], &[0; 3], &[0; 3])),
+            "all 3 labels are `0`",
+            "nothing to tell apart",
+        ),
+        (
+            FileSet { test: Some(train()), ..only(train()) },
+            "training and the test part are the same examples",
+            "take data.test out",
+        ),
+        (
+            FileSet { test: other("dark.csv", "0,1,0\n1,0,1\n"), ..only(train()) },
+            "two scales",
+            "data.full_scale = 70",
+        ),
+        (
+            FileSet { test: other("new.csv", "7,1,40\n"), ..only(train()) },
+            "the label `7`",
+            "data.classes = 4",
+        ),
+        (
+            only(files.csv(
+                "thin.csv",
+                "0,5\n0,2\n1,3\n1,4\n1,5\n2,6\n0,7\n0,8\n1,9\n1,5\n1,5\n2,6\n0,7\n0,8\n0,9\n",
+            )),
+            "the class `2` has too few examples",
+            "data.classes = 3",
+        ),
+        (
+            only(files.csv("flat.csv", &"0,9\n1,9\n".repeat(12))),
+            "training examples have the same values",
+            "check the file",
+        ),
     ];
     for (set, found, advice) in cases {
         let error = loaded(set).unwrap_err();
         assert!(error.contains(found) && error.contains(advice), "{error}");
     }
+}
+
+#[test]
+fn the_arrays_of_known_archives_are_the_parts_they_name() {
+    let files = Files::new();
+    let bytes = |count: u8, from: u8| {
+        let shape = format!("({count}, 2)");
+        npy("'|u1'", "False", &shape, &(from..from + 2 * count).collect::<Vec<_>>())
+    };
+    let labels = |count: u8| {
+        let shape = format!("({count},)");
+        npy("'|u1'", "False", &shape, &(0..count).map(|e| e % 2).collect::<Vec<_>>())
+    };
+    let path = files.npz(&[
+        ("x_train", bytes(24, 0)),
+        ("y_train", labels(24)),
+        ("x_test", bytes(6, 30)),
+        ("y_test", labels(6)),
+    ]);
+    let npz = |path: &PathBuf| PartFile::Npz {
+        path: path.clone(),
+        labels_path: None,
+        values: None,
+        labels: None,
+    };
+    let set = loaded(only(npz(&path))).unwrap();
+    assert_eq!(
+        (set.split.train.len(), set.split.validation.len(), set.split.test.len()),
+        (22, 2, 6)
+    );
+    assert_eq!(set.split.test.values(0), [30, 31]);
+    assert_eq!(set.told.in_training_file, [false, false, true]);
+    assert!(set.said[0].contains("training examples are array `x_train`"), "{:?}", set.said);
+    assert!(set.said[1].contains("test examples are array `x_test`"), "{:?}", set.said);
+    let same = loaded(FileSet { test: Some(npz(&path)), ..only(npz(&path)) }).unwrap();
+    assert_eq!(same.hash, set.hash);
+    let named = |values: &str, labels: &str| PartFile::Npz {
+        path: path.clone(),
+        labels_path: None,
+        values: Some(values.into()),
+        labels: Some(labels.into()),
+    };
+    let twice =
+        FileSet { test: Some(named("x_train", "y_train")), ..only(named("x_train", "y_train")) };
+    let error = loaded(twice).unwrap_err();
+    assert!(error.contains("the same examples") && error.contains("data.test_array"), "{error}");
 }

@@ -6,7 +6,7 @@ use std::{
     str::FromStr,
 };
 
-use super::{csv::LabelColumn, error::DataError};
+use super::{csv::Reading, error::DataError};
 
 /// Where a run's examples come from.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -103,24 +103,41 @@ impl FromStr for NamedSet {
 /// # Ok::<(), dalean::ConfigError>(())
 /// ```
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct DataRoot(PathBuf);
+pub struct DataRoot {
+    path: PathBuf,
+    /// Where files of one's own lie, if not where the configuration says.
+    files: Option<PathBuf>,
+}
 
 impl DataRoot {
     /// The folder `path`, which need not exist yet.
     pub fn new(path: impl Into<PathBuf>) -> Self {
-        Self(path.into())
+        Self { path: path.into(), files: None }
+    }
+
+    /// The same, with files of one's own elsewhere: in the folder `place` under the names they have in a configuration,
+    /// or, of a set of one file, `place` itself.
+    #[must_use]
+    pub fn with_files(self, place: impl Into<PathBuf>) -> Self {
+        Self { files: Some(place.into()), ..self }
+    }
+
+    /// Where files of one's own lie, if not where a configuration says.
+    #[must_use]
+    pub fn files(&self) -> Option<&Path> {
+        self.files.as_deref()
     }
 
     /// The folder itself.
     #[must_use]
     pub fn path(&self) -> &Path {
-        &self.0
+        &self.path
     }
 
     /// The folder of one set.
     #[must_use]
     pub fn folder(&self, set: NamedSet) -> PathBuf {
-        self.0.join(set.to_string())
+        self.path.join(set.to_string())
     }
 }
 
@@ -136,9 +153,9 @@ pub struct FileSet {
     pub validation: Option<PartFile>,
     /// What is read once at the end.
     pub test: Option<PartFile>,
-    /// Greatest value; without it the greatest value of the training file, or 255 for floats.
+    /// Greatest value; without it the greatest value of the training file, or 255 for fractions.
     pub full_scale: Option<u8>,
-    /// Number of classes, labels being 0 to one less; without it one more than the greatest label.
+    /// Number of classes, labels being 0 to one less; without it as many as there are different labels.
     pub classes: Option<usize>,
     /// Shape of a picture, where the file does not tell it.
     pub image: Option<ImageShape>,
@@ -154,21 +171,23 @@ pub enum PartFile {
         /// The labels, one dimension.
         labels: PathBuf,
     },
-    /// Two arrays of an NPZ archive.
+    /// Two arrays of NPZ archives.
     Npz {
         /// The archive.
         path: PathBuf,
-        /// Name of the array of values, such as `x_train`.
-        values: String,
-        /// Name of the array of labels, such as `y_train`.
-        labels: String,
+        /// The archive of the labels, if they lie in another.
+        labels_path: Option<PathBuf>,
+        /// Name of the array of values; without it a known one.
+        values: Option<String>,
+        /// Name of the array of labels; without it a known one.
+        labels: Option<String>,
     },
     /// A table.
     Csv {
         /// The table.
         path: PathBuf,
-        /// The column of the label.
-        label: LabelColumn,
+        /// What is stated of it.
+        reading: Reading,
     },
 }
 
@@ -181,6 +200,48 @@ impl PartFile {
                 path
             }
         }
+    }
+
+    /// Every file of the part, to be read or named anew.
+    pub(crate) fn paths_mut(&mut self) -> Vec<&mut PathBuf> {
+        match self {
+            Self::Idx { values, labels } => vec![values, labels],
+            Self::Npz { path, labels_path, .. } => {
+                std::iter::once(path).chain(labels_path.as_mut()).collect()
+            }
+            Self::Csv { path, .. } => vec![path],
+        }
+    }
+}
+
+impl FileSet {
+    /// The same set with its files elsewhere: all of them in the folder `place` under their names, or `place` itself
+    /// when there is one file.
+    ///
+    /// # Errors
+    /// When `place` is a file and the set has several.
+    pub(crate) fn moved(&self, place: &Path) -> Result<Self, DataError> {
+        let mut set = self.clone();
+        let mut paths: Vec<&mut PathBuf> = set.train.paths_mut();
+        paths.extend(
+            [&mut set.validation, &mut set.test]
+                .into_iter()
+                .flatten()
+                .flat_map(PartFile::paths_mut),
+        );
+        let name = |path: &Path| path.file_name().map(PathBuf::from).unwrap_or_default();
+        let folder = place.is_dir();
+        let mut names: Vec<PathBuf> = paths.iter().map(|path| (**path).clone()).collect();
+        names.sort();
+        names.dedup();
+        if !folder && names.len() > 1 {
+            let names = names.iter().map(|path| name(path).display().to_string()).collect();
+            return Err(DataError::Several { path: place.into(), names });
+        }
+        for path in paths {
+            *path = if folder { place.join(name(path)) } else { place.to_owned() };
+        }
+        Ok(set)
     }
 }
 

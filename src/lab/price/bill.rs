@@ -10,9 +10,7 @@ use super::plan::Footprint;
 use super::total::{EnergySplit, EnergyTotal, Range};
 use crate::chip::hardware::Hardware;
 use crate::chip::ledger::{During, Event};
-use crate::lab::config::{
-    Constant, Constants, CostClass, CostTable, Kind, Per, QUANTITIES, Standing,
-};
+use crate::lab::config::{Constant, Constants, CostClass, CostTable, Kind, Per, QUANTITIES};
 use crate::lab::store::ledger::{CountRecord, LedgerRecord};
 
 /// Bits that an addition to a digital sum moves: 32 out, 32 in.
@@ -170,10 +168,9 @@ pub fn price<'a>(
     let used = |key: &String| {
         lines.iter().any(|line| line.key == *key) || idle.iter().any(|idle| idle.key == *key)
     };
-    let scaled = constants.iter().filter_map(|constant| match &constant.standing {
-        Standing::Scaled(law) => Some((constant.key.clone(), law.clone())),
-        Standing::Stated | Standing::NotHere(_) => None,
-    });
+    let scaled = constants
+        .iter()
+        .filter_map(|constant| Some((constant.key.clone(), constant.scaled()?.to_owned())));
     let scaled = scaled.filter(|(key, _)| used(key)).collect();
     Bill { lines, idle, seconds, missing, scaled }
 }

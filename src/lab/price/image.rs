@@ -7,23 +7,21 @@
 //!
 //! Calibration is of no image. See docs/MODEL.md, 4.6.
 
-use std::collections::BTreeMap;
-
 use serde_json::{Value, json};
 
 use super::total::{EnergySplit, EnergyTotal};
 use crate::chip::engine::Phase;
 use crate::lab::store::record::{EpochRecord, Score};
 
-/// How many images went through the chip, by phase.
+/// How many images went through the chip, by phase: training first.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
-pub struct Images(BTreeMap<&'static str, u64>);
+pub struct Images(Vec<(&'static str, u64)>);
 
 impl Images {
     /// Images of one phase.
     #[must_use]
     pub fn of_phase(phase: Phase, images: u64) -> Self {
-        Self([(phase.name(), images)].into())
+        Self(vec![(phase.name(), images)])
     }
 
     /// Those of a run: what its epochs learnt from and validated with. The final test is no part of a ledger.
@@ -35,12 +33,12 @@ impl Images {
             totals.fold(0, u64::saturating_add)
         };
         let training = (Phase::Training.name(), sum(EpochRecord::train));
-        Self([training, (Phase::Evaluation.name(), sum(EpochRecord::validation))].into())
+        Self(vec![training, (Phase::Evaluation.name(), sum(EpochRecord::validation))])
     }
 
     /// Phases that images went through, and how many.
     pub(super) fn phases(&self) -> impl Iterator<Item = (&'static str, u64)> + '_ {
-        self.0.iter().map(|(phase, images)| (*phase, *images)).filter(|(_, images)| *images > 0)
+        self.0.iter().copied().filter(|(_, images)| *images > 0)
     }
 }
 

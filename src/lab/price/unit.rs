@@ -2,12 +2,15 @@
 
 use super::Range;
 
-/// Three significant digits, a prefix and a unit: `12.3 nJ`.
+/// Three significant digits, a prefix and a unit: `12.3 nJ`. Two minutes and more are told in minutes, hours or days.
 #[must_use]
 pub fn prefixed(value: f64, unit: &str) -> String {
     const PREFIXES: [&str; 11] = ["a", "f", "p", "n", "u", "m", "", "k", "M", "G", "T"];
     if value == 0.0 || !value.is_finite() {
         return format!("{value} {unit}");
+    }
+    if unit == "s" && value >= MINUTES_FROM {
+        return long(value);
     }
     let mut value = value;
     let mut at = 6;
@@ -28,6 +31,23 @@ pub fn prefixed(value: f64, unit: &str) -> String {
         0
     };
     format!("{value:.digits$} {}{unit}", PREFIXES[at])
+}
+
+/// Seconds from which on people count in minutes.
+const MINUTES_FROM: f64 = 119.5;
+
+/// A time in the two units that matter.
+fn long(seconds: f64) -> String {
+    let (minute, hour, day) = (60.0, 3600.0, 86_400.0);
+    let (big, small, [big_name, small_name]) = match seconds {
+        seconds if seconds < 100.0 * minute => (minute, 1.0, ["min", "s"]),
+        seconds if seconds < 2.0 * day => (hour, minute, ["h", "min"]),
+        _ => (day, hour, ["days", "h"]),
+    };
+    // whole units of the smaller kind, so that 60 of them never stand there
+    let whole = (seconds / small).round();
+    let each = big / small;
+    format!("{:.0} {big_name} {:.0} {small_name}", (whole / each).floor(), whole % each)
 }
 
 /// `12.3 nJ (4.10 nJ to 40.2 nJ)`.
@@ -57,5 +77,22 @@ mod tests {
         ] {
             assert_eq!(prefixed(value, "J"), text);
         }
+    }
+
+    #[test]
+    fn long_times_are_told_in_minutes_hours_and_days() {
+        for (value, text) in [
+            (99.96, "100 s"),
+            (119.4, "119 s"),
+            (119.6, "2 min 0 s"),
+            (1234.0, "20 min 34 s"),
+            (5999.7, "100 min 0 s"),
+            (6000.0, "1 h 40 min"),
+            (172_799.0, "48 h 0 min"),
+            (180_000.0, "2 days 2 h"),
+        ] {
+            assert_eq!(prefixed(value, "s"), text);
+        }
+        assert_eq!(prefixed(1234.0, "J"), "1.23 kJ");
     }
 }

@@ -119,6 +119,12 @@ impl Chart {
         if !cells {
             self.segment("axis", left, base, right, base);
         }
+        if let Some(gap) = self.y.gap() {
+            let y = self.y(gap);
+            for y in [y - 2.5, y + 2.5] {
+                self.segment("axis", left - 5.0, y + 2.5, left + 5.0, y - 2.5);
+            }
+        }
         let (x_label, y_label) = (self.x.label.clone(), self.y.label.clone());
         self.text("label middle", (left + right) / 2.0, self.height - 6.0, &x_label);
         self.leaning("label middle", (12.0, (self.top + base) / 2.0), -90, &y_label);

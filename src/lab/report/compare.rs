@@ -1,5 +1,10 @@
 //! Runs side by side, as a page draws them: plain numbers and texts, read off run folders by [`crate::lab::runs`].
 
+mod energy;
+mod page;
+
+pub use page::html;
+
 use crate::lab::price::Cost;
 use crate::lab::store::record::{EpochRecord, Score};
 use crate::lab::table::ColumnUnit;

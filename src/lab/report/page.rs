@@ -1,42 +1,102 @@
 //! The page around the figures: key figures on top, then everything in [`figures::ALL`].
 
+use super::figures::Figure;
 use super::number::{
     count, escape, hash_head, percent, percent_of, place, quotient, ratio, seconds, short,
 };
-use super::{RunView, figures};
+use super::{RunView, figures, words};
 use crate::lab::config::absent_words;
 use crate::lab::price::{Cost, prefixed};
 use crate::lab::store::record::TestOutcome;
 
-const STYLE: &str = concat!(include_str!("page.css"), include_str!("chart.css"));
-const SCRIPT: &str = include_str!("page.js");
+const STYLE: &str = include_str!("page.css");
+/// In an element of its own, because drawings that are saved take it along.
+const CHART_STYLE: &str = include_str!("chart.css");
+const SCRIPTS: [&str; 3] =
+    [include_str!("page.js"), include_str!("page/save.js"), include_str!("page/maps.js")];
 
-/// The whole page.
-pub(super) fn render(view: &RunView<'_>) -> String {
-    let figures = figures::of(view);
-    let mut contents = String::new();
-    let mut body = String::new();
-    for (number, figure) in (1..).zip(figures) {
-        let wide = if figure.wide { " wide" } else { "" };
-        contents += &format!("<a href=\"#{}\">{}</a>", figure.id, figure.title);
-        body += &format!(
-            "<section class=\"card{wide}\" id=\"{}\"><h2><span>{number}</span>{}</h2>\
-             <p class=\"caption\">{}</p>{}</section>\n",
-            figure.id, figure.title, figure.caption, figure.body
-        );
+/// A page around figures: what all pages without a sweep share.
+pub(super) struct Sheet<'a, F> {
+    /// Heading of the window; with it, saved figures get their names.
+    pub title: String,
+    /// What kind of page it is.
+    pub eyebrow: &'a str,
+    /// Heading and key numbers; markup.
+    pub header: String,
+    /// The figures, in order.
+    pub figures: F,
+    /// Where all numbers come from.
+    pub source: &'a str,
+    /// Version of the program that made them.
+    pub version: &'a str,
+}
+
+impl<F: Iterator<Item = Figure>> Sheet<'_, F> {
+    /// The page, complete.
+    pub(super) fn html(self) -> String {
+        let mut contents = String::new();
+        let mut body = String::new();
+        for (number, figure) in (1..).zip(self.figures) {
+            let wide = if figure.wide { " wide" } else { "" };
+            contents += &format!("<a href=\"#{}\">{}</a>", figure.id, figure.title);
+            body += &format!(
+                "<section class=\"card{wide}\" id=\"{}\"><div class=\"top\"><h2><span>{number}</span>{}</h2>{}</div>\
+                 <p class=\"caption\">{}</p>{}</section>\n",
+                figure.id,
+                figure.title,
+                save(figure.title),
+                figure.caption,
+                words::linked(&figure.body)
+            );
+        }
+        let listed = words::list(&body);
+        if !listed.is_empty() {
+            contents += "<a href=\"#words\">Words</a>";
+            body += &format!(
+                "<section class=\"card wide\" id=\"words\"><h2>Words</h2><p class=\"caption\">What the heads of the \
+                 tables mean.</p><dl class=\"lexicon\">{listed}</dl></section>\n"
+            );
+        }
+        format!(
+            "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<meta name=\"viewport\" \
+             content=\"width=device-width, initial-scale=1\">\n<title>{title}</title>\n\
+             <style>\n{STYLE}</style>\n<style id=\"charts\">\n{CHART_STYLE}</style>\n</head>\n<body>\n<div \
+             class=\"stripe\"><i></i><i></i><i></i><i></i></div>\n<main>\n<header><div class=\"eyebrow\">{eyebrow}<button \
+             type=\"button\" id=\"theme\" hidden>light / dark</button></div>{header}<nav>{contents}</nav>\n<div \
+             class=\"figures\">\n{body}</div>\n<footer>dalean {version}. All numbers come from {source}; nothing on this \
+             page is loaded from elsewhere.</footer>\n</main>\n<script>\n{scripts}</script>\n</body>\n</html>\n",
+            title = escape(&self.title),
+            eyebrow = self.eyebrow,
+            header = self.header,
+            version = escape(self.version),
+            source = self.source,
+            scripts = SCRIPTS.concat(),
+        )
     }
-    format!(
-        "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<meta name=\"viewport\" \
-         content=\"width=device-width, initial-scale=1\">\n<title>{title}</title>\n\
-         <style>\n{STYLE}</style>\n</head>\n<body>\n<div class=\"stripe\"><i></i><i></i><i></i><i></i>\
-         </div>\n<main>\n{header}{notices}<nav>{contents}</nav>\n<div class=\"figures\">\n{body}</div>\n\
-         <footer>dalean {version}. All numbers come from the run's records; nothing on this page is \
-         loaded from elsewhere.</footer>\n</main>\n<script>\n{SCRIPT}</script>\n</body>\n</html>\n",
-        title = escape(&view.title),
-        header = header(view),
-        notices = notices(view),
-        version = escape(&view.timing.version),
-    )
+}
+
+/// The page of a run.
+pub(super) fn render(view: &RunView<'_>) -> String {
+    Sheet {
+        title: view.title.clone(),
+        eyebrow: "dalean run report",
+        header: [header(view), notices(view)].concat(),
+        figures: figures::of(view),
+        source: "the run's records",
+        version: &view.timing.version,
+    }
+    .html()
+}
+
+/// Buttons that save a figure; the script shows them.
+fn save(title: &str) -> String {
+    let button = |format: &str| {
+        format!(
+            "<button type=\"button\" data-save=\"{}\" aria-label=\"{title} as {format}\">{format}</button>",
+            format.to_lowercase()
+        )
+    };
+    format!("<div class=\"save\" hidden>{}{}</div>", button("SVG"), button("PNG"))
 }
 
 fn header(view: &RunView<'_>) -> String {
@@ -51,8 +111,7 @@ fn header(view: &RunView<'_>) -> String {
         threads => format!("{threads} threads"),
     });
     format!(
-        "<header><div class=\"eyebrow\">dalean run report<button type=\"button\" id=\"theme\" hidden>\
-         light / dark</button></div><h1>{}</h1><p class=\"facts\">{}</p>\
+        "<h1>{}</h1><p class=\"facts\">{}</p>\
          <div class=\"hero\"><div class=\"headline\">{}</div><div class=\"keys\">{}</div></div>{}</header>\n",
         escape(&view.title),
         facts.join(" · "),

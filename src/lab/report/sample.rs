@@ -128,6 +128,7 @@ fn record(layers: &[(usize, usize, &[&str])], epoch: u32) -> EpochRecord {
         currents: [[300, 200], [100, 0]],
         adc_shifts: Vec::new(),
         rate_shift: 4,
+        mute: false,
     });
     EpochRecord {
         epoch,
@@ -170,6 +171,7 @@ fn receipt(records: &[EpochRecord], classes: usize) -> Receipt {
             full_scale: 16,
             classes,
             image: None,
+            names: vec![],
         },
         tables: "e0".into(),
         metrics: "f0".into(),
@@ -180,6 +182,7 @@ fn receipt(records: &[EpochRecord], classes: usize) -> Receipt {
         epoch_hashes: records.iter().map(|record| record.state_hash.clone()).collect(),
         test: Some(TestOutcome::Classify(test)),
         notes: vec![],
+        rates: vec![],
     }
 }
 

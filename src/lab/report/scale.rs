@@ -50,6 +50,11 @@ pub(super) struct Axis {
     pub label: String,
 }
 
+/// Room for 0 below a log curve, as a part of it.
+const ZERO_ROOM: f64 = 0.16;
+/// Its name.
+const ZERO: &str = "0";
+
 /// The round step (1, 2 or 5 times a power of ten) that cuts `span` into about `parts`.
 fn step(span: f64, parts: f64) -> f64 {
     let raw = (span / parts).max(1e-9);
@@ -146,19 +151,44 @@ impl Axis {
         Self { scale, ticks, label: label.into() }
     }
 
-    /// Counts on a log curve; 0 is drawn on the bottom line.
+    /// Counts on a log curve; 0 has a place of its own below, where it occurs.
     pub(super) fn counts(values: impl Iterator<Item = f64>, label: &str) -> Self {
-        let (low, high) = ends(values.filter(|&value| value >= 1.0)).unwrap_or((1.0, 1.0));
+        let values: Vec<f64> = values.collect();
+        let there = values.iter().copied().filter(|&value| value >= 1.0);
+        let (low, high) = ends(there).unwrap_or((1.0, 1.0));
         let from = low.log10().floor();
         let to = high.log10().ceil().max(from + 1.0);
-        Self::log(10f64.powf(from), 10f64.powf(to), |count| short(count.round() as u64), label)
+        let show = |count: f64| short(count.round() as u64);
+        let axis = Self::log(10f64.powf(from), 10f64.powf(to), show, label);
+        axis.with_zero(values.iter().any(|&value| value < 1.0))
     }
 
-    /// Energies, given in picojoules, on a log curve that ends where they do.
+    /// Energies, given in picojoules, on a log curve that ends where they do; 0 as for counts.
     pub(super) fn picojoules(values: impl Iterator<Item = f64>, label: &str) -> Self {
-        let there = values.filter(|&value| value > 0.0 && value.is_finite());
+        let values: Vec<f64> = values.collect();
+        let there = values.iter().copied().filter(|&value| value > 0.0 && value.is_finite());
         let (low, high) = ends(there).unwrap_or((1.0, 1.0));
-        Self::log(0.8 * low, 1.25 * high, |tick| round(1e-12 * tick), label)
+        let axis = Self::log(0.8 * low, 1.25 * high, |tick| round(1e-12 * tick), label);
+        axis.with_zero(values.iter().any(|&value| value <= 0.0))
+    }
+
+    /// A log curve has no place for 0: it gets one below the curve, with its name and a gap in between.
+    fn with_zero(mut self, there: bool) -> Self {
+        if there {
+            let decades = (self.scale.to / self.scale.from).log10();
+            self.scale.from /= 10f64.powf(ZERO_ROOM * decades);
+            self.ticks.insert(0, (self.scale.from, ZERO.into()));
+        }
+        self
+    }
+
+    /// Where the axis is broken: between 0 and the curve of a log scale.
+    pub(super) fn gap(&self) -> Option<f64> {
+        let (at, text) = self.ticks.first()?;
+        let broken = self.scale.curve == Curve::Log && text == ZERO;
+        broken.then(|| {
+            at * 10f64.powf(0.5 * ZERO_ROOM * (self.scale.to / at).log10() / (1.0 + ZERO_ROOM))
+        })
     }
 
     /// Positive numbers on a log curve.
@@ -261,6 +291,19 @@ mod tests {
         }
         assert_eq!(Scale { curve: Curve::Log, from: 1.0, to: 16.0 }.fraction(4.0), 0.5);
         assert_eq!(Scale { curve: Curve::Linear, from: 3.0, to: 3.0 }.fraction(3.0), 0.5);
+    }
+
+    #[test]
+    fn zero_is_not_drawn_at_a_hundred_on_a_log_axis() {
+        let axis = Axis::counts([0.0, 120.0, 5000.0].into_iter(), "");
+        assert_eq!((axis.ticks[0].1.as_str(), axis.ticks[1].1.as_str()), ("0", "100"));
+        let [zero, hundred, five] = [0.0, 100.0, 5000.0].map(|value| axis.scale.fraction(value));
+        assert!(zero == 0.0 && (0.13..0.15).contains(&hundred) && five > 0.8, "{hundred} {five}");
+        let gap = axis.scale.fraction(axis.gap().unwrap());
+        assert!((0.05..hundred).contains(&gap), "{gap}");
+        assert_eq!(Axis::counts([120.0, 5000.0].into_iter(), "").gap(), None);
+        assert_eq!(Axis::epochs(0, 3).gap(), None, "0 of a straight axis is a number as others");
+        assert!(Axis::picojoules([0.0, 7.0].into_iter(), "").gap().is_some());
     }
 
     #[test]

@@ -12,7 +12,9 @@
 
 mod curves;
 mod heat;
+mod importance;
 mod json;
+mod learning;
 mod library;
 mod measure;
 mod page;
@@ -23,12 +25,14 @@ mod settings;
 mod statistics;
 mod text;
 
+pub use learning::{Learning, wanted};
 pub use page::html;
 pub use paper::{StaticFigure, figures};
 pub use raster::png;
 pub use text::text;
 
-use crate::lab::table::Table;
+use super::words;
+use crate::lab::table::{Column, Role, Table};
 
 /// Everything the page of a sweep shows. Nothing here opens a file or reads a clock.
 #[derive(Debug, Clone)]
@@ -46,6 +50,8 @@ pub struct SweepView<'a> {
     pub axes: &'a [ShownAxis],
     /// What the figures show unless the reader chooses otherwise.
     pub figures: Figures,
+    /// Right answers over epochs, as far as they were read: see [`wanted`].
+    pub learning: &'a Learning,
     /// Points that cannot be run, with the reason.
     pub refused: &'a [Refused],
     /// What runs on these chips leave out: `key = text`, from `[not_simulated]`.
@@ -96,6 +102,16 @@ pub struct Refused {
     pub what: String,
     /// Why.
     pub why: String,
+}
+
+/// What a column means, in a sentence or two.
+#[must_use]
+pub fn meaning(column: &Column) -> String {
+    match (words::of_column(&column.name), column.role) {
+        (Some(meaning), _) => meaning.into(),
+        (None, Role::Axis) => "Varied by the sweep; the sweep file says which keys it sets.".into(),
+        (None, _) => String::new(),
+    }
 }
 
 #[cfg(test)]

@@ -226,6 +226,7 @@ fn summary_is_narrow_aligned_and_dashes_where_nothing_can_be_divided() {
         train        80.20 %  802 of 1000 right, while learning in epoch 2
         validation   82.00 %  82 of 100 right, after epoch 2
         test         97.33 %  1749 of 1797 right, after epoch 2 (best validation)
+        beside this 1 effect of real chips is not simulated, 1 with figures of this one: see the report
         state       0000000000000000000000000000000000000000000000000000000000abcdf1
     "#]].assert_eq(&text::summary(&sample.view()));
     let hollow = &samples()[3];
@@ -265,8 +266,10 @@ fn what_a_run_cost_stands_on_page_and_terminal() {
     expect_test::expect![[r#"
         on the chip 1.23 M cycles, 1.23 ms, at least 2.00 nJ (1.00 nJ to 8.00 nJ), 2 of 3 parts priced
                     converter at least 75 %, static 25 %, 25 % assumed
+                    30 % is memory of digital sums, 64 bits a product; mode online or replay does without
                     to learn from an image at least 2.00 pJ, 1.20 us
                     without a price: holds
+        beside this 1 effect of real chips is not simulated, 1 with figures of this one: see the report
     "#]]
     .assert_eq(&text[text.find("on the chip").unwrap()..text.find("state ").unwrap()]);
 }

@@ -24,9 +24,34 @@ const COLUMNS: [(&str, usize); 11] = [
     ("gate", 6),
 ];
 
+/// What the columns mean, in their order.
+const MEANINGS: [&str; COLUMNS.len()] = [
+    "devices, each with an unsigned level",
+    "cells at the lower end of the programming window, of the cells",
+    "cells that store 0, of the cells (connection sparsity)",
+    "sum of excitatory over sum of inhibitory levels of the layer",
+    "pulses given over the whole training, after the bound",
+    "pulses that moved their cell",
+    "increments that the bound cut, of those that were not 0",
+    "conversions while learning beyond the range of the converter",
+    "look-ups at an end of the table",
+    "error words cut by their width",
+    "gates cut by their width",
+];
+
+/// What the columns of [`summary`] mean, a line each.
+#[must_use]
+pub fn words() -> String {
+    let line = |((head, _), meaning): (&(&str, usize), &str)| format!("{head:<10} {meaning}\n");
+    COLUMNS.iter().zip(MEANINGS).map(line).collect()
+}
+
 /// Events of the last four columns.
 const SATURATED: [&str; 4] =
     ["saturated_conversions", "saturated_look_ups", "saturated_errors", "saturated_gates"];
+
+/// Share of the energy from which the memory of digital sums is named.
+const SHOWN: f64 = 0.05;
 
 /// Cells, writes and saturations of every pathway in the final state, then accuracies and the state hash.
 /// Pulses, bounds and saturations are those of the whole training; `-` stands where there is nothing to divide by.
@@ -59,6 +84,24 @@ pub fn summary(view: &RunView<'_>) -> String {
         let _ = writeln!(out, "beside this {}: see the report", absent_words(view.absent));
     }
     let _ = writeln!(out, "state       {}", last.state_hash);
+    out
+}
+
+/// Lines beside a result, one a text, cut between words at 100 columns.
+#[must_use]
+pub fn beside(name: &str, texts: &[String]) -> String {
+    let mut out = String::new();
+    for text in texts {
+        let mut line = format!("{name:<11}");
+        for word in text.split(' ') {
+            if line.len() + 1 + word.len() > 100 && line.len() > 11 {
+                let _ = writeln!(out, "{line}");
+                line = " ".repeat(11);
+            }
+            let _ = write!(line, " {word}");
+        }
+        let _ = writeln!(out, "{line}");
+    }
     out
 }
 
@@ -128,6 +171,12 @@ fn chip(out: &mut String, cost: &Cost) {
         });
         let assumed = format!("{:.0} % assumed", 100.0 * cost.assumed_share);
         lines.push(split.chain([assumed]).collect::<Vec<_>>().join(", "));
+    }
+    if let Some(share) = cost.sums_share.filter(|&share| share >= SHOWN) {
+        lines.push(format!(
+            "{:.0} % is memory of digital sums, 64 bits a product; mode online or replay does without",
+            100.0 * share
+        ));
     }
     let images: Vec<_> = cost.per_image.iter().map(image).filter(|one| !one.is_empty()).collect();
     lines.push(images.join("; "));

@@ -56,6 +56,7 @@ impl Classify {
             let hint = "choose the last epoch with learning.select = \"last\"";
             return Err(RunError::Empty { part: "validation", hint });
         }
+        super::weigh(&experiment.network.layers, &experiment.hardware, super::Memory::left())?;
         let seeded = experiment.build(machine.backend(), train.len())?;
         let mut trainer = Trainer::new(experiment, seeded);
         let (threads, engine) = (machine.threads(), trainer.driver_mut().engine_mut());
@@ -67,21 +68,19 @@ impl Classify {
     }
 
     fn told(&mut self, train: Option<Score>, seconds: f64) -> Told {
-        let (validation, currents) = self.validate();
-        Told {
-            outcome: Outcome::Classify(ClassifyOutcome { train, validation }),
-            currents,
-            seconds,
-        }
+        let (validation, currents, mute) = self.validate();
+        let outcome = Outcome::Classify(ClassifyOutcome { train, validation });
+        Told { outcome, currents, mute, seconds }
     }
 
-    fn validate(&mut self) -> (Option<Score>, Vec<Currents>) {
+    fn validate(&mut self) -> (Option<Score>, Vec<Currents>, Vec<bool>) {
         let Self { trainer, validation, .. } = self;
         if validation.is_empty() {
-            return (None, vec![[[0; 2]; 2]; trainer.driver().engine().layers().len()]);
+            let layers = trainer.driver().engine().layers().len();
+            return (None, vec![[[0; 2]; 2]; layers], vec![false; layers]);
         }
-        let Evaluation { correct, currents, .. } = trainer.evaluate(validation);
-        (Some(Score { correct, total: validation.len() as u64 }), currents)
+        let Evaluation { correct, currents, mute, .. } = trainer.evaluate(validation);
+        (Some(Score { correct, total: validation.len() as u64 }), currents, mute)
     }
 }
 
@@ -91,12 +90,16 @@ impl Task for Classify {
     }
 
     fn advance(&mut self, go_on: GoOn<'_>) -> Option<Told> {
+        if self.trainer.epoch() >= self.trainer.experiment().epochs {
+            return None;
+        }
         let started = Instant::now();
         let again = matches!(
             self.trainer.experiment().hardware.adc,
             Adc::Finite { range: AdcRange::Calibrated { every_epoch: true, .. }, .. }
         );
         let Self { trainer, train, .. } = self;
+        let epochs = trainer.experiment().epochs;
         if again && trainer.epoch() > 0 {
             let _ = trainer.calibrate(train);
         }
@@ -107,7 +110,7 @@ impl Task for Classify {
                                                     correct,
                                                 }| {
             let answers = Some(Score { correct, total: samples as u64 });
-            go_on(Progress { epoch, done: samples, total: samples_total, answers })
+            go_on(Progress { epoch, epochs, done: samples, total: samples_total, answers })
         });
         let (correct, total) = (learnt.ok()?, train.len() as u64);
         let seconds = started.elapsed().as_secs_f64();

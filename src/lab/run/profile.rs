@@ -5,8 +5,8 @@ use super::{Machine, RunError, Session};
 use crate::chip::engine::Phase;
 use crate::chip::hardware::Hardware;
 use crate::chip::ledger::Event;
-use crate::lab::config::{Config, Constants};
-use crate::lab::data::{self, DataRoot};
+use crate::lab::config::{Config, Constants, Sources, load};
+use crate::lab::data::{self, Data, DataRoot};
 use crate::lab::price::{Bill, Convention, Footprint, Images, StageUse, price, stages};
 use crate::lab::store::ledger::{CyclesRecord, LedgerRecord};
 
@@ -25,11 +25,31 @@ pub struct Act {
     pub products: [u64; 2],
 }
 
+/// The same first update in a mode of writing a batch.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ModeUse {
+    /// `learning.mode`.
+    pub mode: &'static str,
+    /// Whether it is the experiment's own.
+    pub own: bool,
+    /// What had to change beside it, as a setting.
+    pub also: Option<&'static str>,
+    /// What it did, or why the experiment cannot have it.
+    pub act: Result<Act, String>,
+}
+
+/// Modes of writing a batch.
+const MODES: [&str; 3] = ["accumulate", "replay", "online"];
+/// What a mode that writes after each sample needs where the experiment centres over a batch.
+const RUNNING: &str = "learning.centre=running";
+
 /// What an experiment costs, before it is carried out.
 #[derive(Debug, Clone)]
 pub struct Profile {
     /// The first update, and an inference after it.
     pub acts: [Act; 2],
+    /// The first update in each mode of writing a batch, this experiment's own among them.
+    pub modes: Vec<ModeUse>,
     /// Arrays of the network.
     pub plan: Footprint,
     /// The chip.
@@ -45,33 +65,71 @@ pub struct Profile {
 /// # Errors
 /// When the configuration does not fit the data or the chip, or the data cannot be read.
 pub fn profile(config: &Config, root: &DataRoot, machine: Machine) -> Result<Profile, RunError> {
-    let mut session = Session::new(config, data::load(&config.source()?, root)?, machine)?;
-    let ledger = |session: &Session, phase| session.engines()[0].ledger(phase).clone();
-    let before = ledger(&session, Phase::Training);
-    session.updates(1)?;
-    let engine = session.engines()[0];
-    let step = LedgerRecord::since(engine, Phase::Training, &before);
-    let plan = Footprint::of_layers(engine.layers());
-    let samples = (session.epoch_size().0 as u64).min(u64::from(config.batch.get()));
-    let before = ledger(&session, Phase::Evaluation);
+    let data = data::load(&config.source()?, root)?;
+    let mut session = Session::new(config, data.clone(), machine)?;
+    let step = step(&mut session, config)?;
+    let plan = Footprint::of_layers(session.engines()[0].layers());
+    let before = session.engines()[0].ledger(Phase::Evaluation).clone();
     session.infer();
     let engine = session.engines()[0];
     let inference = LedgerRecord::since(engine, Phase::Evaluation, &before);
-    let act = |name, samples, phase: Phase, ledger: LedgerRecord| {
-        let slices = u64::from(config.hardware.slices());
-        let products = [ledger.total(Event::CellReads) / slices, ledger.total(Event::Accumulates)];
-        Act { name, samples, phase, ledger, products }
-    };
+    let inference = act("inference", 1, Phase::Evaluation, inference, config);
     Ok(Profile {
-        acts: [
-            act("training step", samples, Phase::Training, step),
-            act("inference", 1, Phase::Evaluation, inference),
-        ],
+        modes: modes(config, &data, machine, &step),
+        acts: [step, inference],
         plan,
         hardware: config.hardware.clone(),
         constants: config.constants.clone(),
-        warnings: session.warnings().to_vec(),
+        warnings: session.warnings(),
     })
+}
+
+fn act(
+    name: &'static str,
+    samples: u64,
+    phase: Phase,
+    ledger: LedgerRecord,
+    config: &Config,
+) -> Act {
+    let slices = u64::from(config.hardware.slices());
+    let products = [ledger.total(Event::CellReads) / slices, ledger.total(Event::Accumulates)];
+    Act { name, samples, phase, ledger, products }
+}
+
+/// Learns the first batch.
+fn step(session: &mut Session, config: &Config) -> Result<Act, RunError> {
+    let before = session.engines()[0].ledger(Phase::Training).clone();
+    session.updates(1)?;
+    let ledger = LedgerRecord::since(session.engines()[0], Phase::Training, &before);
+    let samples = (session.epoch_size().0 as u64).min(u64::from(config.batch.get()));
+    Ok(act("training step", samples, Phase::Training, ledger, config))
+}
+
+/// The first update in every mode: the experiment is built again with that key alone changed, and centred by running
+/// means where it centres over the batch and the mode cannot.
+fn modes(config: &Config, data: &Data, machine: Machine, own: &Act) -> Vec<ModeUse> {
+    let text = config.to_toml();
+    let other = |settings: &[String]| -> Result<Act, RunError> {
+        let experiment = Some(("this experiment", &*text));
+        let config = load(&Sources { experiment, settings, ..Sources::default() })?;
+        step(&mut Session::new(&config, data.clone(), machine)?, &config)
+    };
+    let of = |mode: &'static str| {
+        if mode == config.mode_name() {
+            return ModeUse { mode, own: true, also: None, act: Ok(own.clone()) };
+        }
+        let set = format!("learning.mode={mode}");
+        let first = other(std::slice::from_ref(&set));
+        let (also, act) = match first {
+            Err(_) => match other(&[set, RUNNING.to_owned()]) {
+                Ok(act) => (Some(RUNNING), Ok(act)),
+                Err(_) => (None, first),
+            },
+            Ok(_) => (None, first),
+        };
+        ModeUse { mode, own: false, also, act: act.map_err(|error| error.to_string()) }
+    };
+    MODES.map(of).into()
 }
 
 impl Profile {

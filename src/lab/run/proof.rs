@@ -11,13 +11,13 @@ use crate::lab::store::folder::{self, FolderError, names};
 use crate::lab::store::record::{BestRecord, EpochRecord, Receipt};
 use crate::lab::store::{ARITHMETIC, hash};
 
-/// The receipt of a run whose states stay: `text` is its `config.toml`, `checkpoint` the hash of the state after the
-/// last record. It is neither finished nor tested.
+/// The receipt of a run whose states stay: `text` is its `config.toml`, `metrics` the hash of its records' text,
+/// `checkpoint` that of the state after the last record. It is neither finished nor tested.
 pub(super) fn receipt(
     session: &Session,
     text: &str,
     records: &[EpochRecord],
-    checkpoint: String,
+    [metrics, checkpoint]: [String; 2],
     best: Option<BestRecord>,
 ) -> Receipt {
     Receipt {
@@ -27,7 +27,7 @@ pub(super) fn receipt(
         config: hash::bytes(text),
         data: session.data().clone(),
         tables: hash::tables(&session.networks()),
-        metrics: hash::bytes(folder::metrics_text(records)),
+        metrics,
         ledger: None,
         checkpoint,
         best,
@@ -35,6 +35,7 @@ pub(super) fn receipt(
         epoch_hashes: records.iter().map(|record| record.state_hash.clone()).collect(),
         test: None,
         notes: session.notes().to_vec(),
+        rates: session.rates().to_vec(),
     }
 }
 
@@ -107,6 +108,12 @@ pub(super) fn records_text(path: &Path, receipt: &Receipt) -> Result<String, Run
     // a kill may have come between the records of later epochs and their receipt
     let end = text.match_indices('\n').nth(epochs.wrapping_sub(1)).map(|(at, _)| at + 1);
     let spoken_of = end.and_then(|end| text.get(..end));
+    // but nothing comes behind the last one of a finished run
+    if receipt.status == "finished" && end.is_some_and(|end| end < text.len()) {
+        let found =
+            format!("holds more than the {epochs} records that {} speaks of", names::RECEIPT);
+        return Err(damaged(found).into());
+    }
     match spoken_of.filter(|text| hash::bytes(text) == receipt.metrics) {
         Some(text) => Ok(text.to_owned()),
         None => {

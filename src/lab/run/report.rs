@@ -9,6 +9,7 @@
 use std::path::{Path, PathBuf};
 
 use super::RunError;
+use super::notes::notes;
 use super::session::chosen;
 use super::train::read_config;
 use crate::lab::config::Config;
@@ -147,8 +148,10 @@ impl Parts<'_> {
             Err(error) => (vec![], Some(error)),
         };
         let pictures = self.pictures();
-        let notes = self.receipt.notes.iter().map(ToString::to_string);
-        let warnings: Vec<_> = self.config.warnings().into_iter().chain(notes).collect();
+        let notes: Vec<_> =
+            notes(self.receipt, self.records).iter().map(ToString::to_string).collect();
+        let warnings: Vec<_> =
+            self.config.warnings().into_iter().chain(notes.iter().cloned()).collect();
         let absent = self.config.absent();
         let view = RunView {
             title: self.title(),
@@ -162,11 +165,12 @@ impl Parts<'_> {
             level_max: self.config.hardware.cell.level_bits.level_max(),
             heats: &heats,
             pictures: &pictures,
-            class_names: &[],
+            class_names: &self.receipt.data.names,
             ledger: self.counted.map(|(ledger, _)| ledger),
             cost: self.counted.map(|(_, cost)| cost),
         };
-        Page { html: report::html(&view), summary: report::text::summary(&view), damage }
+        let summary = report::text::summary(&view) + report::text::beside("note", &notes).as_str();
+        Page { html: report::html(&view), summary, damage }
     }
 
     fn title(&self) -> String {

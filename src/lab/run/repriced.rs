@@ -1,12 +1,11 @@
 //! Pricing a finished run, with its own chip's constants or with another's.
 
-use std::collections::BTreeMap;
 use std::path::Path;
 
 use super::train::read_config;
 use super::{RunError, records};
 use crate::chip::hardware::Hardware;
-use crate::lab::config::{Config, Constants, Model, load_model};
+use crate::lab::config::{Absent, Config, Constants, Model, load_model};
 use crate::lab::price::{Bill, Change, Cost, Footprint, Images, areas, changes, price};
 use crate::lab::store::folder::{self, FolderError, names};
 use crate::lab::store::hash;
@@ -23,8 +22,8 @@ pub struct Repriced {
     pub changes: Vec<Change>,
     /// What was counted.
     pub ledger: LedgerRecord,
-    /// What the chip that made the run does and this program does not simulate.
-    pub not_simulated: BTreeMap<String, String>,
+    /// What real chips do and the run did not.
+    pub absent: Vec<Absent>,
     /// [`Prices::fingerprint`] of the chip whose constants are used.
     pub fingerprint: String,
     /// Images that went through the chip.
@@ -39,8 +38,8 @@ pub struct Repriced {
 pub struct Prices {
     /// Its name.
     pub name: String,
-    /// What it does and this program does not simulate.
-    pub not_simulated: BTreeMap<String, String>,
+    /// What such chips do and this program does not simulate.
+    pub absent: Vec<Absent>,
     /// The chip.
     pub hardware: Hardware,
     /// Its constants.
@@ -53,7 +52,7 @@ impl Prices {
     pub fn of(config: &Config) -> Self {
         Self {
             name: config.hardware_name.clone(),
-            not_simulated: config.not_simulated.clone(),
+            absent: config.absent(),
             hardware: config.hardware.clone(),
             constants: config.constants.clone(),
         }
@@ -73,12 +72,12 @@ impl Prices {
 pub fn reprice(path: &Path, other: Option<&str>) -> Result<Repriced, RunError> {
     let prices = |name: &str| -> Result<Prices, RunError> {
         let Model { name, hardware, constants, .. } = load_model(name)?;
-        Ok(Prices { name, hardware, constants, not_simulated: BTreeMap::new() })
+        Ok(Prices { name, hardware, constants, absent: vec![] })
     };
     let other = other.map(prices).transpose()?;
     let mut repriced = reprice_as(path, other)?;
     // what the run leaves out is what the chip that made it leaves out
-    repriced.not_simulated = read_config(path)?.0.not_simulated;
+    repriced.absent = read_config(path)?.0.absent();
     Ok(repriced)
 }
 
@@ -105,13 +104,13 @@ pub fn reprice_as(path: &Path, other: Option<Prices>) -> Result<Repriced, RunErr
     let changes = other.as_ref().map_or_else(Vec::new, |o| changes(&config.hardware, &o.hardware));
     let prices = other.unwrap_or_else(|| Prices::of(&config));
     let fingerprint = prices.fingerprint();
-    let Prices { name: priced_as, not_simulated, hardware, constants } = prices;
+    let Prices { name: priced_as, absent, hardware, constants } = prices;
     Ok(Repriced {
         made_on,
         priced_as,
         changes,
         ledger,
-        not_simulated,
+        absent,
         fingerprint,
         images: Images::of_records(&records),
         plan,

@@ -10,7 +10,9 @@ use crate::chip::ledger::Event;
 use crate::lab::config::{Config, Select};
 use crate::lab::data::Data;
 use crate::lab::store::checkpoint::{self, CheckpointError, Identity};
-use crate::lab::store::record::{DataRecord, EpochRecord, LayerRecord, Note, Score, TestOutcome};
+use crate::lab::store::record::{
+    DataRecord, EpochRecord, LayerRecord, Note, RateRecord, Score, TestOutcome,
+};
 use crate::lab::store::{address, hash};
 use crate::learn::driver::Driver;
 use crate::task::classify::Examples;
@@ -40,6 +42,8 @@ pub struct Session {
     /// Address of the run.
     run: String,
     data: DataRecord,
+    /// Rates asked for and in effect.
+    rates: Vec<RateRecord>,
     /// What the configuration lets expect.
     warnings: Vec<String>,
     /// What the run showed.
@@ -57,9 +61,11 @@ impl Session {
         let record = DataRecord::of(&data);
         let given = config.given(record.features, record.classes, record.image)?;
         let task = task::build(config, data, machine)?;
+        let rates = rates(config, &record, &task.networks())?;
         let run = address::key(given, &record.hash);
         let notes = task.notes();
-        Ok(Self { task, run, data: record, warnings: config.warnings(), notes, best_answers: 0 })
+        let warnings = config.warnings();
+        Ok(Self { task, run, data: record, rates, warnings, notes, best_answers: 0 })
     }
 
     /// Learns this many updates of the first epoch and stops inside it.
@@ -78,14 +84,14 @@ impl Session {
         self.task.infer();
     }
 
-    /// Starts recording operations; what was read before the last samples were loaded is forgotten.
+    /// Starts recording operations; what was executed before the last update is forgotten.
     pub(crate) fn keep_tape(&mut self) {
         for network in self.task.networks_mut() {
             let _ = network.engine_mut().record(true);
         }
     }
 
-    /// What the first network executed since its last samples were loaded.
+    /// What the first network executed in its last update.
     pub(crate) fn take_tape(&mut self) -> Vec<Recorded> {
         let mut networks = self.task.networks_mut().into_iter();
         networks.next().map_or_else(Vec::new, |network| network.engine_mut().record(false))
@@ -103,6 +109,12 @@ impl Session {
         &self.data
     }
 
+    /// The rate of each layer, as it was asked for and as it is.
+    #[must_use]
+    pub fn rates(&self) -> &[RateRecord] {
+        &self.rates
+    }
+
     /// What the configuration lets expect, and what the run showed so far.
     #[must_use]
     pub fn warnings(&self) -> Vec<String> {
@@ -115,8 +127,9 @@ impl Session {
         &self.notes
     }
 
-    /// What a record shows for the first time: conversions, tables or gates that saturate, or an epoch that lost half of
-    /// what was learnt. Records are told in the order of their epochs.
+    /// What a record shows for the first time, as receipts have always said it: conversions, tables or gates that saturate
+    /// of all layers together and since the start, or an epoch that lost half of what was learnt. Records are told in the
+    /// order of their epochs. What users are shown is [`notes`](super::notes).
     pub fn note(&mut self, record: &EpochRecord) -> &[Note] {
         let told = self.notes.len();
         let epoch = record.epoch;
@@ -213,7 +226,7 @@ impl Session {
         self.record(told).0
     }
 
-    /// One epoch, its record, and the seconds of learning. `None` when `go_on` said to stop.
+    /// One epoch, its record, and the seconds of learning. `None` when `go_on` said to stop, or when no epoch is left.
     pub fn advance(&mut self, go_on: GoOn<'_>) -> Option<(EpochRecord, f64)> {
         let told = self.task.advance(go_on)?;
         Some(self.record(told))
@@ -226,14 +239,15 @@ impl Session {
 
     /// What the chip says of an epoch, beside what the task told.
     fn record(&mut self, told: Told) -> (EpochRecord, f64) {
-        let Told { outcome, currents, seconds } = told;
+        let Told { outcome, currents, mute, seconds } = told;
         let state_hash = self.state_hash();
         let pathways = self.task.pathways();
         let networks = self.task.networks();
         let layers = networks.iter().flat_map(|driver| {
             driver.engine().layers().iter().enumerate().map(move |(at, layer)| (driver, at, layer))
         });
-        let layers = layers.zip(currents).map(|((driver, at, this), currents)| {
+        let seen = currents.into_iter().zip(mute);
+        let layers = layers.zip(seen).map(|((driver, at, this), (currents, mute))| {
             let layer = usize::from(this.index);
             LayerRecord {
                 layer,
@@ -241,6 +255,7 @@ impl Session {
                 currents,
                 adc_shifts: this.adc_shifts.clone(),
                 rate_shift: driver.shift(at),
+                mute,
             }
         });
         let layers = layers.collect();
@@ -273,6 +288,27 @@ impl Session {
         };
         (record, seconds)
     }
+}
+
+/// The rates of networks that have learnt nothing yet.
+fn rates(
+    config: &Config,
+    data: &DataRecord,
+    networks: &[&Driver],
+) -> Result<Vec<RateRecord>, RunError> {
+    let experiment = config.experiment(data.features, data.classes, data.image)?;
+    let network = &experiment.network;
+    let effective = network.rates_effective(&experiment.hardware)?;
+    let layers = network.rates.iter().zip(effective).zip(&network.mantissas).enumerate();
+    let shift = |layer| networks.first().map_or(0, |driver| driver.shift(layer));
+    let records = layers.map(|(layer, ((asked, effective), mantissa))| RateRecord {
+        layer,
+        asked: asked.get(),
+        effective: effective.get(),
+        shift: shift(layer),
+        mantissa: mantissa.get(),
+    });
+    Ok(records.collect())
 }
 
 /// The epoch whose state reads the test set, given the records so far.

@@ -25,6 +25,8 @@ use crate::task::classify::Examples;
 pub struct Progress {
     /// Epoch in progress, from 0.
     pub epoch: u32,
+    /// Epochs in all.
+    pub epochs: u32,
     /// Samples learnt from in this epoch.
     pub done: usize,
     /// Samples of an epoch.
@@ -43,6 +45,8 @@ pub(super) struct Told {
     pub(super) outcome: Outcome,
     /// Bank currents of the evaluation, layer by layer through all networks.
     pub(super) currents: Vec<Currents>,
+    /// Layers that put out the same whatever was shown in it.
+    pub(super) mute: Vec<bool>,
     /// Wall-clock seconds of learning.
     pub(super) seconds: f64,
 }
@@ -52,8 +56,8 @@ pub(super) trait Task: fmt::Debug {
     /// Looks at the state before the first update.
     fn start(&mut self) -> Told;
 
-    /// Learns for an epoch and looks at what came of it. `None` when `go_on` said to stop; the state then lies inside an
-    /// epoch.
+    /// Learns for an epoch and looks at what came of it. `None` when `go_on` said to stop, the state then lies inside an
+    /// epoch, or when no epoch is left.
     fn advance(&mut self, go_on: GoOn<'_>) -> Option<Told>;
 
     /// Everything that decides what comes next.

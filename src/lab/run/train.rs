@@ -7,15 +7,16 @@
 use std::path::Path;
 use std::time::{Duration, Instant};
 
+use super::notes::{Watcher, with_calibration};
 use super::session::chosen;
 use super::{Machine, Progress, RunError, Session, proof};
-use crate::lab::config::{self, Config, Select, Sources};
-use crate::lab::data::{self, Data, DataRoot, ImageShape};
+use crate::lab::config::{self, Absent, Config, Select, Sources};
+use crate::lab::data::{self, Data, DataRoot, ImageShape, Told};
 use crate::lab::price::Cost;
-use crate::lab::store::folder::{self, FolderError, RunFolder, names};
+use crate::lab::store::folder::{self, FolderError, MetricsLog, RunFolder, names};
 use crate::lab::store::ledger::LedgerRecord;
 use crate::lab::store::record::{
-    BestRecord, DataRecord, EpochRecord, Receipt, TestOutcome, TimingRecord,
+    BestRecord, DataRecord, EpochRecord, Note, RateRecord, Receipt, TestOutcome, TimingRecord,
 };
 use crate::lab::store::{address, hash};
 
@@ -31,8 +32,12 @@ pub enum RunEvent<'a> {
         folder: &'a Path,
         /// The data, in one line.
         data: &'a str,
+        /// How files of one's own were read, as far as nobody had said it.
+        said: &'a [String],
         /// What the user should know.
         warnings: &'a [String],
+        /// The rate of each layer, as it was asked for and as it is.
+        rates: &'a [RateRecord],
         /// Epochs finished before (0 unless continued).
         epoch: u32,
         /// Epochs in all.
@@ -75,10 +80,14 @@ pub struct Trained {
     pub records: Vec<EpochRecord>,
     /// What it took here.
     pub timing: TimingRecord,
+    /// What to know beside the result, as [`notes`](super::notes()) says it.
+    pub notes: Vec<Note>,
     /// The summary table.
     pub summary: String,
     /// What it cost on its chip, the final test aside.
     pub cost: Cost,
+    /// What real chips do and the run did not.
+    pub absent: Vec<Absent>,
 }
 
 /// Trains a configuration in a new folder below `root`.
@@ -127,10 +136,10 @@ pub fn train(
     on_event: &mut (dyn FnMut(RunEvent<'_>) -> bool + Send),
 ) -> Result<Trained, RunError> {
     let loaded = data::load(&config.source()?, data_root)?;
-    let about = (loaded.description.clone(), loaded.image);
+    let about = About::of(&loaded);
     let session = Session::new(config, loaded, machine)?;
     let folder = RunFolder::create(root, &config.run_name())?;
-    let text = config.to_toml();
+    let text = config.settled(&about.told, folder.path());
     folder.write(names::CONFIG, text.as_bytes())?;
     Run::new(config, text, folder, machine, about, session).carry_out(on_event)
 }
@@ -150,7 +159,7 @@ pub fn resume(
     let folder = RunFolder::open(path)?;
     let (config, text) = read_config(path)?;
     let loaded = data::load(&config.source()?, data_root)?;
-    let about = (loaded.description.clone(), loaded.image);
+    let about = About::of(&loaded);
     let session = Session::new(&config, loaded, machine)?;
     let mut run = Run::new(&config, text, folder, machine, about, session);
     run.restore()?;
@@ -169,9 +178,9 @@ pub fn carry_on(
     keeping: Keeping,
     on_event: &mut (dyn FnMut(RunEvent<'_>) -> bool + Send),
 ) -> Result<Trained, RunError> {
-    let about = (loaded.description.clone(), loaded.image);
+    let about = About::of(loaded);
     let session = || Session::new(config, loaded.clone(), machine);
-    let text = config.to_toml();
+    let text = config.settled(&about.told, folder.path());
     let begun = folder::read_text(folder.path(), names::CONFIG).is_ok_and(|found| found == text);
     let mut run = Run::new(config, text, folder, machine, about, session()?);
     run.keeping = keeping;
@@ -256,15 +265,32 @@ pub fn evaluate(
     Ok((test, state))
 }
 
+/// What is told of data beside their examples.
+struct About {
+    description: String,
+    image: Option<ImageShape>,
+    said: Vec<String>,
+    told: Told,
+}
+
+impl About {
+    fn of(data: &Data) -> Self {
+        let Data { description, image, said, told, .. } = data;
+        let (description, said, told) = (description.clone(), said.clone(), told.clone());
+        Self { description, image: *image, said, told }
+    }
+}
+
 struct Run<'a> {
     config: &'a Config,
     /// `config.toml`, as it lies in the folder.
     text: String,
     folder: RunFolder,
-    description: String,
-    image: Option<ImageShape>,
+    about: About,
     session: Session,
     records: Vec<EpochRecord>,
+    /// The records on disk, once this process has written any.
+    log: Option<MetricsLog>,
     timing: TimingRecord,
     keeping: Keeping,
     /// When files were written last.
@@ -275,6 +301,8 @@ struct Run<'a> {
     best: Option<BestRecord>,
     /// It, while it is not on disk.
     best_state: Option<Vec<u8>>,
+    /// What the records show.
+    seen: Watcher,
 }
 
 impl<'a> Run<'a> {
@@ -283,17 +311,17 @@ impl<'a> Run<'a> {
         text: String,
         folder: RunFolder,
         machine: Machine,
-        (description, image): (String, Option<ImageShape>),
+        about: About,
         session: Session,
     ) -> Self {
         Self {
             config,
             text,
             folder,
-            description,
-            image,
+            about,
             session,
             records: vec![],
+            log: None,
             timing: TimingRecord {
                 version: env!("CARGO_PKG_VERSION").into(),
                 kernel: machine.backend().name().into(),
@@ -305,6 +333,7 @@ impl<'a> Run<'a> {
             pending: false,
             best: None,
             best_state: None,
+            seen: Watcher::default(),
         }
     }
 
@@ -312,14 +341,24 @@ impl<'a> Run<'a> {
     fn start_over(&mut self, session: Session) {
         self.session = session;
         self.records.clear();
+        self.log = None;
         self.timing.epoch_seconds.clear();
         (self.best, self.best_state) = (None, None);
+        self.seen = Watcher::default();
     }
 
     /// Brings the session to the last finished epoch on disk; to none when there is no checkpoint.
     fn restore(&mut self) -> Result<(), RunError> {
         let path = self.folder.path().to_path_buf();
         if !path.join(names::CHECKPOINT).exists() && !path.join(names::RECEIPT).exists() {
+            // the ledger is written when the last epoch is done: such a run is never begun anew behind its owner's back
+            if path.join(names::LEDGER).exists() {
+                let found = format!(
+                    "is missing, though {} says that the run came to its end",
+                    names::LEDGER
+                );
+                return Err(FolderError::Content { path: path.join(names::RECEIPT), found }.into());
+            }
             return Ok(());
         }
         let receipt = folder::read_receipt(&path)?;
@@ -329,7 +368,13 @@ impl<'a> Run<'a> {
         proof::inputs(&receipt, &self.session, &self.text)?;
         let mut records = proof::records(&path, &receipt)?;
         if !path.join(names::CHECKPOINT).exists() {
-            // killed before the first one was in its place
+            // killed before the first one was in its place; later there is always one
+            if receipt.epoch_hashes.len() > 1 && self.keeping == Keeping::ALL {
+                let found = format!("is missing, though {} speaks of it", names::RECEIPT);
+                return Err(
+                    FolderError::Content { path: path.join(names::CHECKPOINT), found }.into()
+                );
+            }
             return Ok(());
         }
         let bytes = restore(&mut self.session, &path, names::CHECKPOINT)?;
@@ -340,11 +385,13 @@ impl<'a> Run<'a> {
         records.truncate(epoch as usize + 1);
         for record in &records {
             let _ = self.session.note(record);
+            let _ = self.seen.look(record);
         }
         self.best = self.best_on_disk(&path, &records)?;
         self.records = records;
         if last {
-            let expected = self.receipt("running", None, hash::bytes(&bytes), None);
+            let hashes = [receipt.metrics.clone(), hash::bytes(&bytes)];
+            let expected = self.receipt("running", None, hashes, None);
             let expected = Receipt { states: receipt.states, ..expected };
             proof::same_receipt(&path, &receipt, &expected)?;
         }
@@ -376,13 +423,16 @@ impl<'a> Run<'a> {
         let epochs = self.config.epochs;
         on_event(RunEvent::Started {
             folder: &path,
-            data: &self.description,
+            data: &self.about.description,
+            said: &self.about.said,
             warnings: &self.session.warnings(),
+            rates: self.session.rates(),
             epoch: self.session.epoch(),
             epochs,
         });
         if self.records.is_empty() {
             let record = self.session.start();
+            let _ = self.seen.look(&record);
             self.keep(record, 0.0)?;
         }
         while self.session.epoch() < epochs {
@@ -391,12 +441,12 @@ impl<'a> Run<'a> {
             let Some((record, seconds)) = learnt else {
                 return Err(RunError::Stopped { epoch, path: path.display().to_string() });
             };
-            let notes: Vec<_> =
-                self.session.note(&record).iter().map(ToString::to_string).collect();
+            let _ = self.session.note(&record);
+            let notes = self.seen.look(&record);
             self.keep(record, seconds)?;
             on_event(RunEvent::Epoch(self.records.last().expect("just kept"), seconds));
             for note in notes {
-                on_event(RunEvent::Warning(&note));
+                on_event(RunEvent::Warning(&note.to_string()));
             }
         }
         self.finish()
@@ -431,25 +481,38 @@ impl<'a> Run<'a> {
         if let (Some(state), Some(best)) = (self.best_state.take(), &self.best) {
             self.folder.write(&RunFolder::best_name(best.epoch), &state)?;
         }
-        self.folder.write_metrics(&self.records)?;
+        let metrics = self.write_records()?;
         self.folder.write_timing(&self.timing)?;
-        self.folder.write_receipt(&self.receipt("running", None, hash::bytes(state), None))?;
+        let hashes = [metrics, hash::bytes(state)];
+        self.folder.write_receipt(&self.receipt("running", None, hashes, None))?;
         self.folder.write(names::CHECKPOINT, state)?;
         self.folder.tidy(self.best.as_ref().map(|best| best.epoch));
         (self.written, self.pending) = (Instant::now(), false);
         Ok(())
     }
 
-    /// What the run can prove so far; `checkpoint` is the hash of the state after the last record.
+    /// Puts the records behind those on disk, and gives the hash of their text.
+    fn write_records(&mut self) -> Result<String, RunError> {
+        let log = match &mut self.log {
+            Some(log) => {
+                log.grow(&self.records)?;
+                log
+            }
+            none => none.insert(self.folder.begin_metrics(&self.records)?),
+        };
+        Ok(log.hash())
+    }
+
+    /// What the run can prove so far; `hashes` are those of the records' text and of the state after the last one.
     fn receipt(
         &self,
         status: &str,
         ledger: Option<&str>,
-        checkpoint: String,
+        hashes: [String; 2],
         test: Option<TestOutcome>,
     ) -> Receipt {
         let Self { session, records, best, text, .. } = self;
-        let receipt = proof::receipt(session, text, records, checkpoint, best.clone());
+        let receipt = proof::receipt(session, text, records, hashes, best.clone());
         Receipt {
             status: status.into(),
             ledger: ledger.map(hash::bytes),
@@ -467,7 +530,7 @@ impl<'a> Run<'a> {
         let checkpoint = hash::bytes(&state);
         let ledger = LedgerRecord::of(&self.session.engines());
         let ledger_text = ledger.to_json();
-        self.folder.write_metrics(&self.records)?;
+        let metrics = self.write_records()?;
         self.folder.write_timing(&self.timing)?;
         self.folder.write(names::LEDGER, ledger_text.as_bytes())?;
         let cost = super::report::cost(self.config, &ledger, &self.records);
@@ -495,7 +558,7 @@ impl<'a> Run<'a> {
         }
         let read = self.session.checkpoint();
         let test = self.session.test();
-        let receipt = self.receipt("finished", Some(&ledger_text), checkpoint, test);
+        let receipt = self.receipt("finished", Some(&ledger_text), [metrics, checkpoint], test);
         let page = super::report::Parts {
             config: self.config,
             text: &self.text,
@@ -504,7 +567,7 @@ impl<'a> Run<'a> {
             records: &self.records,
             counted: Some((&ledger, &cost)),
             state: self.keeping.states.then_some(&read),
-            examples: self.session.examples().zip(self.image),
+            examples: self.session.examples().zip(self.about.image),
         };
         let page = page.draw();
         self.folder.write(names::REPORT, page.html.as_bytes())?;
@@ -512,7 +575,9 @@ impl<'a> Run<'a> {
         if !self.keeping.states {
             self.folder.forget_states();
         }
+        let notes = with_calibration(&receipt, &self.seen);
         let Self { records, timing, .. } = self;
-        Ok(Trained { receipt, records, timing, summary: page.summary, cost })
+        let absent = self.config.absent();
+        Ok(Trained { receipt, records, timing, notes, summary: page.summary, cost, absent })
     }
 }

@@ -28,6 +28,13 @@ pub fn is_key(text: &str) -> bool {
     text.len() == 32 && text.bytes().all(|b| b.is_ascii_digit() || (b'a'..=b'f').contains(&b))
 }
 
+/// Whether a text can be the name of a sweep: 1 to 64 lower-case letters, digits and `-`, so that it can be that of a file.
+#[must_use]
+pub fn is_name(text: &str) -> bool {
+    let good = |b: u8| b.is_ascii_lowercase() || b.is_ascii_digit() || b == b'-';
+    (1..=64).contains(&text.len()) && text.bytes().all(good)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -1,10 +1,11 @@
 //! The folder of a run: files written whole, read with limits, held by one process at a time.
 #![expect(clippy::disallowed_methods, reason = "runs live in files")]
 
-use std::fs::{self, File};
-use std::io::{self, Read, Write};
+use std::fs::{self, File, OpenOptions};
+use std::io::{self, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
+use super::place;
 use super::record::{EpochRecord, Receipt, TimingRecord};
 
 /// Greatest size of a text file that is read back.
@@ -78,6 +79,18 @@ pub mod names {
     pub const RECEIPT: &str = "receipt.json";
     /// For people.
     pub const REPORT: &str = "report.html";
+    /// Held by the process that is at the run; empty.
+    pub const LOCK: &str = "lock";
+}
+
+/// Whether a file of that name is part of a run: no lock, no part, nothing of somebody else.
+#[must_use]
+pub fn is_of_run(name: &str) -> bool {
+    use names::{CHECKPOINT, CONFIG, LEDGER, METRICS, RECEIPT, REPORT, TIMING};
+    let best = name.strip_prefix("best-").and_then(|rest| rest.strip_suffix(".safetensors"));
+    let is_best =
+        best.is_some_and(|n| (5..=10).contains(&n.len()) && n.bytes().all(|b| b.is_ascii_digit()));
+    is_best || [CONFIG, METRICS, LEDGER, CHECKPOINT, TIMING, RECEIPT, REPORT].contains(&name)
 }
 
 impl RunFolder {
@@ -113,15 +126,24 @@ impl RunFolder {
     /// # Errors
     /// When it cannot be made or another process holds it.
     pub fn take(path: &Path) -> Result<Self, FolderError> {
-        fs::create_dir_all(path).map_err(|e| io_error("make folder", path, e))?;
+        for folder in path.parent().into_iter().chain([path]) {
+            place::make_folder(folder).map_err(|e| io_error("make folder", folder, e))?;
+        }
         Self::hold(path.into())
     }
 
     fn hold(path: PathBuf) -> Result<Self, FolderError> {
-        let lock_path = path.join("lock");
-        let lock = File::create(&lock_path).map_err(|e| io_error("write", &lock_path, e))?;
+        let lock_path = path.join(names::LOCK);
+        let mut options = OpenOptions::new();
+        options.read(true).write(true).create(true).truncate(false);
+        let lock = place::open(&lock_path, &mut options, false);
+        let lock = lock.map_err(|e| io_error("lock", &lock_path, e))?;
         match lock.try_lock() {
-            Ok(()) => Ok(Self { path, _lock: lock }),
+            Ok(()) => {
+                // whoever held it before has ended: what it left half written is nobody's
+                place::clear_held(&path);
+                Ok(Self { path, _lock: lock })
+            }
             Err(fs::TryLockError::WouldBlock) => Err(FolderError::Held { path }),
             Err(fs::TryLockError::Error(e)) => Err(io_error("lock", &lock_path, e)),
         }
@@ -139,18 +161,26 @@ impl RunFolder {
     /// When the system refuses; the old file is then still there.
     pub fn write(&self, name: &str, bytes: &[u8]) -> Result<(), FolderError> {
         let place = self.path.join(name);
-        write_whole(&place, |file| file.write_all(bytes)).map_err(|e| io_error("write", &place, e))
+        place::write_whole(&place, |file| file.write_all(bytes))
+            .map_err(|e| io_error("write", &place, e))
     }
 
-    /// Writes the records of all epochs.
+    /// Writes the records so far, whole, and gives what the next ones are put behind.
     ///
     /// # Errors
     /// When the system refuses.
     ///
     /// # Panics
     /// Never: records have a JSON form.
-    pub fn write_metrics(&self, records: &[EpochRecord]) -> Result<(), FolderError> {
-        self.write(names::METRICS, metrics_text(records).as_bytes())
+    pub fn begin_metrics(&self, records: &[EpochRecord]) -> Result<MetricsLog, FolderError> {
+        let text = metrics_text(records);
+        self.write(names::METRICS, text.as_bytes())?;
+        let path = self.path.join(names::METRICS);
+        let file = place::open(&path, OpenOptions::new().write(true), false);
+        let file = file.map_err(|e| io_error("write", &path, e))?;
+        let mut hash = blake3::Hasher::new();
+        hash.update(text.as_bytes());
+        Ok(MetricsLog { path, file, bytes: text.len() as u64, records: records.len(), hash })
     }
 
     /// Writes the receipt.
@@ -177,13 +207,25 @@ impl RunFolder {
         self.write(names::TIMING, text.as_bytes())
     }
 
+    /// Copies a file of another run's folder, whole.
+    ///
+    /// # Errors
+    /// When it is no plain file, or the system refuses.
+    pub fn copy(&self, source: &Path, name: &str) -> Result<(), FolderError> {
+        let [from, to] = [source, &self.path].map(|folder| folder.join(name));
+        let file = place::open(&from, OpenOptions::new().read(true), false);
+        let mut file = file.map_err(|e| io_error("read", &from, e))?;
+        place::write_whole(&to, |to| io::copy(&mut file, to).map(drop))
+            .map_err(|e| io_error("write", &to, e))
+    }
+
     /// Name of the file of the best state, reached in `epoch`.
     #[must_use]
     pub fn best_name(epoch: u32) -> String {
         format!("best-{epoch:05}.safetensors")
     }
 
-    /// Removes files that a finished write has replaced: best states other than that of `keep`, and parts.
+    /// Removes files that a finished write has replaced: best states other than that of `keep`.
     pub fn tidy(&self, keep: Option<u32>) {
         let keep = keep.map(Self::best_name);
         self.remove(|name| name.starts_with("best-") && Some(name) != keep.as_deref());
@@ -194,15 +236,56 @@ impl RunFolder {
         self.remove(|name| name.starts_with("best-") || name == names::CHECKPOINT);
     }
 
-    /// Removes parts of files that were never finished, and what else is not wanted.
     fn remove(&self, unwanted: impl Fn(&str) -> bool) {
         let Ok(entries) = fs::read_dir(&self.path) else { return };
         for entry in entries.flatten() {
-            let name = entry.file_name().to_string_lossy().into_owned();
-            if unwanted(&name) || name.starts_with(".part-") {
+            if entry.file_name().to_str().is_some_and(&unwanted) {
                 let _ = fs::remove_file(entry.path());
             }
         }
+    }
+}
+
+/// `metrics.jsonl` while a run goes on: each record is written once, behind those before it. A kill may leave half a line
+/// at the end; the receipt says how many lines count, and who continues writes those alone.
+#[derive(Debug)]
+pub struct MetricsLog {
+    path: PathBuf,
+    file: File,
+    bytes: u64,
+    records: usize,
+    hash: blake3::Hasher,
+}
+
+impl MetricsLog {
+    /// Writes those of all records that are not there yet.
+    ///
+    /// # Errors
+    /// When the system refuses; the file then holds what it held.
+    ///
+    /// # Panics
+    /// Never: records have a JSON form.
+    pub fn grow(&mut self, records: &[EpochRecord]) -> Result<(), FolderError> {
+        let text = metrics_text(records.get(self.records..).unwrap_or_default());
+        let file = &mut self.file;
+        let written = file
+            .seek(SeekFrom::Start(self.bytes))
+            .and_then(|_| file.write_all(text.as_bytes()))
+            .and_then(|()| file.sync_data());
+        if let Err(error) = written {
+            let _ = file.set_len(self.bytes);
+            return Err(io_error("write", &self.path, error));
+        }
+        self.bytes += text.len() as u64;
+        self.records = records.len();
+        self.hash.update(text.as_bytes());
+        Ok(())
+    }
+
+    /// BLAKE3 of what is written.
+    #[must_use]
+    pub fn hash(&self) -> String {
+        self.hash.finalize().to_hex().to_string()
     }
 }
 
@@ -231,38 +314,10 @@ pub fn receipt_text(receipt: &Receipt) -> String {
     text
 }
 
-/// Writes a file whole: beside its place, flushed, then moved into it.
-///
-/// # Errors
-/// When the system or `write` refuses; the old file is then still there.
-pub fn write_whole(
-    place: &Path,
-    write: impl FnOnce(&mut File) -> io::Result<()>,
-) -> io::Result<()> {
-    let folder = place.parent().filter(|folder| !folder.as_os_str().is_empty());
-    let folder = folder.unwrap_or_else(|| Path::new("."));
-    let mut builder = tempfile::Builder::new();
-    builder.prefix(".part-");
-    #[cfg(unix)]
-    let builder = {
-        // readable by whom the user's mask allows, as any other file
-        use std::os::unix::fs::PermissionsExt;
-        builder.permissions(fs::Permissions::from_mode(0o666))
-    };
-    let mut part = builder.tempfile_in(folder)?;
-    write(part.as_file_mut())?;
-    part.as_file().sync_all()?;
-    part.persist(place).map_err(|error| error.error)?;
-    // the move itself has to reach the disk; not every file system lets a folder be flushed
-    if let Ok(folder) = File::open(folder) {
-        let _ = folder.sync_all();
-    }
-    Ok(())
-}
-
 /// Reads a file of a run, up to a limit.
 fn read_limited(path: &Path, limit: u64) -> Result<Vec<u8>, FolderError> {
-    let file = File::open(path).map_err(|e| io_error("read", path, e))?;
+    let file = place::open(path, OpenOptions::new().read(true), true);
+    let file = file.map_err(|e| io_error("read", path, e))?;
     let mut bytes = Vec::new();
     file.take(limit + 1).read_to_end(&mut bytes).map_err(|e| io_error("read", path, e))?;
     if bytes.len() as u64 > limit {

@@ -4,6 +4,10 @@
 //! A field that is added has `#[serde(default)]`, so that runs of earlier programs are read; every other field has to be
 //! there, also where it is `null`.
 
+mod note;
+
+pub use note::Note;
+
 use std::collections::BTreeMap;
 use std::fmt;
 
@@ -48,6 +52,9 @@ pub struct LayerRecord {
     pub adc_shifts: Vec<Vec<u32>>,
     /// Shift k of the rate at the end of the epoch.
     pub rate_shift: u32,
+    /// Whether its units put out the same whatever was shown in the evaluation of this epoch; absent where they did not.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub mute: bool,
 }
 
 /// What a task says of an epoch.
@@ -227,6 +234,9 @@ pub struct DataRecord {
     /// Height, width and channels, where examples are pictures.
     #[serde(deserialize_with = "Option::deserialize")]
     pub image: Option<[usize; 3]>,
+    /// What the classes are called, where it is not by their numbers.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub names: Vec<String>,
 }
 
 impl DataRecord {
@@ -241,6 +251,7 @@ impl DataRecord {
             full_scale: train.full_scale(),
             classes: train.classes(),
             image: data.image.map(|shape| [shape.height, shape.width, shape.channels]),
+            names: data.names.clone(),
         }
     }
 }
@@ -256,80 +267,31 @@ impl fmt::Display for DataRecord {
     }
 }
 
-/// Something a run showed that its user should know: numbers, put into words where they are shown.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(tag = "note", rename_all = "snake_case", deny_unknown_fields)]
+/// The rate of a layer: the shift is a whole number, so a rate becomes another one.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 #[non_exhaustive]
-pub enum Note {
-    /// Converters of a layer use few codes on the first training examples.
-    LowCodes {
-        /// Which layer.
-        layer: usize,
-        /// Greatest code.
-        code_max: i64,
-    },
-    /// Many conversions saturated while learning.
-    Saturated {
-        /// Epochs by then.
-        epoch: u32,
-        /// Conversions that did.
-        saturated: u64,
-        /// Of so many.
-        conversions: u64,
-    },
-    /// An epoch knows less than half of what an earlier one knew.
-    Forgot {
-        /// Which epoch.
-        epoch: u32,
-        /// Right answers after it.
-        correct: u64,
-        /// Right answers after the best before it.
-        best: u64,
-    },
-    /// Most indices of tables, or most gates, lie at their ends.
-    Ends {
-        /// Epochs by then.
-        epoch: u32,
-        /// `tables` or `gates`.
-        of: String,
-        /// Those at an end.
-        saturated: u64,
-        /// Of so many.
-        all: u64,
-    },
+pub struct RateRecord {
+    /// Layer, from 0 at the input.
+    pub layer: usize,
+    /// Rate asked for, its multiplier included.
+    pub asked: f64,
+    /// Rate that shift and mantissa give before any decay.
+    pub effective: f64,
+    /// Shift k before any decay.
+    pub shift: u32,
+    /// Small factor beside it.
+    pub mantissa: u32,
 }
 
-fn percent(some: u64, all: u64) -> u128 {
-    u128::from(some) * 100 / u128::from(all).max(1)
-}
-
-impl fmt::Display for Note {
+impl fmt::Display for RateRecord {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::LowCodes { layer, code_max } => write!(
-                f,
-                "layer {layer}: on the first training examples the converters use codes 0 to {code_max} only; currents \
-                 grow while learning, but if accuracy stays low, give them more hw.adc.bits or a smaller range"
-            ),
-            Self::Saturated { epoch, saturated, conversions } => write!(
-                f,
-                "{} % of the conversions up to epoch {epoch} saturated: the range of the converters is too small for \
-                 the currents of a net that learns. hw.adc.range = \"tracking\" widens it meanwhile; of a \
-                 \"calibrated\" one, raise hw.adc.headroom",
-                percent(*saturated, *conversions)
-            ),
-            Self::Forgot { epoch, correct, best } => write!(
-                f,
-                "epoch {epoch} knows {correct} right answers, an earlier one knew {best}: the network diverges; lower \
-                 learning.rate or raise network.alpha"
-            ),
-            Self::Ends { epoch, of, saturated, all } => write!(
-                f,
-                "{} % of the {of} up to epoch {epoch} lie at an end of their range, where nothing is learnt; lower \
-                 learning.rate, or raise network.alpha or network.weight_max",
-                percent(*saturated, *all)
-            ),
-        }
+        let Self { layer, asked, effective, shift, mantissa } = self;
+        let off = 100.0 * (effective / asked - 1.0);
+        write!(
+            f,
+            "layer {layer}: {asked} asked for, {effective:.4} in effect ({off:+.1} %; {mantissa} x 2^-{shift})"
+        )
     }
 }
 
@@ -380,8 +342,11 @@ pub struct Receipt {
     /// The final test, when finished.
     #[serde(deserialize_with = "Option::deserialize")]
     pub test: Option<TestOutcome>,
-    /// What the run showed.
+    /// What the run showed, as far as a receipt says it: [`notes`](crate::lab::run::notes) has the rest.
     pub notes: Vec<Note>,
+    /// Rates of the layers; empty in receipts of earlier programs.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub rates: Vec<RateRecord>,
 }
 
 impl Receipt {

@@ -1,10 +1,13 @@
 //! One axis of a sweep: a list of values, or a range to draw from.
 
+use std::path::Path;
+use std::sync::Arc;
+
 use serde::{Deserialize, Serialize};
 
 use super::SweepError;
 use crate::lab::config::sweep::{AxisFile, CaseFile, KeyFile, ScalarFile};
-use crate::lab::config::{overlay, setting};
+use crate::lab::config::{anchor, overlay, setting};
 
 /// Most values of one axis.
 const VALUES_MAX: usize = 100_000;
@@ -72,8 +75,8 @@ impl From<ScalarFile> for Value {
 pub struct Choice {
     /// The value.
     pub value: Value,
-    /// Keys of an experiment.
-    pub keys: toml::Table,
+    /// Keys of an experiment; points that have the value share them.
+    pub keys: Arc<toml::Table>,
 }
 
 /// Where the values come from.
@@ -98,6 +101,13 @@ pub struct Axis {
 }
 
 impl Axis {
+    /// Makes paths that it sets, which are relative to `folder`, relative to where the program runs.
+    pub(super) fn anchor(&mut self, folder: &Path) {
+        if let Source::List(choices) = &mut self.source {
+            choices.iter_mut().for_each(|choice| anchor(Arc::make_mut(&mut choice.keys), folder));
+        }
+    }
+
     /// Checks an axis. `sampled`: points are drawn, so a range needs no steps.
     pub(super) fn new(file: AxisFile, sampled: bool) -> Result<Self, SweepError> {
         let AxisFile { name, label, key, values, from, to, scale, steps, case } = file;
@@ -145,13 +155,13 @@ impl Axis {
             if list.is_empty() || list.len() > VALUES_MAX {
                 return Err(wrong("has no values, or too many", "give it 1 to 100000"));
             }
-            for (at, one) in list.iter().enumerate() {
-                if list[..at].iter().any(|other| other.value == one.value) {
-                    return Err(wrong(
-                        &format!("has the value {} twice", one.value),
-                        "give it once",
-                    ));
-                }
+            // sorted, as a list may be long
+            let mut words: Vec<_> = list.iter().map(|one| format!("{:?}", one.value)).collect();
+            words.sort_unstable();
+            if let Some(twice) = words.windows(2).find(|pair| pair[0] == pair[1]) {
+                let one = list.iter().find(|one| format!("{:?}", one.value) == twice[0]);
+                let value = one.map_or_else(String::new, |one| one.value.to_string());
+                return Err(wrong(&format!("has the value {value} twice"), "give it once"));
             }
         }
         Ok(Self { label: label.unwrap_or_else(|| name.replace('_', " ")), name, log, source })
@@ -164,6 +174,22 @@ impl Axis {
             Source::List(list) => list,
             Source::Range { .. } => &[],
         }
+    }
+
+    /// The keys it sets, with dots, each once.
+    #[must_use]
+    pub fn keys(&self) -> Vec<String> {
+        let mut keys = match &self.source {
+            Source::Range { keys, .. } => keys.clone(),
+            Source::List(list) => {
+                let mut keys = Vec::new();
+                list.iter().for_each(|choice| leaves(&choice.keys, "", &mut keys));
+                keys
+            }
+        };
+        keys.sort();
+        keys.dedup();
+        keys
     }
 
     /// Whether all values are numbers.
@@ -192,10 +218,21 @@ impl Axis {
     }
 }
 
+/// Names of everything in a table that is no table, with dots.
+fn leaves(table: &toml::Table, place: &str, into: &mut Vec<String>) {
+    for (name, value) in table {
+        let name = if place.is_empty() { name.clone() } else { format!("{place}.{name}") };
+        match value {
+            toml::Value::Table(inside) => leaves(inside, &name, into),
+            _ => into.push(name),
+        }
+    }
+}
+
 fn choice(names: &[String], value: Value) -> Choice {
     let mut keys = toml::Table::new();
     names.iter().for_each(|name| overlay(&mut keys, setting(name, value.to_toml())));
-    Choice { value, keys }
+    Choice { value, keys: Arc::new(keys) }
 }
 
 fn case_choice(axis: &str, case: CaseFile) -> Result<Choice, SweepError> {
@@ -207,7 +244,7 @@ fn case_choice(axis: &str, case: CaseFile) -> Result<Choice, SweepError> {
         ));
     };
     let keys = super::table(&case.set.unwrap_or_default());
-    Ok(Choice { value: name.into(), keys })
+    Ok(Choice { value: name.into(), keys: Arc::new(keys) })
 }
 
 /// Between two numbers; `libm`, so that every machine draws the same.
@@ -291,9 +328,9 @@ mod tests {
         }
         let one = axis("key = 'hw.cell.level_bits'\nvalues = [3]", false).unwrap();
         assert_eq!((one.name.as_str(), one.label.as_str()), ("level_bits", "level bits"));
-        assert_eq!(toml::to_string(&one.list()[0].keys).unwrap(), "[hw.cell]\nlevel_bits = 3\n");
+        assert_eq!(toml::to_string(&*one.list()[0].keys).unwrap(), "[hw.cell]\nlevel_bits = 3\n");
         let two = axis("key = ['a.b', 'a.c']\nvalues = [3]", false).unwrap();
-        assert_eq!(toml::to_string(&two.list()[0].keys).unwrap(), "[a]\nb = 3\nc = 3\n");
+        assert_eq!(toml::to_string(&*two.list()[0].keys).unwrap(), "[a]\nb = 3\nc = 3\n");
     }
 
     #[test]
@@ -316,7 +353,7 @@ mod tests {
         let rule = axis(text, false).unwrap();
         assert_eq!((values(&rule).as_str(), rule.is_number()), ("ed bp", false));
         assert_eq!(
-            toml::to_string(&rule.list()[0].keys).unwrap(),
+            toml::to_string(&*rule.list()[0].keys).unwrap(),
             "[learning]\nrate = 4.0\nrule = \"ed\"\n"
         );
     }

@@ -32,6 +32,8 @@ pub struct Options {
     pub keeping: Keeping,
     /// Which of the runs are this process's.
     pub shard: Option<Shard>,
+    /// Whether another sweep of that name in the store is replaced.
+    pub replace: bool,
 }
 
 /// What happens meanwhile.
@@ -110,9 +112,6 @@ enum Came {
 ///
 /// # Errors
 /// When disk or index refuse; what is finished by then is kept.
-///
-/// # Panics
-/// When a thread cannot be started.
 pub fn carry_out(
     plan: &SweepPlan,
     store: &mut Store,
@@ -121,13 +120,13 @@ pub fn carry_out(
     on_event: &(dyn Fn(SweepEvent<'_>) + Sync),
 ) -> Result<Carried, SweepError> {
     let (sweep, points) = plan.records();
-    store.plan(&sweep, &points)?;
+    store.plan(&sweep, &points, options.replace)?;
     let mine = |at: &usize| options.shard.is_none_or(|shard| shard.has(*at));
     let tasks: Vec<&PlannedRun> =
         (0..plan.tasks.len()).filter(mine).map(|at| &plan.tasks[at]).collect();
     let mut todo = VecDeque::new();
     for &task in &tasks {
-        if store.row(&task.key)?.is_none() {
+        if !store.is_finished(&task.key)? {
             todo.push_back(task);
         }
     }
@@ -148,8 +147,15 @@ pub fn carry_out(
         on_event,
     };
     std::thread::scope(|scope| {
-        for _ in 0..jobs {
-            scope.spawn(|| crew.work());
+        for job in 0..jobs {
+            let named = std::thread::Builder::new().name(format!("run {job}"));
+            if named.spawn_scoped(scope, || crew.work()).is_err() {
+                // the system gives no more threads: those it gave do the work, or this one
+                if job == 0 {
+                    crew.work();
+                }
+                break;
+            }
         }
     });
     if let Some(error) = lock(&crew.broken).take() {
@@ -166,7 +172,7 @@ fn price_points(plan: &SweepPlan, store: &mut Store) -> Result<(), SweepError> {
     let mut own = Vec::new();
     for planned in &plan.points {
         let (Ok(key), Some(prices)) = (&planned.key, &planned.prices) else { continue };
-        let Some(kept) = store.row(key)? else { continue };
+        let Some(kept) = store.row(key)?.filter(|_| store.has_folder(key)) else { continue };
         let kept: Option<Row> = serde_json::from_str(&kept).ok();
         if kept.is_none_or(|kept| kept.priced_with != prices.fingerprint()) {
             let (row, _) = row_as(&store.folder(key), Some(Prices::clone(prices)))?;
@@ -259,15 +265,11 @@ impl<'a> Crew<'a> {
             return Ok(Came::Done { row, seconds, elsewhere: true });
         }
         let machine = Machine::new(self.options.backend, 1).expect("one thread");
-        let samples = f64::from(task.config.epochs) * data.split.train.len().max(1) as f64;
+        let config = self.plan.config(task).map_err(|error| Trouble::Run(error.to_string()))?;
+        let samples = f64::from(task.epochs) * data.split.train.len().max(1) as f64;
         let mut before = None;
-        let outcome = run::carry_on(
-            &task.config,
-            data,
-            folder,
-            machine,
-            self.options.keeping,
-            &mut |event| {
+        let outcome =
+            run::carry_on(&config, data, folder, machine, self.options.keeping, &mut |event| {
                 if let run::RunEvent::Batch(progress) = event {
                     let seen =
                         f64::from(progress.epoch) * progress.total as f64 + progress.done as f64;
@@ -275,8 +277,7 @@ impl<'a> Crew<'a> {
                     (self.on_event)(SweepEvent::Work(task.work * done / samples));
                 }
                 !self.stopped()
-            },
-        );
+            });
         match outcome {
             Ok(_) => {
                 let (row, seconds) = row(&path).map_err(Trouble::place)?;

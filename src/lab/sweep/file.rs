@@ -6,9 +6,10 @@ use std::path::Path;
 use super::filter::Filter;
 use super::row::RESULTS;
 use super::{Axis, SweepError};
-use crate::lab::config::ConfigError;
 use crate::lab::config::sweep::{ReportFile, SampleFile, SeedsFile, SweepFile};
+use crate::lab::config::{ConfigError, anchor};
 use crate::lab::report::sweep::Figures;
+use crate::lab::store::address;
 
 /// Draws points in place of the full grid.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -93,14 +94,13 @@ impl Sweep {
         let stem =
             Path::new(place).file_stem().map(|s| s.to_string_lossy().replace(['_', ' '], "-"));
         let name = file.name.or(stem).unwrap_or_default();
-        let good = |b: u8| b.is_ascii_lowercase() || b.is_ascii_digit() || b == b'-';
-        if !(1..=64).contains(&name.len()) || !name.bytes().all(good) {
+        if !address::is_name(&name) {
             let allowed = "use 1 to 64 lower-case letters, digits and `-`";
             return Err(SweepError::key("name", &format!("is {name:?}"), allowed));
         }
         let sample = file.sample.map(sampled).transpose()?;
         let axes = file.axis.unwrap_or_default().into_iter();
-        let axes: Vec<Axis> =
+        let mut axes: Vec<Axis> =
             axes.map(|axis| Axis::new(axis, sample.is_some())).collect::<Result<_, _>>()?;
         if axes.is_empty() {
             return Err(SweepError::key(
@@ -120,12 +120,17 @@ impl Sweep {
                 ));
             }
         }
+        distinct(&axes)?;
         let seeds = seeds(file.seeds)?;
         let mut names: Vec<&str> = axes.iter().map(|axis| &*axis.name).collect();
         names.push("seed");
         let filter = Filter::new(&file.filter.unwrap_or_default(), &names)?;
         let figures = figures(file.report.unwrap_or_default(), &axes)?;
-        let base = super::table(&file.base.unwrap_or_default());
+        let mut base = super::table(&file.base.unwrap_or_default());
+        // paths in a file are relative to that file
+        let folder = Path::new(place).parent().unwrap_or(Path::new(""));
+        anchor(&mut base, folder);
+        axes.iter_mut().for_each(|axis| axis.anchor(folder));
         let title = file.title.unwrap_or_else(|| name.clone());
         let about = file.about.unwrap_or_default();
         Ok(Self {
@@ -146,8 +151,27 @@ impl Sweep {
 
 /// Names of columns that are not axes.
 fn reserved(name: &str) -> bool {
-    ["point", "seed", "status", "key", "run", "state_hash", "data_hash"].contains(&name)
-        || RESULTS.iter().any(|result| result.name == name)
+    super::table::NAMES.contains(&name) || RESULTS.iter().any(|result| result.name == name)
+}
+
+/// Whether no two axes set one key: the later one would win at every point, and the other be a name for nothing.
+fn distinct(axes: &[Axis]) -> Result<(), SweepError> {
+    let covers = |a: &str, b: &str| a == b || b.strip_prefix(a).is_some_and(|b| b.starts_with('.'));
+    let keys: Vec<_> = axes.iter().map(Axis::keys).collect();
+    for (at, axis) in axes.iter().enumerate() {
+        for (other, theirs) in axes.iter().zip(&keys).take(at) {
+            let both = keys[at]
+                .iter()
+                .find(|key| theirs.iter().any(|other| covers(key, other) || covers(other, key)));
+            if let Some(key) = both {
+                let found = format!("sets `{key}`, and so does axis `{}`", other.name);
+                let allowed =
+                    "one key has one axis: take one out, or join the two with [[axis.case]]";
+                return Err(SweepError::axis(&axis.name, &found, allowed));
+            }
+        }
+    }
+    Ok(())
 }
 
 fn sampled(file: SampleFile) -> Result<Sample, SweepError> {
@@ -167,15 +191,24 @@ fn sampled(file: SampleFile) -> Result<Sample, SweepError> {
     Ok(Sample { latin_hypercube, points, seed: file.seed.unwrap_or(1) })
 }
 
+/// Most seeds of a sweep.
+const SEEDS_MAX: u32 = 100_000;
+
 fn seeds(file: Option<SeedsFile>) -> Result<Vec<u64>, SweepError> {
+    let allowed =
+        "give 1 to 100000 different ones; ten of them tell a difference of one standard deviation";
+    let wrong = |count: u64| SweepError::key("seeds", &format!("are {count}"), allowed);
     let list = match file {
         None => return Ok(vec![]),
-        Some(SeedsFile::Count(count)) => (1..=u64::from(count)).collect(),
+        // counted before they are made
+        Some(SeedsFile::Count(count)) if (1..=SEEDS_MAX).contains(&count) => {
+            (1..=u64::from(count)).collect()
+        }
+        Some(SeedsFile::Count(count)) => return Err(wrong(u64::from(count))),
         Some(SeedsFile::List(list)) => list,
     };
-    let allowed = "give 1 to 100000 different ones";
-    if !(1..=100_000).contains(&list.len()) {
-        return Err(SweepError::key("seeds", &format!("are {}", list.len()), allowed));
+    if list.is_empty() || list.len() > SEEDS_MAX as usize {
+        return Err(wrong(list.len() as u64));
     }
     let mut sorted = list.clone();
     sorted.sort_unstable();
@@ -266,6 +299,20 @@ mod tests {
             (
                 &format!("{GRID}[[axis]]\nname = 'cycles'\nkey = 'a'\nvalues = [1]"),
                 "another column",
+            ),
+            (
+                &format!("{GRID}[[axis]]\nname = 'hardware'\nkey = 'a'\nvalues = [1]"),
+                "another column",
+            ),
+            (
+                &format!("{GRID}[[axis]]\nname = 'b'\nkey = 'hw.cell.level_bits'\nvalues = [3]"),
+                "sets `hw.cell.level_bits`, and so does axis `level_bits`",
+            ),
+            (
+                &format!(
+                    "{GRID}[[axis]]\nname = 'b'\n[[axis.case]]\nname = 'x'\nset.hw.cell.level_bits = 3"
+                ),
+                "sets `hw.cell.level_bits`, and so does axis `level_bits`",
             ),
             (&format!("{GRID}[base.learning]\nepoch = 3"), "unknown field `epoch`"),
             (&format!("filter = ['bits > 3']\n{GRID}"), "level_bits, rule, seed"),

@@ -7,9 +7,9 @@ use std::path::Path;
 use super::row::row;
 use super::{Row, SweepError};
 use crate::lab::run::{self, RunError};
-use crate::lab::store::ARITHMETIC;
 use crate::lab::store::folder::{self, FolderError, RunFolder, names};
 use crate::lab::store::index::{Store, StoreError};
+use crate::lab::store::{ARITHMETIC, place};
 
 /// Rows written to an index at a time.
 const BATCH: usize = 256;
@@ -23,10 +23,34 @@ pub struct Merged {
     pub shared: usize,
     /// Runs left behind: another process is at them.
     pub held: usize,
+    /// Runs left behind: they are broken, or say something else than the same run here.
+    pub skipped: Vec<Skipped>,
     /// Sweeps that were new.
     pub sweeps: usize,
     /// Sweeps of a name that means another sweep here; their runs came over, their points did not.
     pub different: Vec<String>,
+}
+
+/// A run folder that was left as it is.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Skipped {
+    /// Its key.
+    pub key: String,
+    /// What is wrong with it.
+    pub why: String,
+}
+
+/// What an index was made of.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Reindexed {
+    /// Finished runs.
+    pub finished: usize,
+    /// Folders of runs that are not.
+    pub unfinished: usize,
+    /// Folders that say that they are finished and cannot be read as that.
+    pub damaged: Vec<Skipped>,
+    /// Runs that the index knew and that have no folder, or a damaged one.
+    pub forgotten: usize,
 }
 
 /// The key a finished run should have, from what is in its folder.
@@ -39,10 +63,42 @@ pub(super) fn address_of(path: &Path) -> Result<String, SweepError> {
     run::address_of(path, &receipt.data).map_err(SweepError::from)
 }
 
-/// Brings the finished runs and the sweeps of `from` into `into`.
+/// The row of a finished run that lies where its key says, read off plain files alone.
+fn own_row(store: &Store, key: &str) -> Result<(Row, f64), SweepError> {
+    let path = store.folder(key);
+    let damaged = |found: &str| {
+        let found = found.into();
+        SweepError::from(RunError::from(FolderError::Content { path: path.clone(), found }))
+    };
+    let is_folder = |path: &Path| fs::symlink_metadata(path).is_ok_and(|found| found.is_dir());
+    if !path.parent().is_some_and(is_folder) || !is_folder(&path) {
+        return Err(damaged("is no folder of this store"));
+    }
+    let files = files(&path).map_err(|error| damaged(&error.to_string()))?;
+    if let Some(name) = files.iter().find(|name| !place::is_plain(&path.join(name))) {
+        return Err(damaged(&format!("holds a {name} that is no plain file")));
+    }
+    let found = row(&path)?;
+    if address_of(&path)? != *key {
+        return Err(damaged("does not hold the run its name says"));
+    }
+    Ok(found)
+}
+
+/// Names of the files of a run that lie in a folder; what else may lie there is nobody's.
+fn files(path: &Path) -> std::io::Result<Vec<String>> {
+    let mut files = Vec::new();
+    for entry in fs::read_dir(path)? {
+        files.extend(entry?.file_name().into_string().ok().filter(|name| folder::is_of_run(name)));
+    }
+    files.sort_by_key(|name| (name == names::RECEIPT, name.clone()));
+    Ok(files)
+}
+
+/// Brings the finished runs and the sweeps of `from` into `into`. What is broken there is left behind, with the reason.
 ///
 /// # Errors
-/// When a run is damaged, or the two stores hold different results of one run.
+/// When an index refuses, or the place that is written to.
 pub fn merge(
     into: &mut Store,
     from: &Store,
@@ -53,31 +109,23 @@ pub fn merge(
     let mut fresh = Vec::new();
     for (number, (key, ..)) in rows.iter().enumerate() {
         on_run(number + 1, rows.len());
-        let source = from.folder(key);
-        let damaged =
-            |found: &str| FolderError::Content { path: source.clone(), found: found.into() };
-        if address_of(&source)? != *key {
-            return Err(RunError::from(damaged("does not hold the run its name says")).into());
-        }
         // the folder is asked, not the other index
-        let (row, seconds) = row(&source)?;
-        if let Some(here) = into.row(key)? {
-            let here: Row = serde_json::from_str(&here)
-                .map_err(|error| RunError::from(damaged(&format!("has a row that {error}"))))?;
-            if here.disagreement(&row, false).is_some() {
-                return Err(SweepError::Contradiction {
-                    key: key.clone(),
-                    store: into.path().into(),
-                    here: here.state_hash,
-                    other: from.path().into(),
-                    there: row.state_hash,
-                });
+        let (row, seconds) = match own_row(from, key) {
+            Ok(found) => found,
+            Err(error) => {
+                merged.skipped.push(Skipped { key: key.clone(), why: error.to_string() });
+                continue;
             }
-            merged.shared += 1;
+        };
+        if let Some(here) = into.row(key)?.filter(|_| into.has_folder(key)) {
+            match contradiction(into, from, key, &here, &row) {
+                Some(why) => merged.skipped.push(Skipped { key: key.clone(), why }),
+                None => merged.shared += 1,
+            }
             continue;
         }
         match RunFolder::take(&into.folder(key)) {
-            Ok(folder) => copy(&source, &folder)?,
+            Ok(folder) => copy(&from.folder(key), &folder)?,
             Err(FolderError::Held { .. }) => {
                 merged.held += 1;
                 continue;
@@ -98,7 +146,7 @@ pub fn merge(
             None => {
                 let points: Vec<_> =
                     from.points(&sweep.name)?.into_iter().map(|(point, _)| point).collect();
-                into.plan(&sweep, &points)?;
+                into.plan(&sweep, &points, false)?;
                 merged.sweeps += 1;
             }
             Some(here) if *here == sweep => {}
@@ -108,42 +156,58 @@ pub fn merge(
     Ok(merged)
 }
 
+/// Why a run here and one there cannot both be right.
+fn contradiction(into: &Store, from: &Store, key: &str, here: &str, row: &Row) -> Option<String> {
+    let Ok(here) = serde_json::from_str::<Row>(here) else {
+        return Some(format!(
+            "the index of {} has a row of it that cannot be read",
+            into.path().display()
+        ));
+    };
+    here.disagreement(row, false)?;
+    let error = SweepError::Contradiction {
+        key: key.into(),
+        store: into.path().into(),
+        here: here.state_hash,
+        other: from.path().into(),
+        there: row.state_hash.clone(),
+    };
+    Some(error.to_string())
+}
+
 /// Copies a finished run; the receipt, which makes it count, comes last.
 fn copy(source: &Path, folder: &RunFolder) -> Result<(), SweepError> {
     let fail = |error| StoreError::Io { doing: "read", path: source.into(), error };
-    let mut files = Vec::new();
-    for entry in fs::read_dir(source).map_err(fail)? {
-        let name = entry.map_err(fail)?.file_name().to_string_lossy().into_owned();
-        if name != "lock" && !name.starts_with(".part-") {
-            files.push(name);
-        }
-    }
-    files.sort_by_key(|name| (name == names::RECEIPT, name.clone()));
-    for name in files {
-        let bytes = fs::read(source.join(&name)).map_err(fail)?;
-        folder.write(&name, &bytes).map_err(RunError::from)?;
+    for name in files(source).map_err(fail)? {
+        folder.copy(source, &name).map_err(RunError::from)?;
     }
     Ok(())
 }
 
-/// Makes the rows of the index again from the run folders. Gives the finished runs and those that are not.
+/// Makes the rows of the index again from the run folders.
 ///
 /// # Errors
 /// When folders cannot be listed or the index refuses.
 pub fn reindex(
     store: &mut Store,
     on_run: &mut dyn FnMut(usize, usize),
-) -> Result<[usize; 2], SweepError> {
+) -> Result<Reindexed, SweepError> {
     let keys = store.folders()?;
+    let mut made = Reindexed::default();
     let mut rows = Vec::new();
-    let mut finished = 0;
+    let mut kept = Vec::new();
     for (number, key) in keys.iter().enumerate() {
         on_run(number + 1, keys.len());
-        let path = store.folder(key);
-        let Ok((row, seconds)) = row(&path) else { continue };
-        if address_of(&path).is_ok_and(|address| address == *key) {
-            rows.push((key.clone(), row.to_json(), seconds));
-            finished += 1;
+        match own_row(store, key) {
+            Ok((row, seconds)) => {
+                rows.push((key.clone(), row.to_json(), seconds));
+                kept.push(key.clone());
+                made.finished += 1;
+            }
+            Err(_) if is_unfinished(&store.folder(key)) => made.unfinished += 1,
+            Err(error) => {
+                made.damaged.push(Skipped { key: key.clone(), why: error.to_string() });
+            }
         }
         if rows.len() == BATCH {
             store.keep(&rows)?;
@@ -151,5 +215,14 @@ pub fn reindex(
         }
     }
     store.keep(&rows)?;
-    Ok([finished, keys.len() - finished])
+    made.forgotten = store.forget_others(&kept)?;
+    Ok(made)
+}
+
+/// Whether a folder is that of a run that someone may go on with: no receipt yet, or one that says so.
+fn is_unfinished(path: &Path) -> bool {
+    let none = fs::symlink_metadata(path.join(names::RECEIPT)).is_err();
+    // the ledger is written when the last epoch is done
+    let begun = none && fs::symlink_metadata(path.join(names::LEDGER)).is_err();
+    begun || folder::read_receipt(path).is_ok_and(|receipt| receipt.status == "running")
 }

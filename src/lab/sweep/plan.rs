@@ -9,7 +9,7 @@ use std::time::Instant;
 use super::{Point, Sweep, SweepError};
 use crate::lab::config::{self, Config, Overlay, Sources};
 use crate::lab::data::{self, Data, DataRoot};
-use crate::lab::run::{Machine, Prices, RunError, Session};
+use crate::lab::run::{self, Machine, Memory, Prices, RunError, Session};
 use crate::lab::store::address;
 use crate::lab::store::index::{PointRecord, SweepRecord};
 use crate::lab::store::record::DataRecord;
@@ -63,8 +63,8 @@ pub struct Planned {
 pub struct PlannedRun {
     /// Its key.
     pub key: String,
-    /// Its configuration.
-    pub config: Config,
+    /// Passes over its data.
+    pub epochs: u32,
     /// Its data, in [`SweepPlan::data`].
     pub data: usize,
     /// The first point that needs it, in [`SweepPlan::points`].
@@ -86,36 +86,50 @@ pub struct SweepPlan {
     pub tasks: Vec<PlannedRun>,
     /// Data sets.
     pub data: Vec<Data>,
+    /// `--set`: what lies between the sweep's `base` and its axes.
+    settings: Vec<toml::Table>,
 }
 
 /// Resolves every point. `settings` (`key=value`) lie between the sweep's `base` and its axes.
 ///
 /// # Errors
-/// When data is missing, or no point makes a run.
+/// When no point makes a run; a point that cannot is kept with the reason.
 pub fn plan(sweep: Sweep, settings: &[String], root: &DataRoot) -> Result<SweepPlan, SweepError> {
     let (points, before) = sweep.points()?;
-    let mut plan = SweepPlan { points: vec![], before, tasks: vec![], data: vec![], sweep };
-    let mut sources: Vec<String> = Vec::new();
+    let settings_tables =
+        settings.iter().map(|text| config::setting_table(text)).collect::<Result<Vec<_>, _>>()?;
+    let mut plan = SweepPlan {
+        points: vec![],
+        before,
+        tasks: vec![],
+        data: vec![],
+        sweep,
+        settings: settings_tables,
+    };
+    // each is read once, also when it cannot be
+    let mut sources: BTreeMap<String, Result<usize, String>> = BTreeMap::new();
+    let left = Memory::left();
     let mut first_error = None;
     let mut known = BTreeMap::new();
     let mut chips: BTreeMap<String, Arc<Prices>> = BTreeMap::new();
-    let settings_tables =
-        settings.iter().map(|text| config::setting_table(text)).collect::<Result<Vec<_>, _>>()?;
     for point in points {
-        let resolved = resolve(&plan.sweep, &settings_tables, &point)
+        let resolved = resolve(&plan.sweep, &plan.settings, &point)
             .map_err(SweepError::from)
             .and_then(|config| {
                 let source = config.source()?;
                 let name = format!("{source:?}");
-                let at = match sources.iter().position(|known| *known == name) {
-                    Some(at) => at,
+                let at = match sources.get(&name) {
+                    Some(Ok(at)) => *at,
+                    Some(Err(error)) => return Err(SweepError::Unread(error.clone())),
                     None => {
-                        plan.data.push(data::load(&source, root)?);
-                        sources.push(name);
-                        sources.len() - 1
+                        let loaded = data::load(&source, root);
+                        let at = loaded.as_ref().map(|_| plan.data.len());
+                        sources.insert(name, at.map_err(ToString::to_string));
+                        plan.data.push(loaded?);
+                        plan.data.len() - 1
                     }
                 };
-                let (key, work) = check(&config, &plan.data[at])?;
+                let (key, work) = check(&config, &plan.data[at], left)?;
                 Ok((config, at, key, work))
             });
         let mut prices = None;
@@ -127,7 +141,7 @@ pub fn plan(sweep: Sweep, settings: &[String], root: &DataRoot) -> Result<SweepP
                 if known.insert(key.clone(), ()).is_none() {
                     let task = PlannedRun {
                         key: key.clone(),
-                        config,
+                        epochs: config.epochs,
                         data,
                         point: plan.points.len(),
                         work,
@@ -136,7 +150,6 @@ pub fn plan(sweep: Sweep, settings: &[String], root: &DataRoot) -> Result<SweepP
                 }
                 Ok(key)
             }
-            Err(error @ SweepError::Data(_)) => return Err(error),
             Err(error) => {
                 let text = error.to_string();
                 first_error.get_or_insert(error);
@@ -168,7 +181,8 @@ fn resolve(
     let axes = sweep.axes.iter().map(|axis| format!("axis `{}`", axis.name)).collect::<Vec<_>>();
     let base = Overlay { place: "base", table: &sweep.base };
     let settings = settings.iter().map(|table| Overlay { place: "--set", table });
-    let axes = axes.iter().zip(&point.keys).map(|(place, table)| Overlay { place, table });
+    let axes =
+        axes.iter().zip(&point.keys).map(|(place, table)| Overlay { place, table: table.as_ref() });
     let overlays: Vec<_> = std::iter::once(base).chain(settings).chain(axes).collect();
     let [name, text] = &sweep.experiment;
     let experiment = (!text.is_empty()).then_some((&**name, &**text));
@@ -177,11 +191,12 @@ fn resolve(
 }
 
 /// Checks that a configuration fits data and chip; the address of its run, and how much work it is.
-fn check(config: &Config, data: &Data) -> Result<(String, f64), RunError> {
+fn check(config: &Config, data: &Data, left: Option<Memory>) -> Result<(String, f64), RunError> {
     let train = &data.split.train;
     let record = DataRecord::of(data);
     let experiment = config.experiment(record.features, record.classes, record.image)?;
     experiment.check()?;
+    run::weigh(&experiment.network.layers, &experiment.hardware, left)?;
     let key =
         address::key(config.given(record.features, record.classes, record.image)?, &record.hash);
     let cells = |layer: &crate::chip::layer::LayerSpec| {
@@ -194,6 +209,18 @@ fn check(config: &Config, data: &Data) -> Result<(String, f64), RunError> {
 }
 
 impl SweepPlan {
+    /// The configuration of a run, resolved again: that of every point at once would take the memory of the runs.
+    ///
+    /// # Errors
+    /// When a file that it names was changed since it was planned.
+    pub fn config(&self, task: &PlannedRun) -> Result<Config, SweepError> {
+        let config = resolve(&self.sweep, &self.settings, &self.points[task.point].point)?;
+        match check(&config, &self.data[task.data], None)? {
+            (key, _) if key == task.key => Ok(config),
+            _ => Err(SweepError::Changed),
+        }
+    }
+
     /// As an index keeps it.
     #[must_use]
     pub fn records(&self) -> (SweepRecord, Vec<PointRecord>) {
@@ -249,14 +276,14 @@ pub fn estimate(
         let task = tasks[(2 * probe + 1) * tasks.len() / (2 * probes)];
         let data = &plan.data[task.data];
         let started = Instant::now();
-        let mut session = Session::new(&task.config, data.clone(), machine)?;
+        let mut session = Session::new(&plan.config(task)?, data.clone(), machine)?;
         let start = started.elapsed().as_secs_f64();
         let (samples, updates) = session.epoch_size();
         let measured = PROBE_UPDATES.min(updates);
         let started = Instant::now();
         session.updates(measured)?;
         let update = started.elapsed().as_secs_f64() / measured as f64;
-        let epochs = f64::from(task.config.epochs);
+        let epochs = f64::from(task.epochs);
         // reading without learning takes about a third
         let split = &data.split;
         let read = split.validation.len() as f64 * (epochs + 1.0) + split.test.len() as f64;
@@ -298,11 +325,27 @@ mod tests {
         assert_eq!((plan.points.len(), plan.tasks.len()), (6, 4));
         let why = plan.points[4].key.clone().unwrap_err();
         assert!(why.contains("hw.cell.level_bits") && why.contains("44"), "{why}");
-        assert!(plan.tasks.iter().all(|task| task.config.epochs == 3));
+        assert!(plan.tasks.iter().all(|task| task.epochs == 3));
         // the first seed comes first
         let order: Vec<_> = plan.tasks.iter().map(|task| plan.words(task.point)).collect();
         assert_eq!(order[1], "level_bits 4, seed 1");
         assert_eq!(order[2], "level_bits 2, seed 2");
+    }
+
+    #[test]
+    fn one_impossible_point_does_not_end_a_sweep() {
+        // data that are not there, a layer that no memory holds, and a rate that no shift stands for
+        let text = "base.data.set = 'xor'\n[[axis]]\nname = 'what'\n[[axis.case]]\nname = 'good'\n[[axis.case]]\n\
+                    name = 'data'\nset.data.set = 'mnist'\n[[axis.case]]\nname = 'memory'\n\
+                    set.network.hidden = [65535, 65535, 65535, 65535]\n[[axis.case]]\nname = 'rate'\nset.learning.rate = 1e-5\n";
+        let plan = planned(text, &[]).unwrap();
+        assert_eq!((plan.points.len(), plan.tasks.len()), (4, 1));
+        let why = |at: usize| plan.points[at].key.clone().unwrap_err();
+        assert!(why(1).contains("data fetch mnist"), "{}", why(1));
+        assert!(why(2).contains("of memory"), "{}", why(2));
+        assert!(why(3).contains("learning.rate"), "{}", why(3));
+        // and what was resolved once is resolved again as the same
+        assert_eq!(plan.config(&plan.tasks[0]).unwrap().epochs, plan.tasks[0].epochs);
     }
 
     #[test]

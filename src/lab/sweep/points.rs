@@ -9,10 +9,15 @@
 //!
 //! Seeds are the fastest of all. Points are numbered from 1 after the filters.
 
+use std::sync::Arc;
+
 use super::{Choice, Sweep, SweepError, Value};
+use crate::lab::run::Memory;
 
 /// Most points of a sweep, before filters.
-const POINTS_MAX: usize = 2_000_000;
+const POINTS_MAX: u128 = 2_000_000;
+/// Bytes that a planned point takes, its run and its line in the index included: measured, and rounded up.
+const POINT_BYTES: u64 = 2_048;
 
 /// One point.
 #[derive(Debug, Clone, PartialEq)]
@@ -24,7 +29,7 @@ pub struct Point {
     /// Seed, when the sweep has seeds.
     pub seed: Option<u64>,
     /// Keys that the axes set, weakest first.
-    pub keys: Vec<toml::Table>,
+    pub keys: Vec<Arc<toml::Table>>,
 }
 
 fn word(seed: u64, axis: usize, point: u32, what: &[u8]) -> u64 {
@@ -50,35 +55,72 @@ impl Sweep {
         self.filter.passes(&names, &values)
     }
 
+    /// Points before the filters.
+    #[must_use]
+    pub fn size(&self) -> u128 {
+        let draws = match self.sample {
+            Some(sample) => u128::from(sample.points),
+            None => self
+                .axes
+                .iter()
+                .fold(1, |all: u128, axis| all.saturating_mul(axis.list().len() as u128)),
+        };
+        draws.saturating_mul(self.seeds.len().max(1) as u128)
+    }
+
+    /// Weighs the points before any is made.
+    fn weigh(&self) -> Result<(), SweepError> {
+        let all = self.size();
+        let sizes: Vec<_> =
+            self.axes.iter().map(|axis| format!("{} {}", axis.list().len(), axis.name)).collect();
+        let seeds = format!("{} seeds", self.seeds.len().max(1));
+        let wrong = |most: String| {
+            let found = format!("and seeds make {all} points ({}, {seeds})", sizes.join(" x "));
+            let allowed = format!(
+                "{most}: take fewer values or seeds, draw some points with [sample], or make several sweeps"
+            );
+            Err(SweepError::key("axis", &found, &allowed))
+        };
+        if all > POINTS_MAX {
+            return wrong(format!("at most {POINTS_MAX} can be planned"));
+        }
+        let wanted = u64::try_from(all).unwrap_or(u64::MAX).saturating_mul(POINT_BYTES);
+        match Memory::left() {
+            Some(left) if wanted > left.bytes() => {
+                let wanted = Memory::of(wanted);
+                wrong(format!("to plan them takes about {wanted} of memory, and {left} are left"))
+            }
+            _ => Ok(()),
+        }
+    }
+
     /// The points, and how many there were before the filters.
     ///
     /// # Errors
     /// When a filter fails, or there are none or too many.
     pub fn points(&self) -> Result<(Vec<Point>, usize), SweepError> {
-        let all = match self.sample {
-            None => self.grid()?,
-            Some(_) => self.sampled(),
-        };
+        self.weigh()?;
         let seeds: Vec<Option<u64>> = match &*self.seeds {
             [] => vec![None],
             seeds => seeds.iter().copied().map(Some).collect(),
         };
-        let before = all.len() * seeds.len();
-        if before > POINTS_MAX {
-            let allowed =
-                format!("at most {POINTS_MAX}: take fewer values, or draw them with [sample]");
-            return Err(SweepError::key("axis", &format!("make {before} points"), &allowed));
-        }
-        let mut points = Vec::new();
-        for choices in all {
+        let mut before = 0;
+        let mut points: Vec<Point> = Vec::new();
+        let mut add = |choices: &[Choice]| -> Result<(), SweepError> {
             for &seed in &seeds {
-                if self.passes(&choices, seed)? {
+                before += 1;
+                if self.passes(choices, seed)? {
                     let number = u32::try_from(points.len() + 1).expect("checked: few points");
                     let (values, keys) =
                         choices.iter().cloned().map(|choice| (choice.value, choice.keys)).unzip();
                     points.push(Point { number, values, seed, keys });
                 }
             }
+            Ok(())
+        };
+        match self.sample {
+            None => self.grid(&mut add)?,
+            Some(_) => self.sampled().iter().try_for_each(|choices| add(choices))?,
         }
         if points.is_empty() {
             Err(SweepError::Empty { points: before })
@@ -87,23 +129,24 @@ impl Sweep {
         }
     }
 
-    fn grid(&self) -> Result<Vec<Vec<Choice>>, SweepError> {
-        let mut all = vec![vec![]];
-        for axis in &self.axes {
-            if all.len().saturating_mul(axis.list().len()) > POINTS_MAX {
-                let allowed =
-                    format!("at most {POINTS_MAX}: take fewer values, or draw them with [sample]");
-                return Err(SweepError::key("axis", "make too many points", &allowed));
-            }
-            let with = |choices: &Vec<Choice>| {
-                let choices = choices.clone();
-                axis.list()
-                    .iter()
-                    .map(move |choice| [&choices[..], std::slice::from_ref(choice)].concat())
-            };
-            all = all.iter().flat_map(with).collect();
+    /// Every combination, the last axis fastest.
+    fn grid(
+        &self,
+        add: &mut dyn FnMut(&[Choice]) -> Result<(), SweepError>,
+    ) -> Result<(), SweepError> {
+        let mut at = vec![0; self.axes.len()];
+        if self.axes.iter().any(|axis| axis.list().is_empty()) {
+            return Ok(());
         }
-        Ok(all)
+        loop {
+            let choices = self.axes.iter().zip(&at).map(|(axis, &at)| axis.list()[at].clone());
+            add(&choices.collect::<Vec<_>>())?;
+            // as a clock counts
+            let turns = |(axis, at): (&super::Axis, &usize)| at + 1 < axis.list().len();
+            let Some(turned) = self.axes.iter().zip(&at).rposition(turns) else { return Ok(()) };
+            at[turned] += 1;
+            at[turned + 1..].fill(0);
+        }
     }
 
     fn sampled(&self) -> Vec<Vec<Choice>> {
@@ -163,6 +206,22 @@ mod tests {
         assert_eq!(show(&points(TWO).0)[3], "4 2,v None");
         let none = Sweep::parse("s", &format!("filter = ['a > 2']\n{TWO}"), "").unwrap().points();
         assert!(none.unwrap_err().to_string().contains("all 4"));
+    }
+
+    #[test]
+    fn points_without_number_are_refused_at_once_with_their_number() {
+        let axis = |name: &str, count: u32| {
+            format!("[[axis]]\nname = '{name}'\nkey = '{name}.k'\nfrom = 1\nto = {count}\n")
+        };
+        let all = ["a", "b", "c", "d"].map(|name| axis(name, 1000)).concat();
+        let error = Sweep::parse("s.toml", &all, "").unwrap().points().unwrap_err().to_string();
+        assert!(error.contains("make 1000000000000 points (1000 a x 1000 b"), "{error}");
+        assert!(error.contains("[sample]") && error.contains("at most 2000000"), "{error}");
+        for (seeds, found) in [("4000000000", "are 4000000000"), ("0", "are 0")] {
+            let text = format!("seeds = {seeds}\n{TWO}");
+            let error = Sweep::parse("s.toml", &text, "").unwrap_err().to_string();
+            assert!(error.contains(found) && error.contains("1 to 100000"), "{error}");
+        }
     }
 
     #[test]

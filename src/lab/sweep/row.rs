@@ -6,6 +6,8 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Map, Number, Value};
 
 use super::SweepError;
+use crate::chip::engine::Phase;
+use crate::lab::config::CostClass;
 use crate::lab::price::Cost;
 use crate::lab::run::{self, Prices, RunError, reprice_as};
 use crate::lab::store::folder;
@@ -64,6 +66,20 @@ impl Facts<'_> {
         self.last.layers.iter().map(|layer| layer.levels[bank]).sum()
     }
 
+    /// Typical joules of an image of a phase, if every part of them has a price.
+    fn image(&self, phase: Phase, class: Option<CostClass>) -> Option<Number> {
+        let one = self.cost.of_image(phase)?;
+        let total = match class {
+            None => one.total,
+            Some(class) => one.split.iter().find(|split| split.class == class)?.total,
+        };
+        Number::from_f64(total.whole()?[1])
+    }
+
+    fn image_seconds(&self, phase: Phase) -> Option<Number> {
+        self.cost.of_image(phase)?.seconds.and_then(Number::from_f64)
+    }
+
     fn joules(&self, bound: usize) -> Option<Number> {
         self.cost.energy.and_then(|energy| Number::from_f64(energy.whole()?[bound]))
     }
@@ -117,6 +133,19 @@ pub const RESULTS: &[ResultColumn] = results![
     "joules_high", "energy on the chip, high", Joules, Priced, |f| f.joules(2);
     "joules_assumed", "share of energy that leans on assumed constants", Fraction, Priced,
         |f| f.cost.energy.and_then(|_| Number::from_f64(f.cost.assumed_share));
+    "parts_priced", "share of the parts that have a price", Fraction, Priced, |f| f.cost.energy.and_then(|e| over(e.priced as u64, e.parts as u64));
+    "learn_joules", "energy to learn from an image", Joules, Priced, |f| f.image(Phase::Training, None);
+    "learn_joules_device", "energy to learn from an image, device", Joules, Priced, |f| f.image(Phase::Training, Some(CostClass::Device));
+    "learn_joules_converter", "energy to learn from an image, converters", Joules, Priced, |f| f.image(Phase::Training, Some(CostClass::Converter));
+    "learn_joules_digital", "energy to learn from an image, digital", Joules, Priced, |f| f.image(Phase::Training, Some(CostClass::Digital));
+    "learn_joules_static", "energy to learn from an image, static", Joules, Priced, |f| f.image(Phase::Training, Some(CostClass::Static));
+    "learn_seconds", "time to learn from an image", Seconds, Priced, |f| f.image_seconds(Phase::Training);
+    "read_joules", "energy to read an image", Joules, Priced, |f| f.image(Phase::Evaluation, None);
+    "read_joules_device", "energy to read an image, device", Joules, Priced, |f| f.image(Phase::Evaluation, Some(CostClass::Device));
+    "read_joules_converter", "energy to read an image, converters", Joules, Priced, |f| f.image(Phase::Evaluation, Some(CostClass::Converter));
+    "read_joules_digital", "energy to read an image, digital", Joules, Priced, |f| f.image(Phase::Evaluation, Some(CostClass::Digital));
+    "read_joules_static", "energy to read an image, static", Joules, Priced, |f| f.image(Phase::Evaluation, Some(CostClass::Static));
+    "read_seconds", "time to read an image", Seconds, Priced, |f| f.image_seconds(Phase::Evaluation);
     "converters_mm2", "area of converters", SquareMillimetres, Priced, |f| f.converters_mm2.and_then(Number::from_f64);
     #[cfg(feature = "grown")] "grown", "what a later program shows", Count, Whole, |f| Some(f.last.grown.into());
 ];
@@ -133,8 +162,11 @@ pub struct Row {
     pub data_hash: String,
     /// Name of the chip.
     pub hardware: String,
-    /// What it leaves out: `key = text`.
+    /// What its model says of what is left out: `key = text`.
     pub not_simulated: Vec<String>,
+    /// Effects of real chips that it is simulated without: keys of [`crate::lab::config::EFFECTS`] and its own.
+    #[serde(default)]
+    pub absent: Vec<String>,
     /// [`Prices::fingerprint`] of the constants that its prices were made with.
     #[serde(default)]
     pub priced_with: String,
@@ -157,7 +189,29 @@ impl Row {
             let both = self.results.get(column.name).zip(other.results.get(column.name));
             both.is_some_and(|(mine, theirs)| mine != theirs)
         };
-        RESULTS.iter().filter(counts).find(differs).map(|column| column.name)
+        // two programs may know different columns, but no folder gives what its row has and it has not
+        let made_up = |column: &&ResultColumn| {
+            one_folder
+                && self.results.contains_key(column.name)
+                && !other.results.contains_key(column.name)
+        };
+        let wrong = |column: &&ResultColumn| differs(column) || made_up(column);
+        let column = RESULTS.iter().filter(counts).find(wrong).map(|column| column.name);
+        let said = one_folder && self.priced_with == other.priced_with;
+        column.or_else(|| (said && self.hardware != other.hardware).then_some("hardware")).or_else(
+            || (said && self.not_simulated != other.not_simulated).then_some("not_simulated"),
+        )
+    }
+
+    /// What it says of a column, for people.
+    pub(super) fn word(&self, column: &str) -> String {
+        match column {
+            "state_hash" => self.state_hash.clone(),
+            "data_hash" => self.data_hash.clone(),
+            "hardware" => self.hardware.clone(),
+            "not_simulated" => self.not_simulated.join(", "),
+            _ => self.results.get(column).map_or_else(|| "nothing".into(), Value::to_string),
+        }
     }
 
     /// As an index keeps it.
@@ -205,13 +259,17 @@ pub fn row_as(path: &Path, prices: Option<Prices>) -> Result<(Row, f64), SweepEr
         let value = (column.of)(&facts)?;
         Some((column.name.to_owned(), Value::Number(value)))
     });
-    let not_simulated = priced.not_simulated.iter().map(|(key, text)| format!("{key} = {text}"));
+    let not_simulated = priced.absent.iter().filter_map(|one| {
+        let chip = one.chip.as_ref()?;
+        Some(format!("{} = {chip}", one.effect))
+    });
     let row = Row {
         results: results.collect(),
         state_hash: last.state_hash.clone(),
         data_hash: receipt.data.hash.clone(),
         hardware: priced.priced_as.clone(),
         not_simulated: not_simulated.collect(),
+        absent: priced.absent.iter().map(|one| one.effect.clone()).collect(),
         priced_with: priced.fingerprint.clone(),
     };
     Ok((row, folder::read_timing(path).train_seconds()))

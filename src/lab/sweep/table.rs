@@ -3,9 +3,14 @@
 use super::axis::Value;
 use super::row::{RESULTS, ResultKind, Row};
 use super::{Sweep, SweepError};
+use crate::lab::config::EFFECTS;
 use crate::lab::report::sweep::{Figures, Refused, ShownAxis};
 use crate::lab::store::index::{Store, SweepRecord};
 use crate::lab::table::{Column, ColumnUnit, Role, Table, Values};
+
+/// Names of columns that are neither axes nor results.
+pub(super) const NAMES: [&str; 9] =
+    ["point", "seed", "status", "hardware", "state_hash", "data_hash", "key", "run", "report"];
 
 /// What a store knows of a sweep.
 #[derive(Debug)]
@@ -24,6 +29,8 @@ pub struct Results {
     pub not_simulated: Vec<String>,
     /// Points whose run is finished.
     pub finished: usize,
+    /// Points whose run was finished, but whose folder is gone.
+    pub lost: usize,
 }
 
 /// The sweep of that name; without a name, the only one.
@@ -65,7 +72,12 @@ pub fn results(store: &Store, record: &SweepRecord) -> Result<Results, SweepErro
     let mut values: Vec<Vec<Value>> = Vec::new();
     let mut rows: Vec<Option<Row>> = Vec::new();
     let mut points = Vec::new();
+    let mut lost = Vec::new();
     for (point, row) in store.points(name)? {
+        // a row whose folder is gone can be checked by nobody
+        let gone = |key: &String| row.is_some() && !store.has_folder(key);
+        lost.push(point.key.as_ref().is_some_and(gone));
+        let row = row.filter(|_| lost.last() == Some(&false));
         let axes: Vec<Value> = serde_json::from_str(&point.axes)
             .map_err(|error| damaged(format!("point {}: {error}", point.number)))?;
         if axes.len() != sweep.axes.len() {
@@ -109,9 +121,10 @@ pub fn results(store: &Store, record: &SweepRecord) -> Result<Results, SweepErro
         let (name, label, values) = (name.to_owned(), label.to_owned(), Values::Text(values));
         Column { name, label, unit: ColumnUnit::Plain, role: Role::Name, values }
     };
-    let status = points.iter().zip(&rows).map(|(point, row)| {
+    let status = points.iter().zip(&rows).zip(&lost).map(|((point, row), lost)| {
         let status = match (row, &point.refused) {
             (Some(_), _) => "finished",
+            (None, _) if *lost => "lost",
             (None, Some(_)) => "refused",
             (None, None) => "planned",
         };
@@ -136,10 +149,7 @@ pub fn results(store: &Store, record: &SweepRecord) -> Result<Results, SweepErro
         Some(Refused { point: point.number as usize, what: words(at), why })
     });
     let refused = refused.collect();
-    let mut not_simulated: Vec<String> =
-        rows.iter().flatten().flat_map(|row| row.not_simulated.iter().cloned()).collect();
-    not_simulated.sort();
-    not_simulated.dedup();
+    let not_simulated = left_out(rows.iter().flatten());
     let axes = sweep.axes.iter().zip(&columns[1..]).map(|(axis, column)| ShownAxis {
         name: axis.name.clone(),
         label: axis.label.clone(),
@@ -159,7 +169,28 @@ pub fn results(store: &Store, record: &SweepRecord) -> Result<Results, SweepErro
     let cost = sweep.figures.cost.clone().or_else(|| costs.map(str::to_owned));
     let figures = Figures { cost, ..sweep.figures.clone() };
     let finished = rows.iter().flatten().count();
-    Ok(Results { sweep, table, axes, figures, refused, not_simulated, finished })
+    let lost = lost.into_iter().filter(|lost| *lost).count();
+    Ok(Results { sweep, table, axes, figures, refused, not_simulated, finished, lost })
+}
+
+/// What real chips do and the runs did not, `key = text`: each effect of the program's list, and after it what models say
+/// of theirs; then what only models name.
+fn left_out<'a>(rows: impl Iterator<Item = &'a Row> + Clone) -> Vec<String> {
+    let mut of_models: Vec<&String> = rows.clone().flat_map(|row| &row.not_simulated).collect();
+    of_models.sort();
+    of_models.dedup();
+    let has = |key: &str| rows.clone().any(|row| row.absent.iter().any(|absent| absent == key));
+    let mut all = Vec::new();
+    for effect in EFFECTS.iter().filter(|effect| has(effect.key)) {
+        all.push(format!("{} = {}", effect.key, effect.instead));
+        let of_effect = format!("{} = ", effect.key);
+        let (mine, others): (Vec<_>, Vec<_>) =
+            of_models.into_iter().partition(|text| text.starts_with(&of_effect));
+        all.extend(mine.into_iter().cloned());
+        of_models = others;
+    }
+    all.extend(of_models.into_iter().cloned());
+    all
 }
 
 /// Whole numbers if all are, else numbers if all are, else words.

@@ -1,7 +1,8 @@
 //! A table as a file: CSV, JSON, Parquet.
 //!
 //! A missing cell is an empty field, `null`, or a null. Numbers are in their base unit (fractions are 0 to 1, energy is
-//! in joules) and are written in the shortest form that reads back the same.
+//! in joules) and are written in the shortest form that reads back the same. A word that a spreadsheet would take for a
+//! formula, as its first character is one of `= + - @`, has a `'` in front of it in CSV; numbers have none.
 
 use std::io::Write;
 use std::str::FromStr;
@@ -74,8 +75,10 @@ impl Table {
         let mut writer = csv::Writer::from_writer(out);
         writer.write_record(self.columns.iter().map(|column| &column.name))?;
         for row in 0..self.len() {
-            let cells =
-                self.columns.iter().map(|column| column.values.text(row).unwrap_or_default());
+            let cells = self.columns.iter().map(|column| {
+                let text = column.values.text(row).unwrap_or_default();
+                if column.values.is_text() { as_word(text) } else { text }
+            });
             writer.write_record(cells)?;
         }
         Ok(writer.flush()?)
@@ -138,6 +141,12 @@ impl Table {
     }
 }
 
+/// A word that no spreadsheet carries out.
+fn as_word(text: String) -> String {
+    let formula = text.starts_with(['=', '+', '-', '@', '\t', '\r']);
+    if formula && text.parse::<f64>().is_err() { format!("'{text}") } else { text }
+}
+
 /// Which cells are there (1) and which are not (0), and the values of those that are.
 fn present<A, B>(cells: &[Option<A>], value: impl Fn(&A) -> B) -> (Vec<i16>, Vec<B>) {
     let there = cells.iter().map(|cell| i16::from(cell.is_some())).collect();
@@ -190,6 +199,22 @@ mod tests {
         let json: serde_json::Value = serde_json::from_slice(&written(Format::Json)).unwrap();
         assert_eq!(json[1], serde_json::json!({"bits": null, "accuracy": 1e-30, "rule": null}));
         assert_eq!(json[2]["bits"], i64::MIN);
+    }
+
+    #[test]
+    fn a_spreadsheet_takes_no_word_for_a_formula() {
+        for (text, wanted) in [
+            ("=1+1", "'=1+1"),
+            ("@SUM(A1)", "'@SUM(A1)"),
+            ("+cmd|' /C calc'!A0", "'+cmd|' /C calc'!A0"),
+            ("-x", "'-x"),
+            ("-1.5e3", "-1.5e3"),
+            ("+4", "+4"),
+            ("ed", "ed"),
+            ("", ""),
+        ] {
+            assert_eq!(as_word(text.into()), wanted);
+        }
     }
 
     #[test]

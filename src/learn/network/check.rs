@@ -221,6 +221,11 @@ fn rates(network: &NetworkSpec, hardware: &Hardware) -> Checked {
         let allowed = format!("there are {layers} layers (hidden and output); give {layers}");
         return misfit("learning.rate_multipliers", format!("makes {found} rates"), allowed);
     }
+    let found = network.mantissas.len();
+    if found != layers {
+        let allowed = format!("there are {layers} layers (hidden and output); give {layers}");
+        return misfit("learning.rate_mantissa", format!("has {found} numbers"), allowed);
+    }
     for (at, rate) in network.rates(hardware).enumerate() {
         rate.shift().map_err(|error| no_shift(at, &error))?;
     }

@@ -26,7 +26,7 @@ fn plain() -> NetworkSpec {
         centre: Centre::Batch,
         route: Some(Route::Modulo { taps: 1, shift: None }),
         batch: Batch::new(8).unwrap(),
-        mantissa: RateMantissa::new(1).unwrap(),
+        mantissas: vec![RateMantissa::new(1).unwrap(); 2],
         rates: vec![Positive::new(20.0).unwrap(); 2],
         decay: Decay::Constant,
     }

@@ -40,7 +40,7 @@ use crate::learn::network::NetworkError;
 ///     centre: Centre::Batch,
 ///     route: Some(Route::Modulo { taps: 1, shift: None }),
 ///     batch: Batch::new(4)?,
-///     mantissa: RateMantissa::new(1)?,
+///     mantissas: vec![RateMantissa::new(1)?; 2],
 ///     rates: vec![Positive::new(20.0).ok_or("a rate")?; 2],
 ///     decay: Decay::Constant,
 /// };
@@ -80,13 +80,16 @@ impl Classifier {
     /// One pass over the training examples, in the epoch's order. Returns right answers given while learning.
     ///
     /// # Errors
-    /// [`Stop`] when `go_on` says so; the state then lies inside an epoch.
+    /// [`Stop`] when `go_on` says so, the state then lies inside an epoch, or when the experiment has no epoch left.
     pub fn learn(&mut self, go_on: &mut dyn FnMut(EpochProgress) -> bool) -> Result<u64, Stop> {
         let again = matches!(
             self.trainer.experiment().hardware.adc,
             Adc::Finite { range: AdcRange::Calibrated { every_epoch: true, .. }, .. }
         );
         let Self { trainer, train } = self;
+        if trainer.epoch() >= trainer.experiment().epochs {
+            return Err(Stop);
+        }
         if again && trainer.epoch() > 0 {
             trainer.calibrate(train);
         }

@@ -29,7 +29,7 @@ pub struct EpochProgress {
     pub correct: u64,
 }
 
-/// The caller asked to stop; the epoch in progress is not finished.
+/// The caller asked to stop and the epoch in progress is not finished, or there is no epoch left.
 ///
 /// See [`Classifier`](crate::Classifier).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -50,6 +50,8 @@ pub struct Evaluation {
     pub correct: u64,
     /// Bank currents by layer.
     pub currents: Vec<Currents>,
+    /// Layers whose units put out the same whatever was shown.
+    pub mute: Vec<bool>,
 }
 
 /// A training in progress.
@@ -200,7 +202,7 @@ impl Trainer {
     pub fn evaluate(&mut self, examples: &Examples) -> Evaluation {
         let phase = self.driver.engine().phase();
         self.driver.engine_mut().set_phase(Phase::Evaluation);
-        let _ = self.driver.engine_mut().take_currents();
+        let _ = (self.driver.engine_mut().take_currents(), self.driver.engine_mut().take_mute());
         let (mut predictions, mut margins) = (Vec::new(), Vec::new());
         let mut correct = 0;
         for first in (0..examples.len()).step_by(READ_BATCH) {
@@ -219,8 +221,9 @@ impl Trainer {
             }
         }
         let currents = self.driver.engine_mut().take_currents();
+        let mute = self.driver.engine_mut().take_mute();
         self.driver.engine_mut().set_phase(phase);
-        Evaluation { predictions, margins, correct, currents }
+        Evaluation { predictions, margins, correct, currents, mute }
     }
 }
 

@@ -40,6 +40,11 @@ fn browser() -> Option<&'static str> {
 /// Opens `page` and runs `steps`, the body of an asynchronous function that gives an object. `None`, loudly, without a
 /// browser. The answer also holds `errors` and `requests`.
 pub(crate) fn open(page: &str, steps: &str, graphics: Graphics) -> Option<Value> {
+    open_at(page, steps, graphics, 1300)
+}
+
+/// The same in a frame of that width: windows have a least width of their own.
+pub(crate) fn open_at(page: &str, steps: &str, graphics: Graphics, width: u32) -> Option<Value> {
     let Some(browser) = browser() else {
         eprintln!("SKIPPED: no Chromium; the pages have not been opened");
         return None;
@@ -69,7 +74,8 @@ pub(crate) fn open(page: &str, steps: &str, graphics: Graphics) -> Option<Value>
             "--mute-audio",
         ])
         .args(["--disable-background-networking", "--disable-component-update", "--disable-sync"])
-        .args(["--host-resolver-rules=MAP * ~NOTFOUND", "--window-size=1300,1000", "--dump-dom"])
+        .args(["--host-resolver-rules=MAP * ~NOTFOUND", "--dump-dom"])
+        .arg(format!("--window-size={width},1000"))
         .arg(format!("--user-data-dir={}", folder.path().join("profile").display()));
     match graphics {
         Graphics::Played | Graphics::Software => {

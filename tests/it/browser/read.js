@@ -16,8 +16,8 @@ window.look = () => {
       caption: card.querySelector(".caption").textContent,
       links: [...card.querySelectorAll(".more a")].map((link) => link.getAttribute("href")),
       lines: card.querySelectorAll(".more tbody tr").length,
-      traces: (plot.data ?? []).map(({ meta, type, x, y, z, name, customdata, error_x, error_y, text, dimensions }) => ({
-        meta, type, x, y, z, name, customdata, error_x, error_y, text: type === "heatmap" ? text : undefined,
+      traces: (plot.data ?? []).map(({ meta, type, x, y, z, zmin, zmax, name, customdata, error_x, error_y, text, dimensions }) => ({
+        meta, type, x, y, z, zmin, zmax, name, customdata, error_x, error_y, text: type === "heatmap" ? text : undefined,
         bar: plot.data.find((trace) => trace.colorbar)?.colorbar.title.text, dimensions: dimensions?.map((one) => one.label),
       })),
     };
@@ -30,6 +30,7 @@ window.look = () => {
     rows: [...document.querySelectorAll("#table tbody tr")].map((row) => [...row.cells].map((cell) => cell.textContent)),
     runs: [...document.querySelectorAll("#table tbody a")].map((link) => link.getAttribute("href")),
     found: document.getElementById("found").textContent,
+    fits: document.querySelector("#rows .scroll").scrollWidth <= document.querySelector("#rows .scroll").clientWidth,
     unnamed: [...document.querySelectorAll("select, input, button")].filter((one) => !one.labels?.length && !one.textContent.trim() && !one.getAttribute("aria-label")).length,
   };
 };

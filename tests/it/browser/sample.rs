@@ -1,6 +1,6 @@
 //! Invented sweeps, as views of tables: a grid like that of a study of level bits, a large one drawn at random, odd ones.
 
-use dalean::lab::report::sweep::{Figures, Refused, ShownAxis, SweepView};
+use dalean::lab::report::sweep::{Figures, Learning, Refused, ShownAxis, SweepView};
 use dalean::lab::table::{Column, ColumnUnit, Role, Table, Values};
 
 /// A sweep that owns what its view borrows.
@@ -10,6 +10,7 @@ pub(crate) struct Sample {
     pub(crate) axes: Vec<ShownAxis>,
     pub(crate) figures: Figures,
     pub(crate) refused: Vec<Refused>,
+    pub(crate) learning: Learning,
 }
 
 /// Words between 0 and 1, the same every time.
@@ -57,6 +58,7 @@ impl Sample {
             table: &self.table,
             axes: &self.axes,
             figures: self.figures.clone(),
+            learning: &self.learning,
             refused: &self.refused,
             not_simulated: NOTES.get_or_init(|| {
                 vec![
@@ -113,6 +115,16 @@ impl Sample {
                 }
             }
         }
+        // every run climbs to its validation accuracy in six epochs
+        let climb = |validation: &Option<f64>| -> Vec<(u32, f64)> {
+            let top = validation.unwrap_or_default();
+            let at = |epoch: u32| (epoch, 0.1 + (top - 0.1) * f64::from(epoch) / 6.0);
+            validation.iter().flat_map(|_| (0..=6).map(at)).collect()
+        };
+        let learning = Learning {
+            label: "validation accuracy".into(),
+            rows: results[1].iter().map(climb).collect(),
+        };
         let [accuracy, validation, joules, low, high, floor] = results;
         let real =
             |name: &str, unit, values| column(name, unit, Role::Result, Values::Real(values));
@@ -159,6 +171,7 @@ impl Sample {
                 cost: Some("joules".into()),
             },
             refused: refused.collect(),
+            learning,
         }
     }
 
@@ -237,6 +250,7 @@ impl Sample {
                 cost: Some("joules".into()),
             },
             refused: vec![],
+            learning: Learning::default(),
         }
     }
 
@@ -266,12 +280,14 @@ impl Sample {
                 ..Figures::default()
             },
             refused: vec![],
+            learning: Learning::default(),
         }
     }
 
     /// Nothing has finished.
     pub(crate) fn hollow() -> Self {
         let mut sample = Self::grid();
+        sample.learning.rows.iter_mut().for_each(Vec::clear);
         for column in &mut sample.table.columns {
             match &mut column.values {
                 Values::Real(values) => values.iter_mut().for_each(|value| *value = None),
@@ -287,7 +303,8 @@ impl Sample {
     /// No rows at all.
     pub(crate) fn empty() -> Self {
         let table = Table { columns: vec![] };
-        Self { name: "empty", table, axes: vec![], figures: Figures::default(), refused: vec![] }
+        let (figures, learning) = (Figures::default(), Learning::default());
+        Self { name: "empty", table, axes: vec![], figures, refused: vec![], learning }
     }
 }
 

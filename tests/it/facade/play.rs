@@ -226,6 +226,7 @@ fn network(c: &mut Choices<'_>, inputs: usize, outputs: usize) -> NetworkSpec {
     };
     let batch = if c.one_in(8) { c.near(1, 4096) } else { i64::from(c.byte() % 16) + 1 };
     let rates = if c.one_in(32) { c.size(0, 3).min(9) } else { layers.len() };
+    let mantissas = if c.one_in(32) { c.size(0, 3).min(9) } else { layers.len() };
     NetworkSpec {
         layers,
         rule,
@@ -233,7 +234,9 @@ fn network(c: &mut Choices<'_>, inputs: usize, outputs: usize) -> NetworkSpec {
         centre: c.of(&[Centre::None, Centre::Batch, Centre::Running]),
         route,
         batch: or(Batch::new(batch), Batch::new(4).expect("inside")),
-        mantissa: or(RateMantissa::new(c.near(1, 15)), RateMantissa::new(1).expect("inside")),
+        mantissas: (0..mantissas)
+            .map(|_| or(RateMantissa::new(c.near(1, 15)), RateMantissa::new(1).expect("inside")))
+            .collect(),
         rates: (0..rates).map(|_| positive(c)).collect(),
         decay: c.of(&[Decay::Constant, Decay::Cosine]),
     }

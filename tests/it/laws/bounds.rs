@@ -104,7 +104,7 @@ fn a_write_reaches_its_bound_with_the_greatest_batch_and_mantissa() {
     for backend in Backend::available() {
         for (word, array) in [(127, 0), (-127, 1)] {
             let mut engine = engine(hardware(12, 15), backend, 1, 1);
-            engine.set_mantissa(15);
+            engine.set_mantissas(&vec![15; engine.layers().len()]);
             forward(&mut engine, &vec![255; batch]);
             let words = vec![word; batch];
             engine.execute(&Operation::Error {

@@ -338,7 +338,10 @@ pub(crate) fn engine(net: &Net, backend: Backend) -> Engine {
         Layer::new(index, spec.clone(), delivery.clone(), &net.hardware)
     });
     let mut engine = Engine::new(net.hardware.clone(), backend, net.seed, layers.collect());
-    engine.set_mantissa(net.mantissa);
+    // another one in every layer
+    let mantissas: Vec<u32> =
+        (0..).zip(engine.layers()).map(|(at, _)| 1 + (net.mantissa - 1 + 4 * at) % 15).collect();
+    engine.set_mantissas(&mantissas);
     engine.set_potentiation_only(net.potentiation_only);
     if matches!(net.hardware.adc, Adc::Finite { range: AdcRange::Tracking, .. }) {
         let layers = engine.layers_mut().iter_mut();

@@ -125,7 +125,9 @@ fn run() -> impl Strategy<Value = Run> {
                 centre,
                 route: route(raw, outputs, rule),
                 batch: Batch::new(batch).unwrap(),
-                mantissa: RateMantissa::new(mantissa).unwrap(),
+                mantissas: (0..count as i64)
+                    .map(|at| RateMantissa::new(1 + (mantissa - 1 + 4 * at) % 15).unwrap())
+                    .collect(),
                 rates,
                 decay,
             };

@@ -19,7 +19,7 @@ pub(crate) fn law(net: &Net, choices: &[Choice], seed: u64) -> Result<(), String
     let slots = samples.max().unwrap_or(0).max(1);
     let mut engine = play::engine(net, Backend::best());
     let mut tick = Network::new(&net.hardware, net.seed, engine.layers(), slots);
-    tick.set_learning(net.mantissa, net.potentiation_only);
+    tick.set_learning(engine.mantissas(), net.potentiation_only);
     tick.set_error_unit(engine.error_unit());
     let mut numbers = Numbers(seed);
     let mut rest = &ops[..];

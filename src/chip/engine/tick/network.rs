@@ -24,7 +24,7 @@ use layer::TickLayer;
 use segment::Segment;
 use unit::Unit;
 use watch::Watch;
-pub use watch::{Span, TileAt};
+pub use watch::{PartSpan, Span, TileAt};
 
 /// A network, its cycles and its counts.
 #[derive(Debug)]
@@ -77,10 +77,12 @@ impl Network {
         }
     }
 
-    /// Sets the small factor of the rate and whether writes only potentiate.
-    pub fn set_learning(&mut self, mantissa: u32, potentiation_only: bool) {
-        let tiles = self.layers.iter_mut().flat_map(|layer| &mut layer.tiles);
-        tiles.for_each(|tile| tile.set_learning(mantissa.into(), potentiation_only));
+    /// Sets the small factor of the rate of each layer and whether writes only potentiate.
+    pub fn set_learning(&mut self, mantissas: &[u32], potentiation_only: bool) {
+        for (layer, &mantissa) in self.layers.iter_mut().zip(mantissas) {
+            let tiles = layer.tiles.iter_mut();
+            tiles.for_each(|tile| tile.set_learning(mantissa.into(), potentiation_only));
+        }
     }
 
     /// Takes over converter shifts.
@@ -152,14 +154,20 @@ impl Network {
         &self.layers[layer].backward
     }
 
-    /// Starts keeping what every layer did when.
+    /// Starts keeping what every layer, and every part of its tiles, did when.
     pub fn keep_spans(&mut self) {
-        self.watch.keep_spans();
+        let tiles = self.layers.iter().map(|layer| layer.tiles.len());
+        self.watch.keep_spans(tiles);
     }
 
     /// What was kept since the last call.
     pub fn take_spans(&mut self) -> Vec<Span> {
         self.watch.take_spans()
+    }
+
+    /// What parts were at since the last call, in no order.
+    pub fn take_parts(&mut self) -> Vec<PartSpan> {
+        self.watch.take_parts()
     }
 
     /// Shows a tile at the end of every cycle. Nothing happens when there is no such tile: see [`Network::grid`].
@@ -433,6 +441,7 @@ impl Network {
     /// Notes what a layer and its parts do in the cycle that begins.
     fn account(&mut self, layer: usize, during: During, offered: bool) {
         let at_work = self.layers[layer].at_work();
+        self.watch.parts(self.clock, layer, &self.layers[layer]);
         let busy = offered || self.layers[layer].busy(during);
         let cycles = self.cycles();
         if busy {

@@ -1,13 +1,14 @@
 //! `[learning]`: rule, batches, rates, and which state is kept.
 
-use super::{Select, TrainOn, per_layer, positive, range, route, word, wrong};
+use super::{Select, TrainOn, one_a_layer, per_layer, positive, range, route, word, wrong};
 use crate::lab::config::ConfigError;
-use crate::lab::config::file::LearningFile;
+use crate::lab::config::defaults::SetDefaults;
+use crate::lab::config::file::{LearningFile, MantissaFile};
 use crate::learn::error::Centre;
 use crate::learn::route::Route;
 use crate::learn::rule::{Rule, UpdateMode};
 use crate::num::fixed::{Batch, RateMantissa};
-use crate::num::tables::{Decay, Positive};
+use crate::num::tables::{Decay, Positive, Rate};
 
 /// A rule as a file names it: what it is, and what it is by default.
 #[derive(Clone, Copy)]
@@ -36,7 +37,6 @@ pub(super) struct Learning {
     pub(super) centre: Centre,
     pub(super) route: Option<Route>,
     pub(super) batch: Batch,
-    pub(super) mantissa: RateMantissa,
     pub(super) rates: Vec<Positive>,
     pub(super) decay: Decay,
     pub(super) epochs: u32,
@@ -45,8 +45,12 @@ pub(super) struct Learning {
     pub(super) select: Select,
 }
 
-/// Checks how a network of so many layers learns and writes defaults back.
-pub(super) fn resolve(file: &mut LearningFile, layers: usize) -> Result<Learning, ConfigError> {
+/// Checks how a network of such hidden layers learns and writes defaults back.
+pub(super) fn resolve(
+    file: &mut LearningFile,
+    hidden: &[usize],
+    defaults: &SetDefaults,
+) -> Result<Learning, ConfigError> {
     let seeded = file.rule.as_deref() == Some("ed_seed");
     let rules = [
         ("ed", Rule::Ed),
@@ -57,27 +61,33 @@ pub(super) fn resolve(file: &mut LearningFile, layers: usize) -> Result<Learning
     ];
     let kind = Kind { rule: word("learning.rule", &mut file.rule, "ed", &rules)?, seeded };
     let centres = [("none", Centre::None), ("batch", Centre::Batch), ("running", Centre::Running)];
-    let default = if kind.is_raw() { "none" } else { "batch" };
-    let centre = word("learning.centre", &mut file.centre, default, &centres)?;
     let modes = [
         ("accumulate", UpdateMode::Accumulate),
         ("replay", UpdateMode::Replay),
         ("online", UpdateMode::Online),
     ];
     let mode = word("learning.mode", &mut file.mode, "accumulate", &modes)?;
-    let mantissa = *file.rate_mantissa.get_or_insert(1);
     let decays = [("cosine", Decay::Cosine), ("constant", Decay::Constant)];
-    let (train_on, select) = selection(file)?;
+    let (train_on, select) = selection(file, defaults)?;
+    let batch = range("learning.batch", Batch::new(*file.batch.get_or_insert(defaults.batch)))?;
+    file.rate.get_or_insert_with(|| defaults.rate_of(batch));
+    // one sample has no mean but that of those before it
+    let alone = batch.get() == 1 || mode == UpdateMode::Online;
+    let default = match (kind.is_raw(), alone) {
+        (true, _) => "none",
+        (false, true) => "running",
+        (false, false) => "batch",
+    };
+    let centre = word("learning.centre", &mut file.centre, default, &centres)?;
     Ok(Learning {
         kind,
         mode,
         centre,
-        route: route::resolve(file, kind.rule)?,
-        batch: range("learning.batch", Batch::new(*file.batch.get_or_insert(32)))?,
-        mantissa: range("learning.rate_mantissa", RateMantissa::new(mantissa))?,
-        rates: rates(file, layers)?,
+        route: route::resolve(file, kind.rule, defaults)?,
+        batch,
+        rates: rates(file, hidden, defaults)?,
         decay: word("learning.decay", &mut file.decay, "cosine", &decays)?,
-        epochs: *file.epochs.get_or_insert(20),
+        epochs: *file.epochs.get_or_insert(defaults.epochs),
         shift_pixels: *file.shift_pixels.get_or_insert(0),
         train_on,
         select,
@@ -85,10 +95,15 @@ pub(super) fn resolve(file: &mut LearningFile, layers: usize) -> Result<Learning
 }
 
 /// Rate times multiplier, of each layer.
-fn rates(file: &mut LearningFile, layers: usize) -> Result<Vec<Positive>, ConfigError> {
+fn rates(
+    file: &mut LearningFile,
+    hidden: &[usize],
+    defaults: &SetDefaults,
+) -> Result<Vec<Positive>, ConfigError> {
     const KEY: &str = "learning.rate_multipliers";
-    let rate = positive("learning.rate", *file.rate.get_or_insert(20.0))?;
-    let factors = per_layer(KEY, &mut file.rate_multipliers, 1.0, layers)?;
+    let rate = positive("learning.rate", *file.rate.get_or_insert(defaults.rate))?;
+    file.rate_multipliers.get_or_insert_with(|| defaults.multipliers(hidden));
+    let factors = per_layer(KEY, &mut file.rate_multipliers, 1.0, hidden.len() + 1)?;
     let rates = factors.into_iter().map(|factor| {
         let product = rate.times(positive(KEY, factor)?);
         product.ok_or_else(|| wrong(KEY, "times the rate is out of range", "keep it in 1e-6..=1e6"))
@@ -96,12 +111,41 @@ fn rates(file: &mut LearningFile, layers: usize) -> Result<Vec<Positive>, Config
     rates.collect()
 }
 
+/// The small factor of the rate of each layer, written back as numbers: what `auto` finds is what runs again.
+pub(super) fn mantissas(
+    file: &mut LearningFile,
+    rates: &[Rate],
+) -> Result<Vec<RateMantissa>, ConfigError> {
+    const KEY: &str = "learning.rate_mantissa";
+    let list = match file.rate_mantissa.get_or_insert(MantissaFile::All(1)) {
+        MantissaFile::All(one) => vec![*one; rates.len()],
+        MantissaFile::Each(list) if list.len() == rates.len() => list.clone(),
+        MantissaFile::Each(list) => return Err(one_a_layer(KEY, list.len(), rates.len())),
+        MantissaFile::Named(name) if name == "auto" => {
+            rates.iter().map(|rate| rate.with_nearest_mantissa().mantissa.get().into()).collect()
+        }
+        MantissaFile::Named(name) => {
+            let allowed = "it is \"auto\", a whole number in 1..=15, or a list with one a layer";
+            return Err(wrong(KEY, format!("is \"{name}\""), allowed));
+        }
+    };
+    let mantissas: Result<Vec<_>, _> =
+        list.iter().map(|&found| range(KEY, RateMantissa::new(found))).collect();
+    let same = list.iter().all(|one| *one == list[0]);
+    file.rate_mantissa =
+        Some(if same { MantissaFile::All(list[0]) } else { MantissaFile::Each(list) });
+    mantissas
+}
+
 /// What is learnt from, and which epoch's state reads the test set.
-fn selection(file: &mut LearningFile) -> Result<(TrainOn, Select), ConfigError> {
+fn selection(
+    file: &mut LearningFile,
+    defaults: &SetDefaults,
+) -> Result<(TrainOn, Select), ConfigError> {
     let halves = [("train", TrainOn::Train), ("all", TrainOn::All)];
     let train_on = word("learning.train_on", &mut file.train_on, "train", &halves)?;
     let states = [("best_validation", Select::BestValidation), ("last", Select::Last)];
-    let default = if train_on == TrainOn::All { "last" } else { "best_validation" };
+    let default = if train_on == TrainOn::All { "last" } else { defaults.select };
     let select = word("learning.select", &mut file.select, default, &states)?;
     if train_on == TrainOn::All && select == Select::BestValidation {
         let allowed = "validation examples are learnt from (train_on = \"all\"); use \"last\"";

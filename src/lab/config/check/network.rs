@@ -3,6 +3,7 @@
 use super::learning::Kind;
 use super::{per_layer, positive, word, wrong};
 use crate::lab::config::ConfigError;
+use crate::lab::config::defaults::SetDefaults;
 use crate::lab::config::file::NetworkFile;
 use crate::learn::network::{GAIN_64THS, WEIGHT_MAX_LOG2};
 use crate::num::tables::Activation;
@@ -20,6 +21,7 @@ pub(super) fn resolve(
     file: &mut NetworkFile,
     layers: usize,
     kind: Kind,
+    defaults: &SetDefaults,
 ) -> Result<Network, ConfigError> {
     let biases = [("none", false), ("rows", true)];
     let bias_rows = word("network.bias", &mut file.bias, "none", &biases)?;
@@ -30,8 +32,8 @@ pub(super) fn resolve(
         gains("network.init_gain_output", *file.init_gain_output.get_or_insert([1.0, 1.0]))?,
     ];
     Ok(Network {
-        activations: activations(file, layers, kind)?,
-        weight_max_log2: weights(file, layers)?,
+        activations: activations(file, layers, kind, defaults)?,
+        weight_max_log2: weights(file, layers, defaults)?,
         bias_rows,
         gain_64ths,
     })
@@ -42,8 +44,9 @@ fn activations(
     file: &mut NetworkFile,
     layers: usize,
     kind: Kind,
+    defaults: &SetDefaults,
 ) -> Result<Vec<Activation>, ConfigError> {
-    let alpha = if kind.seeded { 1.0 } else { 6.0 };
+    let alpha = if kind.seeded { 1.0 } else { defaults.alpha };
     let alphas = per_layer("network.alpha", &mut file.alpha, alpha, layers)?;
     let names = [
         ("sigmoid", None),
@@ -58,8 +61,13 @@ fn activations(
     layers.collect()
 }
 
-fn weights(file: &mut NetworkFile, layers: usize) -> Result<Vec<i32>, ConfigError> {
-    let weights = per_layer("network.weight_max", &mut file.weight_max, 4.0, layers)?;
+fn weights(
+    file: &mut NetworkFile,
+    layers: usize,
+    defaults: &SetDefaults,
+) -> Result<Vec<i32>, ConfigError> {
+    let weights =
+        per_layer("network.weight_max", &mut file.weight_max, defaults.weight_max, layers)?;
     let log2 = weights.into_iter().map(|weight| {
         let exact = WEIGHT_MAX_LOG2.into_iter().find(|&log2| f64::from(log2).exp2() == weight);
         exact.ok_or_else(|| {

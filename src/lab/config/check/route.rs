@@ -2,12 +2,17 @@
 
 use super::{word, wrong};
 use crate::lab::config::ConfigError;
+use crate::lab::config::defaults::SetDefaults;
 use crate::lab::config::file::LearningFile;
 use crate::learn::route::Route;
 use crate::learn::rule::Rule;
 
 /// Checks the keys of the route and writes defaults back. A route that a rule does not have is refused by the network.
-pub(super) fn resolve(file: &mut LearningFile, rule: Rule) -> Result<Option<Route>, ConfigError> {
+pub(super) fn resolve(
+    file: &mut LearningFile,
+    rule: Rule,
+    defaults: &SetDefaults,
+) -> Result<Option<Route>, ConfigError> {
     if rule == Rule::Bp && file.route.is_none() {
         no_taps(file, "rule = \"bp\" has no route")?;
         return Ok(None);
@@ -21,7 +26,7 @@ pub(super) fn resolve(file: &mut LearningFile, rule: Rule) -> Result<Option<Rout
     ];
     let route = word("learning.route", &mut file.route, default, &names)?;
     if let Route::Modulo { .. } = route {
-        let taps = *file.taps.get_or_insert(1);
+        let taps = *file.taps.get_or_insert(defaults.taps);
         return Ok(Some(Route::Modulo { taps, shift: file.tap_shift }));
     }
     let name = file.route.as_deref().unwrap_or(default);

@@ -1,7 +1,7 @@
 //! Keys of experiment files.
 
 use super::KeyFileKind::Experiment;
-use super::{KeyEntry, KeyTable, key, other, real, whole, words};
+use super::{KeyEntry, KeyTable, flag, key, other, real, whole, words};
 use crate::lab::config::file::{DataFile, ExperimentFile, LearningFile, NetworkFile};
 use crate::lab::config::keys::KeyValues;
 
@@ -53,6 +53,15 @@ const IDX_TEST: &[&str] =
 const NPZ: &[&str] = &["data.format=npz", "data.train=a"];
 const CSV: &[&str] = &["data.format=csv", "data.train=a"];
 
+const NPZ_VALIDATION: &[&str] = &["data.format=npz", "data.train=a", "data.validation_array=b"];
+const NPZ_TEST: &[&str] = &["data.format=npz", "data.train=a", "data.test_array=b"];
+
+const fn array(name: &'static str, beside: &'static [&'static str]) -> KeyEntry {
+    other(name, "the name of an array")
+        .only("with data.format = \"npz\"", beside)
+        .otherwise("known names")
+}
+
 const DATA: &[KeyEntry] = &[
     words(
         "set",
@@ -81,24 +90,42 @@ const DATA: &[KeyEntry] = &[
             ("csv", "a table of text"),
         ],
     )
-    .otherwise("a set is named"),
+    .otherwise("a set is named")
+    .only("without data.set", &["data.train=a"]),
     other("train", "a path").only("with data.format", CSV),
-    other("train_labels", "a path").only("with data.format = \"idx\"", IDX),
+    other("train_labels", "a path")
+        .only("with data.format = \"idx\" or \"npz\"", IDX)
+        .otherwise("in NPZ, the archive of the examples"),
     other("validation", "a path")
         .only("with data.format", CSV)
         .otherwise("cut from the training part"),
     other("validation_labels", "a path")
-        .only("with data.format = \"idx\" and data.validation", IDX_VALIDATION),
+        .only("with data.format = \"idx\" or \"npz\", and data.validation", IDX_VALIDATION),
     other("test", "a path").only("with data.format", CSV).otherwise("cut from the training part"),
-    other("test_labels", "a path").only("with data.format = \"idx\" and data.test", IDX_TEST),
+    other("test_labels", "a path")
+        .only("with data.format = \"idx\" or \"npz\", and data.test", IDX_TEST),
     whole("full_scale", 1, 255)
         .only("with data.format", CSV)
         .otherwise("follows from the training values"),
     whole("classes", 2, 256).only("with data.format", CSV).otherwise("follows from the labels"),
     other("label_column", "`first`, `last`, a number from 0, or a header")
-        .only("with data.format = \"csv\"", CSV),
-    other("examples_array", "the name of an array").only("with data.format = \"npz\"", NPZ),
-    other("labels_array", "the name of an array").only("with data.format = \"npz\"", NPZ),
+        .only("with data.format = \"csv\"", CSV)
+        .otherwise("told from the table, and said"),
+    other("ignore_columns", "a list of columns, each a number from 0 or a header, in quotes")
+        .only("with data.format = \"csv\"", CSV)
+        .otherwise("columns without a name that number the rows"),
+    flag("header").only("with data.format = \"csv\"", CSV).otherwise("told from the table"),
+    words("separator", &[(",", "commas"), (";", "semicolons"), ("tab", "tabs"), ("|", "bars")])
+        .only("with data.format = \"csv\"", CSV)
+        .otherwise("what cuts the first lines into equally many fields"),
+    array("examples_array", NPZ),
+    array("labels_array", NPZ),
+    array("train_array", NPZ),
+    array("train_labels_array", NPZ),
+    array("validation_array", NPZ),
+    array("validation_labels_array", NPZ_VALIDATION),
+    array("test_array", NPZ),
+    array("test_labels_array", NPZ_TEST),
 ];
 
 const NETWORK: &[KeyEntry] = &[
@@ -116,10 +143,14 @@ const NETWORK: &[KeyEntry] = &[
         ],
     )
     .default("\"sigmoid\""),
-    real("alpha", 1e-6, 1e6).layers().default("6.0").otherwise("1 with rule = \"ed_seed\""),
+    real("alpha", 1e-6, 1e6)
+        .layers()
+        .default("4.0")
+        .otherwise("6.0 with other data than the built-in digits; 1.0 with rule = \"ed_seed\""),
     key("weight_max", KeyValues::Lawful(1.0 / 256.0, 256.0, "a power of two"))
         .layers()
-        .default("4.0"),
+        .default("2.0")
+        .otherwise("4.0 with other data than the built-in digits"),
     words("bias", &[("none", "no bias"), ("rows", "a constant row in each array")])
         .default("\"none\""),
     words("readout", &[("p", "outputs are the p stream's activities")]).default("\"p\""),
@@ -141,8 +172,14 @@ const LEARNING: &[KeyEntry] = &[
         ],
     )
     .default("\"ed\""),
-    whole("epochs", 0, 4_294_967_295).unit("epochs").default("20"),
-    whole("batch", 1, 4096).unit("samples").default("32"),
+    whole("epochs", 0, 4_294_967_295)
+        .unit("epochs")
+        .default("40")
+        .otherwise("20 with other data than the built-in digits"),
+    whole("batch", 1, 4096)
+        .unit("samples")
+        .default("16")
+        .otherwise("32 with other data than the built-in digits"),
     words(
         "mode",
         &[
@@ -152,9 +189,17 @@ const LEARNING: &[KeyEntry] = &[
         ],
     )
     .default("\"accumulate\""),
-    real("rate", 1e-6, 1e6).default("20.0"),
-    real("rate_multipliers", 1e-6, 1e6).layers().default("1.0"),
-    whole("rate_mantissa", 1, 15).default("1"),
+    real("rate", 1e-6, 1e6).default("18.0").otherwise(
+        "20.0 with other data than the built-in digits; with a batch below the default one less, in proportion",
+    ),
+    real("rate_multipliers", 1e-6, 1e6).layers().default("[1.0, 0.25]").otherwise(
+        "1 in every layer, 0.25 in the last one of the built-in digits (1.0 with other data); behind more than 256 \
+         hidden units times 256 / units",
+    ),
+    whole("rate_mantissa", 1, 15)
+        .layers()
+        .default("1")
+        .law("or `auto`: in each layer the one whose rate comes nearest"),
     words(
         "decay",
         &[("cosine", "falls to 0 over the run as half a cosine"), ("constant", "stays")],
@@ -169,7 +214,9 @@ const LEARNING: &[KeyEntry] = &[
         ],
     )
     .default("\"batch\"")
-    .otherwise("\"none\" with rule = \"kaneko\" or \"ed_seed\""),
+    .otherwise(
+        "\"running\" with a batch of one or mode = \"online\"; \"none\" with rule = \"kaneko\" or \"ed_seed\"",
+    ),
     words(
         "route",
         &[
@@ -184,7 +231,8 @@ const LEARNING: &[KeyEntry] = &[
     whole("taps", 1, 4)
         .law("at most the number of outputs")
         .unit("words")
-        .default("1")
+        .default("3")
+        .otherwise("1 with other data than the built-in digits")
         .only("with route = \"modulo\"", &["learning.route=modulo"]),
     whole("tap_shift", 0, 16)
         .unit("bits")
@@ -212,8 +260,8 @@ const LEARNING: &[KeyEntry] = &[
             ("last", "the last one"),
         ],
     )
-    .default("\"best_validation\"")
-    .otherwise("\"last\" with train_on = \"all\""),
+    .default("\"last\"")
+    .otherwise("\"best_validation\" with other data than the built-in digits, unless train_on = \"all\""),
     #[cfg(feature = "grown")]
     whole("grown", i64::MIN, i64::MAX).default("0"),
 ];

@@ -111,38 +111,38 @@ const TILE: &[KeyEntry] = &[
 
 const PULSE_WIDTH: &[&str] = &["hw.drive.mode=pulse_width"];
 
-const DRIVE: &[KeyEntry] = &[
-    whole("bits", 1, 8).unit("bits").default("8"),
-    words(
-        "mode",
-        &[
-            ("voltage", "slices of `dac_bits`, one after the other"),
-            ("pulse_width", "a pulse as long as the code, phase by phase"),
-            ("amplitude", "the amplitude of light: the whole code at once"),
-        ],
-    )
-    .default("\"voltage\""),
-    whole("dac_bits", 1, 8)
-        .law("at most drive.bits")
-        .unit("bits")
-        .otherwise("drive.bits; with \"pulse_width\" it follows from `phases`"),
-    whole("slots", 255, 100_000_000)
-        .law("at least 2^(bits of a phase) - 1")
-        .unit("slots")
-        .only("with drive.mode = \"pulse_width\"", PULSE_WIDTH)
-        .otherwise("2^(bits of a phase) - 1"),
-    whole("slot_cycles", 1, 392_156)
-        .law("a phase takes at most 100000000 cycles")
-        .unit("cycles")
-        .default("1")
-        .only("with drive.mode = \"pulse_width\"", PULSE_WIDTH),
-    whole("phases", 1, 8)
-        .law("at most drive.bits")
-        .default("1")
-        .only("with drive.mode = \"pulse_width\"", PULSE_WIDTH),
-    PROVENANCE[0],
-    PROVENANCE[1],
-];
+const DRIVE: &[KeyEntry] =
+    &[
+        whole("bits", 1, 8).unit("bits").default("8"),
+        words(
+            "mode",
+            &[
+                ("voltage", "slices of `dac_bits`, one after the other"),
+                ("pulse_width", "a pulse as long as the code, phase by phase"),
+                ("amplitude", "the amplitude of light: the whole code at once"),
+            ],
+        )
+        .default("\"voltage\""),
+        whole("dac_bits", 1, 8).law("at most drive.bits").unit("bits").default("8").otherwise(
+            "drive.bits, whatever that is; with \"pulse_width\" it follows from `phases`",
+        ),
+        whole("slots", 255, 100_000_000)
+            .law("at least 2^(bits of a phase) - 1")
+            .unit("slots")
+            .only("with drive.mode = \"pulse_width\"", PULSE_WIDTH)
+            .otherwise("2^(bits of a phase) - 1"),
+        whole("slot_cycles", 1, 392_156)
+            .law("a phase takes at most 100000000 cycles")
+            .unit("cycles")
+            .default("1")
+            .only("with drive.mode = \"pulse_width\"", PULSE_WIDTH),
+        whole("phases", 1, 8)
+            .law("at most drive.bits")
+            .default("1")
+            .only("with drive.mode = \"pulse_width\"", PULSE_WIDTH),
+        PROVENANCE[0],
+        PROVENANCE[1],
+    ];
 
 const FINITE: &[&str] = &["hw.adc.bits=8"];
 const CALIBRATED: &[&str] = &["hw.adc.bits=8", "hw.adc.range=calibrated"];

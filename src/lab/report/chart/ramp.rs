@@ -10,14 +10,28 @@ pub(in crate::lab::report) fn ramp(
     [across, high]: [f64; 2],
     ticks: &[(f64, String)],
     title: &str,
+    steps: Option<usize>,
 ) -> String {
     let upright = high > across;
     let colours = colour::ramp();
-    let stop = |(at, colour): (usize, &String)| {
-        let part = size(at) / size(colours.len() - 1);
-        format!("<stop offset=\"{part:.3}\" stop-color=\"{colour}\"/>")
+    let stop =
+        |part: f64, colour: &str| format!("<stop offset=\"{part:.3}\" stop-color=\"{colour}\"/>");
+    let stops: String = match steps {
+        None => {
+            let part = |at| size(at) / size(colours.len() - 1);
+            colours.iter().enumerate().map(|(at, colour)| stop(part(at), colour)).collect()
+        }
+        Some(steps) => {
+            let palette = colour::levels();
+            let both = |at: usize| {
+                let [from, to] = [at, at + 1].map(|at| size(at) / size(steps));
+                let [red, green, blue, _] = palette[usize::from(colour::byte(127.5 * (from + to)))];
+                let colour = format!("#{red:02x}{green:02x}{blue:02x}");
+                [stop(from, &colour), stop(to, &colour)].concat()
+            };
+            (0..steps).map(both).collect()
+        }
     };
-    let stops: String = colours.iter().enumerate().map(stop).collect();
     // one for each scale of a page: a colour that is hidden elsewhere would be hidden here too
     let id: String = title.chars().filter(char::is_ascii_alphanumeric).collect();
     let way = if upright { "x2=\"0\" y1=\"1\"" } else { "" };
@@ -56,7 +70,7 @@ impl super::Chart {
         format!(
             "<svg class=\"chart bar\" viewBox=\"0 0 {WIDTH} 48\" role=\"img\" aria-label=\"Colour scale: {}\">{}</svg>",
             escape(title),
-            ramp([10.0, 2.0], [WIDTH - 20.0, 12.0], ticks, title)
+            ramp([10.0, 2.0], [WIDTH - 20.0, 12.0], ticks, title, None)
         )
     }
 }

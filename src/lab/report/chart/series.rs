@@ -38,6 +38,11 @@ impl Series {
         Self { dash: usize::from(dashed), ..self }
     }
 
+    /// The same with the dashes of that number; 0 is solid.
+    pub(in crate::lab::report) fn numbered(self, number: usize) -> Self {
+        Self { dash: number, ..self }
+    }
+
     /// The same as a single mark.
     pub(in crate::lab::report) fn marked(self) -> Self {
         Self { mark: true, ..self }

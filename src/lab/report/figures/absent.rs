@@ -29,7 +29,7 @@ pub(super) fn draw(view: &RunView<'_>) -> Option<Figure> {
                   its chip. An accuracy above is that of the levels, window, converters and writes, not of these."
             .into(),
         body: format!(
-            "<div class=\"scroll\"><table class=\"words\"><thead><tr><th scope=\"col\">Effect</th><th scope=\"col\">real \
+            "<div class=\"scroll\"><table class=\"stack one wordy\"><thead><tr><th scope=\"col\">Effect</th><th scope=\"col\">real \
              chips have</th><th scope=\"col\">simulated</th><th scope=\"col\">this chip</th></tr></thead><tbody>{rows}\
              </tbody></table></div>"
         ),

@@ -41,7 +41,7 @@ pub(super) fn draw(view: &RunView<'_>) -> Option<Figure> {
     }
     let room = ((high - low) * 0.08).max(0.2);
     let y = Axis::percent((low - room).max(0.0), (high + room).min(100.0), "accuracy");
-    let mut chart = Chart::new(480.0, 520.0, 126.0, Axis::epochs(from, last), y);
+    let mut chart = Chart::new(480.0, 500.0, 140.0, Axis::epochs(from, last), y);
     chart.series(&all, |value| format!("{value:.2}\u{202f}%"));
 
     let best = view

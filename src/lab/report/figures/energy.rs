@@ -114,7 +114,7 @@ fn images(cost: &Cost) -> String {
     }
     let heads = classes.iter().map(|class| format!("<th scope=\"col\">{}</th>", class.name()));
     format!(
-        "<div class=\"scroll\"><table class=\"joules\"><thead><tr><th scope=\"col\">An image takes</th>\
+        "<div class=\"scroll\"><table class=\"stack\"><thead><tr><th scope=\"col\">An image takes</th>\
          <th scope=\"col\">images</th><th scope=\"col\">time</th><th scope=\"col\">energy</th>{}</tr></thead>\
          <tbody>{rows}</tbody></table></div>",
         heads.collect::<String>()

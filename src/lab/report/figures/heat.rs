@@ -60,15 +60,30 @@ fn brightest(maps: &[(&Heat, Grid)]) -> f64 {
 }
 
 fn tile(view: &RunView<'_>, heat: &Heat, grid: &Grid, top: f64) -> String {
+    // where every cell has its pixel, the pixel is its level, for the script to read; blocks of cells get 64 shades: no eye
+    // tells more, and the file is a quarter smaller
+    let whole = (grid.height, grid.width) == (heat.rows, heat.columns) && view.level_max <= 255;
+    let part = |value: f64| (value / top).clamp(0.0, 1.0).sqrt();
+    let map = colour::levels();
     let shade = |value: &f64| {
-        // 64 shades: no eye tells more, and the file is a quarter smaller
-        let shade = colour::byte(63.0 * (value / top).clamp(0.0, 1.0).sqrt());
-        shade << 2 | shade >> 4
+        let shade = colour::byte(63.0 * part(*value));
+        if whole { colour::byte(*value) } else { shade << 2 | shade >> 4 }
     };
+    let own: colour::Palette =
+        std::array::from_fn(|level| map[usize::from(colour::byte(255.0 * part(level as f64)))]);
     let indices: Vec<u8> = grid.values.iter().map(shade).collect();
-    let Some(uri) = indexed(grid.width, grid.height, &indices, &colour::levels()) else {
+    let palette = if whole { &own } else { &map };
+    let Some(uri) = indexed(grid.width, grid.height, &indices, palette) else {
         return String::new();
     };
+    let blocks = [(heat.rows, grid.height), (heat.columns, grid.width)];
+    let [down, across] = blocks.map(|(cells, pixels)| cells.div_ceil(pixels));
+    let read = format!(
+        "{{&quot;rows&quot;:{},&quot;columns&quot;:{},&quot;down&quot;:{down},&quot;across&quot;:{across},&quot;top&quot;:{}}}",
+        heat.rows,
+        heat.columns,
+        if whole { 0.0 } else { top }
+    );
     let record = view
         .last()
         .and_then(|last| of_layer(last, heat.layer).find(|one| one.pathway == heat.pathway));
@@ -90,7 +105,7 @@ fn tile(view: &RunView<'_>, heat: &Heat, grid: &Grid, top: f64) -> String {
     format!(
         "<div class=\"map\"><div class=\"map-name\"><b class=\"swatch\" style=\"--hue:{}\">{name}</b> \
          {route}{sign}</div><img class=\"{class}\" style=\"aspect-ratio:{shape:.3}\" \
-         alt=\"Levels of pathway {name} of layer {}\" src=\"{uri}\"><div class=\"map-note\">{} × {}{floor}</div></div>",
+         data-map=\"{read}\" alt=\"Levels of pathway {name} of layer {}\" src=\"{uri}\"><div class=\"map-note\">{} × {}{floor}</div></div>",
         colour::pathway(&heat.pathway, excites),
         heat.layer,
         heat.rows,

@@ -37,7 +37,7 @@ pub(super) fn draw(view: &RunView<'_>) -> Option<Figure> {
             last.epoch
         ),
         body: format!(
-            "<div class=\"scroll\"><table><thead><tr>{heads}</tr></thead><tbody>{rows}</tbody></table></div>"
+            "<div class=\"scroll\"><table class=\"stack\"><thead><tr>{heads}</tr></thead><tbody>{rows}</tbody></table></div>"
         ),
         wide: true,
     })

@@ -9,6 +9,7 @@ use super::measure::Measure;
 use super::paper::short;
 use super::settings::{Levels, Settings, front_of};
 use super::statistics::Summary;
+use super::{heat, importance, learning, meaning};
 use crate::lab::report::colour;
 use crate::lab::table::{Column, ColumnUnit, Role, Values};
 
@@ -34,6 +35,9 @@ pub(super) fn data(settings: &Settings<'_>) -> String {
         "figures": { "x": figures.x, "y": figures.y, "series": figures.series, "panel": figures.panel,
                      "heat": figures.heat, "cost": figures.cost },
         "best": best,
+        "importance": important(settings),
+        "learning": learning::data(settings),
+        "shades": [heat::STEPS_MIN, heat::STEPS_MAX],
         "hues": colour::HUES.map(|hue| hue.trim_start_matches("var(--").trim_end_matches(')')),
         "ramp": colour::ramp(),
     });
@@ -62,6 +66,18 @@ fn axis(settings: &Settings<'_>, levels: &Levels<'_>) -> Value {
     json!({ "name": own.name, "label": own.label, "log": levels.log(), "numeric": levels.numbers.is_some(),
             "binned": binned, "texts": texts, "ticks": ticks, "numbers": levels.numbers.as_ref().filter(|_| !binned),
             "codes": codes.collect::<Vec<_>>() })
+}
+
+/// By result, what explains its variance.
+fn important(settings: &Settings<'_>) -> Value {
+    let of = |measure: Measure<'_>| {
+        let found = importance::importance(settings, measure)?;
+        let part = |part: &importance::Part| json!({"name": part.name, "share": brief(part.share), "chance": part.chance.and_then(brief)});
+        let parts: Vec<_> = found.parts.iter().map(part).collect();
+        let all = json!({"parts": parts, "runs": found.runs, "balanced": found.balanced});
+        Some((measure.column.name.clone(), all))
+    };
+    Value::Object(settings.measures().into_iter().filter_map(of).collect())
 }
 
 /// For each cost and each result the settings that no other beats.
@@ -95,7 +111,8 @@ fn column(settings: &Settings<'_>, column: &Column) -> Value {
         Role::Result => "result",
         Role::Name => "name",
     };
-    let named = json!({ "name": column.name, "label": column.label, "unit": unit, "role": role });
+    let named = json!({ "name": column.name, "label": column.label, "unit": unit, "role": role,
+                        "meaning": meaning(column) });
     let Value::Object(mut out) = named else { unreachable!("braces make an object") };
     match &column.values {
         // A script's numbers are exact to 2^53; greater ones go as words.

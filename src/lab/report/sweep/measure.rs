@@ -49,6 +49,8 @@ impl<'a> Measure<'a> {
         let (by, prefix) = match column.unit {
             ColumnUnit::Plain | ColumnUnit::SquareMillimetres => (1.0, ""),
             ColumnUnit::Fraction => (100.0, ""),
+            ColumnUnit::Seconds if middle >= 7200.0 => (1.0 / 3600.0, "h"),
+            ColumnUnit::Seconds if middle >= 120.0 => (1.0 / 60.0, "min"),
             ColumnUnit::Seconds | ColumnUnit::Joules => {
                 let thousands = thousands.clamp(-6.0, 5.0);
                 (1000f64.powf(-thousands), PREFIXES[(thousands + 6.0) as usize])
@@ -66,6 +68,7 @@ impl<'a> Measure<'a> {
     pub(super) fn sign(&self) -> String {
         match self.column.unit {
             ColumnUnit::Count | ColumnUnit::Cycles if !self.prefix.is_empty() => self.prefix.into(),
+            ColumnUnit::Seconds if ["min", "h"].contains(&self.prefix) => self.prefix.into(),
             unit => format!("{}{}", self.prefix, unit.sign()),
         }
     }
@@ -102,6 +105,8 @@ mod tests {
             (ColumnUnit::Joules, vec![2e-6, 5.9e-5], "x (µJ)", 1e6),
             (ColumnUnit::Joules, vec![1e-9, 1e-3], "x (µJ)", 1e6),
             (ColumnUnit::Seconds, vec![0.0], "x (s)", 1.0),
+            (ColumnUnit::Seconds, vec![3.0, 400.0], "x (min)", 1.0 / 60.0),
+            (ColumnUnit::Seconds, vec![9000.0], "x (h)", 1.0 / 3600.0),
             (ColumnUnit::Fraction, vec![0.5], "x (%)", 100.0),
             (ColumnUnit::Cycles, vec![1.0, 99_999.0], "x (cycles)", 1.0),
             (ColumnUnit::Count, vec![2e6, 3e7], "x (millions)", 1e-6),

@@ -8,7 +8,8 @@ function firstState() {
   const hold = {};
   // Values drawn from a range meet too few runs for that.
   if (sweep.best !== null) for (const axis of varied) if (!axis.binned && axis.codes[sweep.best] >= 0) hold[axis.name] = axis.codes[sweep.best];
-  return { x: first ?? "", y: known(resultOf, y, results[0]?.name) ?? "", series: known(axisOf, series), panel: known(axisOf, panel), hx: hx ?? "", hy: hy ?? "",
+  const learner = [series, x].find((name) => axisOf.has(name) && axisOf.get(name).varies && !axisOf.get(name).binned) ?? "";
+  return { learner, x: first ?? "", y: known(resultOf, y, results[0]?.name) ?? "", series: known(axisOf, series), panel: known(axisOf, panel), hx: hx ?? "", hy: hy ?? "",
     cost: known(resultOf, cost, results.find((column) => column.less && column.name !== y)?.name) ?? "", hold, find: "", sort: "", down: false, page: 0 };
 }
 
@@ -18,9 +19,9 @@ const state = { ...initial, hold: { ...initial.hold } };
 /** Reads the address; what it names and the table has not is left as it was. */
 function recall() {
   const given = new URLSearchParams(location.hash.slice(1));
-  const fits = { x: axisOf, series: axisOf, panel: axisOf, hx: axisOf, hy: axisOf, y: resultOf, cost: resultOf, sort: columnOf };
+  const fits = { x: axisOf, learner: axisOf, series: axisOf, panel: axisOf, hx: axisOf, hy: axisOf, y: resultOf, cost: resultOf, sort: columnOf };
   for (const [key, value] of given) {
-    if (key in fits && (fits[key].has(value) || (value === "" && ["series", "panel"].includes(key)))) state[key] = value;
+    if (key in fits && (fits[key].has(value) || (value === "" && ["series", "panel", "learner"].includes(key)))) state[key] = value;
     if (key === "find") state.find = value;
     if (key === "down") state.down = value === "1";
     if (key === "page") state.page = Math.max(0, Math.floor(Number(value)) || 0);
@@ -36,7 +37,7 @@ function recall() {
 /** Writes what differs from the first state into the address. */
 function remember() {
   const out = new URLSearchParams();
-  for (const key of ["y", "x", "series", "panel", "hx", "hy", "cost", "find", "sort"]) if (state[key] !== initial[key]) out.set(key, state[key]);
+  for (const key of ["y", "x", "series", "panel", "hx", "hy", "cost", "learner", "find", "sort"]) if (state[key] !== initial[key]) out.set(key, state[key]);
   if (state.down) out.set("down", "1");
   if (state.page) out.set("page", String(state.page));
   for (const axis of varied) {
@@ -88,6 +89,7 @@ function wireChoices() {
   choose("hx", list(varied), ["heat"]);
   choose("hy", list(varied), ["heat"]);
   choose("cost", list(results), ["pareto", "parallel"]);
+  choose("learner", maybe, ["learning"]);
   const holds = document.getElementById("holds");
   for (const axis of varied) {
     // One axis is always shown; a range of values is always pooled.
@@ -101,7 +103,7 @@ function wireChoices() {
     select.addEventListener("change", () => {
       if (select.value === "*") delete state.hold[axis.name];
       else state.hold[axis.name] = Number(select.value);
-      changed(["curves", "heat"]);
+      changed(["curves", "heat", "learning"]);
     });
     label.append(element("span", axis.label), select);
     holds.append(label);
@@ -122,6 +124,8 @@ performance.mark("rows listed");
 figure("curves", curves);
 figure("heat", heat);
 figure("pareto", pareto);
+figure("learning", learning);
+figure("importance", importance);
 figure("parallel", parallel);
 
 // Names of sections would take the place of the choices in the address.
@@ -149,17 +153,17 @@ addEventListener("resize", () => {
   if (innerWidth === lastWidth || onPaper) return;
   lastWidth = innerWidth;
   clearTimeout(later);
-  later = setTimeout(redraw, 120);
+  later = setTimeout(() => { redraw(); drawRows(); }, 120);
 });
-addEventListener("beforeprint", () => { onPaper = true; redraw(); });
-addEventListener("afterprint", () => { onPaper = false; redraw(); });
+addEventListener("beforeprint", () => { onPaper = true; redraw(); drawRows(); });
+addEventListener("afterprint", () => { onPaper = false; redraw(); drawRows(); });
 matchMedia("(prefers-color-scheme: dark)").addEventListener("change", redraw);
 document.getElementById("theme").addEventListener("click", () => setTimeout(redraw, 0));
 addEventListener("hashchange", () => {
   Object.assign(state, initial, { hold: { ...initial.hold } });
   recall();
   settle();
-  for (const key of ["y", "x", "series", "panel", "hx", "hy", "cost"]) document.getElementById(`choose-${key}`).value = state[key];
+  for (const key of ["y", "x", "series", "panel", "hx", "hy", "cost", "learner"]) document.getElementById(`choose-${key}`).value = state[key];
   document.querySelectorAll("[data-hold]").forEach((select) => { select.value = String(state.hold[select.dataset.hold] ?? "*"); });
   document.getElementById("find").value = state.find;
   redraw();

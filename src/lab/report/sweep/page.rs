@@ -3,7 +3,7 @@
 use super::measure::Measure;
 use super::settings::Settings;
 use super::statistics::Summary;
-use super::{SweepView, json, library, paper};
+use super::{SweepView, json, library, meaning, paper};
 use crate::lab::price::prefixed;
 use crate::lab::report::number::{count, escape, percent, significant};
 use crate::lab::table::ColumnUnit;
@@ -12,12 +12,14 @@ const STYLE: &str = include_str!("../page.css");
 const SWEEP_STYLE: &str = include_str!("page.css");
 const SCRIPT: &str = include_str!("../page.js");
 /// Parts of the page's own script, in order; they share one scope.
-const PARTS: [&str; 8] = [
+const PARTS: [&str; 10] = [
     include_str!("data.js"),
     include_str!("look.js"),
     include_str!("curves.js"),
     include_str!("heat.js"),
     include_str!("pareto.js"),
+    include_str!("learning.js"),
+    include_str!("importance.js"),
     include_str!("parallel.js"),
     include_str!("rows.js"),
     include_str!("page.js"),
@@ -30,7 +32,7 @@ struct Frame {
     choices: &'static [(&'static str, &'static str)],
 }
 
-const FRAMES: [Frame; 4] = [
+const FRAMES: [Frame; 6] = [
     Frame {
         id: "curves",
         title: "Curves",
@@ -42,6 +44,8 @@ const FRAMES: [Frame; 4] = [
     },
     Frame { id: "heat", title: "Heat map", choices: &[("hx", "across"), ("hy", "down")] },
     Frame { id: "pareto", title: "What it costs", choices: &[("cost", "cost")] },
+    Frame { id: "learning", title: "Learning", choices: &[("learner", "one curve for each")] },
+    Frame { id: "importance", title: "What matters", choices: &[] },
     Frame { id: "parallel", title: "All settings at once", choices: &[] },
 ];
 
@@ -70,7 +74,7 @@ pub fn html(view: &SweepView<'_>) -> String {
         header = header(&settings),
         notices = notices(view),
         choices = choices(),
-        rows = rows(last),
+        rows = rows(last, view),
         reading = reading(view, last + 1),
         fixed = fixed(view),
         version = escape(view.version),
@@ -108,15 +112,26 @@ fn choices() -> String {
     )
 }
 
-fn rows(number: usize) -> String {
+fn rows(number: usize, view: &SweepView<'_>) -> String {
+    let meanings = view.table.columns.iter().map(|column| {
+        format!(
+            "<div id=\"column-{}\"><dt>{} <code>{0}</code></dt><dd>{}</dd></div>",
+            escape(&column.name),
+            escape(&column.label),
+            escape(&meaning(column))
+        )
+    });
     format!(
         "<section class=\"card wide\" id=\"rows\"><div class=\"top\"><h2><span>{number}</span>Table</h2>\
          <div class=\"save\"><button type=\"button\" id=\"csv-copy\">copy CSV</button><button type=\"button\" \
          id=\"csv-save\">download CSV</button></div></div><div class=\"choices\"><label class=\"choice \
          find\"><span>find</span><input id=\"find\" type=\"search\" placeholder=\"words, or level_bits=4\" \
-         autocomplete=\"off\" spellcheck=\"false\"></label><span id=\"found\" class=\"note\" \
+         autocomplete=\"off\" spellcheck=\"false\"></label><label class=\"tick\"><input type=\"checkbox\" id=\"every\"> \
+         all columns</label><span id=\"found\" class=\"note\" \
          role=\"status\"></span></div><div class=\"scroll\"><table id=\"table\"><thead></thead><tbody></tbody></table>\
-         </div><div class=\"pager\" id=\"pager\"></div></section>\n"
+         </div><div class=\"pager\" id=\"pager\"></div><details id=\"meanings\"><summary>What the columns mean\
+         </summary><dl class=\"lexicon\">{}</dl></details></section>\n",
+        meanings.collect::<String>()
     )
 }
 
@@ -196,8 +211,9 @@ fn print(value: f64, unit: ColumnUnit) -> String {
 
 fn headline(settings: &Settings<'_>) -> String {
     let none = "<div class=\"big none\">–</div><div class=\"what\">no result yet</div>";
-    let Some(measure) = settings.measure(&settings.view.figures.y) else { return none.into() };
-    let Some((rows, best)) = settings.best(measure) else { return none.into() };
+    let Some(wanted) = settings.measure(&settings.view.figures.y) else { return none.into() };
+    let Some((rows, best)) = settings.best(wanted) else { return none.into() };
+    let measure = settings.chooser(wanted);
     let number = match measure.column.unit {
         ColumnUnit::Fraction => format!("{:.2}<small>\u{202f}%</small>", 100.0 * best.mean),
         unit => escape(&print(best.mean, unit)),
@@ -217,28 +233,44 @@ fn headline(settings: &Settings<'_>) -> String {
         })
         .collect();
     let at = if where_.is_empty() { String::new() } else { format!("{}.", where_.join(", ")) };
-    format!(
-        "<div class=\"big{small}\">{number}</div><div class=\"what\">{way} {}</div><p>{at}</p><p>{}</p>",
+    let mut out = format!(
+        "<div class=\"big{small}\">{number}</div><div class=\"what\">{way} {}</div>",
         escape(&measure.column.label),
-        chosen(settings, measure, best)
-    )
+    );
+    let beside = (measure.column.name != wanted.column.name)
+        .then(|| settings.summary(wanted, rows))
+        .flatten();
+    if let Some(test) = beside {
+        out += &format!(
+            "<div class=\"beside\">{} there <b>{}</b>{}</div>",
+            escape(&wanted.column.label),
+            print(test.mean, wanted.column.unit),
+            test.half.map_or_else(String::new, |half| format!(
+                " ±\u{202f}{}",
+                print(half, wanted.column.unit)
+            ))
+        );
+    }
+    let chosen = chosen(settings, measure, best, beside.is_some());
+    format!("{out}<p>{at}</p><p>{chosen}</p>")
 }
 
-fn chosen(settings: &Settings<'_>, measure: Measure<'_>, best: Summary) -> String {
+fn chosen(settings: &Settings<'_>, measure: Measure<'_>, best: Summary, tested: bool) -> String {
     let runs = match (best.n, best.half) {
         (n, Some(half)) => {
-            let half = match measure.column.unit {
-                ColumnUnit::Fraction => percent(half, 2),
-                unit => print(half, unit),
-            };
-            format!("Mean of n = {n} runs ± {half} (95\u{202f}% confidence)")
+            let half = print(half, measure.column.unit);
+            format!("Mean of n = {n} runs ±\u{202f}{half} (95\u{202f}% confidence)")
         }
         _ => "One run (n = 1)".into(),
     };
-    let among = settings.with_mean(measure);
+    let among = tally(settings.with_mean(measure));
+    if tested {
+        return format!(
+            "{runs}, chosen among {among} settings by validation, which flatters this number; the test set took no part."
+        );
+    }
     format!(
-        "{runs}, picked afterwards among {} settings: the best of many is flattered by chance.",
-        tally(among)
+        "{runs}, picked afterwards among {among} settings: the best of many is flattered by chance."
     )
 }
 
@@ -247,10 +279,20 @@ fn notices(view: &SweepView<'_>) -> String {
     let mut out = String::new();
     if !view.not_simulated.is_empty() {
         let list = view.not_simulated.iter();
-        let list: String = list
-            .map(|text| format!("<li>Not simulated: <code>{}</code></li>", escape(text)))
-            .collect();
-        out += &format!("<ul class=\"notices\">{list}</ul>\n");
+        let name = |text: &String| {
+            let name = text.split(" = ").next().unwrap_or_default();
+            escape(&name.replace('_', " "))
+        };
+        let mut names: Vec<String> = list.clone().map(name).collect();
+        names.dedup();
+        let list: String =
+            list.map(|text| format!("<li><code>{}</code></li>", escape(text))).collect();
+        out += &format!(
+            "<ul class=\"notices\"><li><details><summary>{} effects of real chips are not simulated: {}</summary><ul>{list}</ul></details>\
+             </li></ul>\n",
+            names.len(),
+            names.join(", ")
+        );
     }
     if !view.refused.is_empty() {
         let list = view.refused.iter().map(|one| {

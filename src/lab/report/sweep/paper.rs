@@ -1,7 +1,7 @@
 //! Figures for papers: what the page shows at first, as stand-alone SVG on white, a column (90 mm) or a page (180 mm) wide.
 
 use super::settings::{Levels, Settings};
-use super::{SweepView, curves, heat, pareto};
+use super::{SweepView, curves, heat, importance, learning, pareto};
 use crate::lab::report::chart::wide;
 use crate::lab::report::colour::on_white;
 use crate::lab::report::number::{escape, place, significant, size};
@@ -20,7 +20,7 @@ const STYLE: &str = concat!(
 /// A figure as a file.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct StaticFigure {
-    /// What it shows: `curves`, `heat`, `pareto`.
+    /// What it shows: `curves`, `heat`, `pareto`, `learning`, `importance`.
     pub name: String,
     /// Stand-alone SVG.
     pub svg: String,
@@ -34,6 +34,8 @@ pub fn figures(view: &SweepView<'_>) -> Vec<StaticFigure> {
         ("curves", curves::draw(&settings)),
         ("heat", heat::draw(&settings)),
         ("pareto", pareto::draw(&settings)),
+        ("learning", learning::draw(&settings)),
+        ("importance", importance::draw(&settings)),
     ];
     let drawn = all.into_iter().filter_map(|(name, svg)| Some((name, svg?)));
     drawn.map(|(name, svg)| StaticFigure { name: name.into(), svg }).collect()

@@ -31,14 +31,17 @@ function parallel(look, width) {
   const scale = { cmin: low, cmax: high > low ? high : low + 1e-9, showscale: true, colorbar: barLook(look, y.title), colorscale: Array.from({ length: 11 }, (_, at) => [at / 10, lineShade(look, at / 10)]) };
   // Too narrow for upright names: they lean.
   const crowded = rulers.some((one) => one.label.length * 7.2 > (width - 190) / (rulers.length - 1));
-  const margin = { l: Math.max(60, 10 + 7 * Math.max(...rulers[0].ticks.map(([, text]) => text.length))), r: 40, t: crowded ? 96 : 56, b: 26 };
+  const steep = crowded && (width - 190) / (rulers.length - 1) < 90;
+  const lean = steep ? -55 : crowded ? -18 : 0;
+  if (steep) for (const one of rulers) one.label = short(one.label, 20);
+  const margin = { l: Math.max(60, 10 + 7 * Math.max(...rulers[0].ticks.map(([, text]) => text.length))), r: 40, t: steep ? 140 : crowded ? 96 : 56, b: 26 };
   const thinned = rows.length < done.length ? ` ${plain(rows.length)} of them are drawn, evenly picked.` : "";
   const caption = `One line a run, ${plain(done.length)} finished runs, coloured by ${y.label}.${thinned}`;
   const label = `Parallel coordinates of ${plain(done.length)} runs: ${rulers.map((one) => one.label).join(", ")}`;
-  const height = crowded ? 430 : 400;
+  const height = steep ? 470 : crowded ? 430 : 400;
   if (gl) {
     const dimensions = rulers.map((one) => ({ label: escapeText(one.label), values: rows.map(one.value), range: [one.low, one.high], tickvals: one.ticks.map(([at]) => at), ticktext: one.ticks.map(([, text]) => escapeText(text)) }));
-    const data = [{ type: "parcoords", labelangle: crowded ? -18 : 0, labelfont: { size: 13, color: look.ink }, tickfont: { size: 12, color: look.soft }, rangefont: { size: 1, color: "rgba(0,0,0,0)" },
+    const data = [{ type: "parcoords", labelangle: lean, labelfont: { size: 13, color: look.ink }, tickfont: { size: 12, color: look.soft }, rangefont: { size: 1, color: "rgba(0,0,0,0)" },
       line: { color: colours, ...scale }, unselected: { line: { color: look.grid, opacity: 0.35 } }, dimensions, meta: { kind: "parallel" } }];
     return { data, layout: layoutLook(look, width, height, { margin }), label, caption: `${caption} Drag along an axis to keep a range of it; drag a name to move the axis.` };
   }
@@ -53,7 +56,7 @@ function parallel(look, width) {
   data.push({ type: "scatter", mode: "markers", x: [null], y: [null], showlegend: false, hoverinfo: "skip", marker: { color: [low], ...scale }, meta: { kind: "key" } });
   const note = (text, x, more) => ({ text: escapeText(text), x, showarrow: false, ...more });
   const annotations = rulers.flatMap((one, at) => [
-    note(one.label, at, { y: 1, yref: "paper", yanchor: "bottom", yshift: 12, xanchor: crowded && at + 1 < rulers.length ? "left" : "center", textangle: crowded ? -18 : 0 }),
+    note(one.label, at, { y: 1, yref: "paper", yanchor: "bottom", yshift: 12, xanchor: steep || (crowded && at + 1 < rulers.length) ? "left" : "center", textangle: lean }),
     ...one.ticks.map(([tick, text]) => note(text, at, { y: place(one, tick), xanchor: "right", xshift: -3, font: { size: 12, color: look.soft }, bgcolor: fade(look.card, 0.75), borderpad: 0 })),
   ]);
   const shapes = rulers.map((_, at) => ({ type: "line", x0: at, x1: at, y0: 0, y1: 1, line: { color: look.soft, width: 1 }, layer: "above" }));

@@ -86,7 +86,8 @@ function runLink(row) {
 /** The settings of the front in numbers, with links to their runs. */
 function frontTable(heads, lines, all) {
   const rows = (list, tag) => list.map((line) => element("tr", line.map((one) => element(tag, one))));
-  const table = element("table", [element("thead", rows([heads], "th")), element("tbody", rows(lines, "td"))]);
+  const table = element("table", [element("thead", rows([heads], "th")), element("tbody", rows(lines, "td"))], "stack one");
+  for (const row of table.tBodies[0].rows) [...row.cells].forEach((cell, at) => cell.setAttribute("data-head", heads[at]));
   const details = element("details", [element("summary", all === 1 ? "The one setting of the front" : `The ${all} settings of the front`), element("div", table, "scroll")]);
   details.open = all <= 12;
   if (all > lines.length) details.append(element("p", `The first ${lines.length} of ${all}.`, "note"));

@@ -1,7 +1,7 @@
 //! Laws of the page and of figures for papers: complete, escaped, no word that is no number, the same every time.
 
 use super::settings::Settings;
-use super::{Figures, Refused, ShownAxis, SweepView, figures, html, json, png, text};
+use super::{Figures, Learning, Refused, ShownAxis, SweepView, figures, html, json, png, text};
 use crate::lab::table::{Column, ColumnUnit, Role, Table, Values};
 
 struct Sample {
@@ -10,6 +10,7 @@ struct Sample {
     figures: Figures,
     refused: Vec<Refused>,
     notes: Vec<String>,
+    learning: Learning,
 }
 
 const NASTY: &str = "</script><b>\"'&\u{2028}";
@@ -67,6 +68,7 @@ impl Sample {
             },
             refused: vec![Refused { point: 13, what: NASTY.into(), why: NASTY.into() }],
             notes: vec![NASTY.into()],
+            learning: Learning::default(),
         }
     }
 
@@ -80,6 +82,7 @@ impl Sample {
             figures: self.figures.clone(),
             refused: &self.refused,
             not_simulated: &self.notes,
+            learning: &self.learning,
             version: "0.0.0",
         }
     }
@@ -194,7 +197,7 @@ fn figures_for_papers_stand_alone() {
     let sample = Sample::new();
     let drawn = figures(&sample.view());
     let names: Vec<&str> = drawn.iter().map(|figure| figure.name.as_str()).collect();
-    assert_eq!(names, ["curves", "heat", "pareto"]);
+    assert_eq!(names, ["curves", "heat", "pareto", "importance"]);
     for figure in &drawn {
         let svg = &figure.svg;
         assert!(svg.starts_with("<svg xmlns=") && svg.contains("fill=\"#fff\"/>"));
@@ -204,7 +207,8 @@ fn figures_for_papers_stand_alone() {
                 "{bad}"
             );
         }
-        assert!(svg.contains("score (%)"), "{} has its unit", figure.name);
+        let unit = if figure.name == "importance" { "variance of score" } else { "score (%)" };
+        assert!(svg.contains(unit), "{} has its unit", figure.name);
         // A picture of a column's width at about 300 dots an inch.
         let picture = png(svg);
         let reader = png::Decoder::new(std::io::Cursor::new(&picture)).read_info().unwrap();
@@ -217,6 +221,59 @@ fn figures_for_papers_stand_alone() {
     assert!(bits(&drawn[0].svg) && bits(&drawn[1].svg), "every value has its mark");
     assert!(figures(&Sample::hollow().view()).is_empty());
     assert!(png("no svg").is_empty());
+}
+
+#[test]
+fn learning_curves_are_drawn_where_records_have_several_epochs() {
+    let mut sample = Sample::new();
+    let climb = |row: usize| vec![(0, 0.1), (1, 0.4 + 0.01 * row as f64), (2, 0.8)];
+    sample.learning =
+        Learning { label: "validation accuracy".into(), rows: (0..12).map(climb).collect() };
+    let drawn = figures(&sample.view());
+    let learning = drawn.iter().find(|figure| figure.name == "learning").unwrap();
+    assert!(learning.svg.contains("validation accuracy (%)") && learning.svg.contains("epoch"));
+    let data = json::data(&Settings::new(&sample.view()));
+    let data: serde_json::Value = serde_json::from_str(&data).unwrap();
+    assert_eq!(data["learning"]["epochs"], serde_json::json!([0, 1, 2]));
+    assert_eq!(data["learning"]["settings"][0]["mean"], serde_json::json!([0.1, 0.405, 0.8]));
+    assert_eq!(data["learning"]["settings"][0]["n"], 2);
+    // one epoch is no curve
+    sample.learning.rows.iter_mut().for_each(|row| row.truncate(1));
+    assert!(figures(&sample.view()).iter().all(|figure| figure.name != "learning"));
+}
+
+#[test]
+fn an_axis_explains_as_much_of_the_variance_as_its_means_do() {
+    use super::importance::importance;
+    // bits 1 and 2 by two words by two seeds: the score is the bits and a little of the seed
+    let mut sample = Sample::new();
+    for column in &mut sample.table.columns {
+        match &mut column.values {
+            Values::Whole(values) => values.truncate(8),
+            Values::Real(values) => values.truncate(8),
+            Values::Text(values) => values.truncate(8),
+        }
+    }
+    let view = sample.view();
+    let settings = Settings::new(&view);
+    let found = importance(&settings, settings.measure("score").unwrap()).unwrap();
+    let share = |name: &str| found.parts.iter().find(|part| part.name == name).unwrap().share;
+    // sums of squares: 8 x 0.05^2 between the bits, 8 x 0.005^2 between the seeds
+    assert!((share("bits") - 0.02 / 0.0202).abs() < 1e-9, "{found:?}");
+    assert!((share("seeds") - 0.0002 / 0.0202).abs() < 1e-9, "{found:?}");
+    assert!(share("word").abs() < 1e-9 && share("axes together").abs() < 1e-9);
+    assert!(found.balanced && found.runs == 8);
+    assert!((found.parts[0].chance.unwrap() - 1.0 / 7.0).abs() < 1e-12);
+    // the whole sample lacks a run: parts need not add up, and no remainder is told
+    let sample = Sample::new();
+    let view = sample.view();
+    let settings = Settings::new(&view);
+    let found = importance(&settings, settings.measure("score").unwrap()).unwrap();
+    assert!(!found.balanced && found.parts.iter().all(|part| part.name != "axes together"));
+    let hollow = Sample::hollow();
+    let view = hollow.view();
+    let settings = Settings::new(&view);
+    assert_eq!(importance(&settings, settings.measure("score").unwrap()), None);
 }
 
 #[test]

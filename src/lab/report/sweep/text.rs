@@ -2,11 +2,11 @@
 
 use std::fmt::Write as _;
 
-use super::SweepView;
 use super::curves::{held_words, runs};
 use super::paper::short;
 use super::settings::{Levels, Settings};
 use super::statistics::Summary;
+use super::{SweepView, meaning};
 
 /// Lines and columns at most: what a terminal shows at once.
 const LINES_MAX: usize = 40;
@@ -65,6 +65,20 @@ pub fn text(view: &SweepView<'_>) -> Option<String> {
                 format!("{:.2}{}", one.mean * measure.by, half.unwrap_or_default())
             });
             let _ = write!(out, "  {text:>width$}", width = wide(head));
+        }
+    }
+    let width = first.max(x.axis.label.chars().count()).max(measure.column.label.chars().count());
+    let mut explain = |head: &str, words: &str| {
+        let _ = write!(out, "\n{head:>width$}  {words}");
+    };
+    explain(&measure.column.label, &meaning(measure.column));
+    let half = all().any(|one| one.half.is_some()) && !pooled;
+    if half {
+        explain("±", "half of the 95 % interval of the mean over seeds (Student's t)");
+    }
+    for axis in [Some(x), series, panel].into_iter().flatten() {
+        if let Some(column) = view.table.column(&axis.axis.name) {
+            explain(&axis.axis.label, &meaning(column));
         }
     }
     let left = (columns.len() - heads.len(), x.texts.len() - lines.len());

@@ -13,7 +13,7 @@ use super::super::tile::{BankEvents, Command, Launch, Tile, TileEvents, TileSize
 use crate::chip::hardware::timing::tree_levels;
 use crate::chip::hardware::{DitherPattern, Hardware, Timing, WriteScheme};
 use crate::chip::layer::{Delivery, DrivenBy, Layer};
-use crate::chip::ledger::During;
+use crate::chip::ledger::{During, Part};
 use crate::chip::periphery;
 use crate::chip::population::{Stream, Wiring};
 use crate::num::fixed::DriveBits;
@@ -472,6 +472,26 @@ impl TickLayer {
             tile.at_work().map(u64::from);
         let writers = u64::from(self.tiles.iter().any(Tile::is_writing));
         [arrays, converters, in_tree, lanes, bus, multipliers, accumulators, writers]
+    }
+
+    /// What each part of each tile is at in the cycle that begins, in the order of tiles: tile, part, sample, slice. What is
+    /// in the tree belongs to the tile it goes to, and there may be several there at once.
+    pub(super) fn doing(&self) -> impl Iterator<Item = (usize, Part, [Option<usize>; 2])> + '_ {
+        const PARTS: [Part; 7] = [
+            Part::Arrays,
+            Part::Converters,
+            Part::Lanes,
+            Part::Bus,
+            Part::Multipliers,
+            Part::Accumulators,
+            Part::Writers,
+        ];
+        let tiles = self.tiles.iter().enumerate().flat_map(|(at, tile)| {
+            let parts = PARTS.into_iter().zip(tile.doing());
+            parts.filter_map(move |(part, doing)| Some((at, part, doing?)))
+        });
+        let tree = self.tree.iter();
+        tiles.chain(tree.map(|entry| (entry.1, Part::Tree, [Some(entry.3.slot), None])))
     }
 
     /// What was counted since the last call, by plane: banks, and what is beside them.

@@ -3,6 +3,7 @@
 
 use super::super::tile::Tile;
 use super::layer::TickLayer;
+use crate::chip::ledger::Part;
 
 /// One command of a layer, from the cycle in which it was first offered.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -13,6 +14,23 @@ pub struct Span {
     pub name: &'static str,
     /// Which sample, if it is for one.
     pub sample: Option<usize>,
+    /// First cycle.
+    pub start: u64,
+    /// Cycle after the last.
+    pub end: u64,
+}
+
+/// A part of a tile at work without a pause, on one thing.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct PartSpan {
+    /// Which layer.
+    pub layer: usize,
+    /// Which tile of it, counted plane by plane, row by row.
+    pub tile: usize,
+    /// Which part: it is at work as the ledger counts it.
+    pub part: Part,
+    /// Sample and slice that it works on, where there are such.
+    pub on: [Option<usize>; 2],
     /// First cycle.
     pub start: u64,
     /// Cycle after the last.
@@ -37,6 +55,9 @@ type Look = Box<dyn FnMut(u64, &Tile)>;
 #[derive(Default)]
 pub(super) struct Watch {
     spans: Option<Vec<Span>>,
+    /// Parts at work that may go on, by layer and tile.
+    open: Vec<Vec<Vec<PartSpan>>>,
+    over: Vec<PartSpan>,
     tile: Option<(TileAt, Look)>,
 }
 
@@ -47,8 +68,31 @@ impl std::fmt::Debug for Watch {
 }
 
 impl Watch {
-    pub(super) fn keep_spans(&mut self) {
+    /// `tiles`: how many each layer has.
+    pub(super) fn keep_spans(&mut self, tiles: impl Iterator<Item = usize>) {
         self.spans = Some(vec![]);
+        self.open = tiles.map(|tiles| vec![vec![]; tiles]).collect();
+    }
+
+    /// What the parts of a layer do in the cycle that begins.
+    pub(super) fn parts(&mut self, clock: u64, layer: usize, tiles: &TickLayer) {
+        let Some(open) = self.open.get_mut(layer) else { return };
+        for (tile, part, on) in tiles.doing() {
+            let open = &mut open[tile];
+            let same = |span: &&mut PartSpan| (span.part, span.on, span.end) == (part, on, clock);
+            if let Some(span) = open.iter_mut().find(same) {
+                span.end += 1;
+            } else {
+                self.over.extend(open.extract_if(.., |span| span.end < clock));
+                open.push(PartSpan { layer, tile, part, on, start: clock, end: clock + 1 });
+            }
+        }
+    }
+
+    pub(super) fn take_parts(&mut self) -> Vec<PartSpan> {
+        let mut all = std::mem::take(&mut self.over);
+        all.extend(self.open.iter_mut().flatten().flat_map(std::mem::take));
+        all
     }
 
     pub(super) fn take_spans(&mut self) -> Vec<Span> {

@@ -117,6 +117,24 @@ impl Tile {
         ]
     }
 
+    /// What those parts and the writers are at, in the cycle that begins: the sample and the slice, where there are such.
+    /// `None` rests.
+    pub(in super::super) fn doing(&self) -> [Option<[Option<usize>; 2]>; 7] {
+        let [arrays, converters, lanes, bus, multipliers, accumulators] = self.at_work();
+        let sliced = |slot, slice: u32| [Some(slot), usize::try_from(slice).ok()];
+        let (front, conv) = (&self.front, &self.conv);
+        let written = (self.upd.kind == UpdKind::Now).then_some(self.upd.slot);
+        [
+            arrays.then(|| sliced(front.slot, front.slice)),
+            converters.then(|| sliced(conv.slot, conv.slice)),
+            lanes.then_some([Some(self.lane.slot), None]),
+            bus.then_some([Some(self.err.slot), None]),
+            multipliers.then_some([Some(self.err.slot), None]),
+            accumulators.then_some([Some(self.upd.slot), None]),
+            self.is_writing().then_some([written, None]),
+        ]
+    }
+
     /// Codes on the rail and all codes since the last call, by slice, of reads through the rows.
     pub(in super::super) fn take_rails(&mut self) -> Vec<[u64; 2]> {
         let none = vec![[0; 2]; self.rails.len()];

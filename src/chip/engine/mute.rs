@@ -1,0 +1,60 @@
+//! Whether a layer says anything while it is evaluated: a layer whose units put out the same whatever is shown reads
+//! nothing, or nothing but rails.
+//!
+//! ```text
+//! mute = of all samples of an evaluation, of which there are two at least, no activity of a unit differs
+//! ```
+//!
+//! Looked at until the first difference, which is nearly always in the first two samples.
+#![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
+
+use super::{Engine, Phase};
+use crate::chip::crossbar::layout::BLOCK_ROWS;
+
+/// What a layer said since someone asked.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Said {
+    /// What its units put out for the first sample, by target stream: `[block][64]`.
+    first: [Vec<u8>; 2],
+    samples: u64,
+    differs: bool,
+}
+
+impl Engine {
+    pub(super) fn note_said(&mut self, layer: usize) {
+        let said = &mut self.said[layer];
+        if self.phase != Phase::Evaluation || said.differs {
+            return;
+        }
+        let (samples, units) = (self.samples, self.layers[layer].layout.columns);
+        let (head, tail) = self.registers.split_at(layer + 1);
+        let puts_out: [&[u8]; 2] = match tail.first() {
+            Some(next) => next.drives.each_ref().map(|drives| &drives[..]),
+            None => head[layer].activities.each_ref().map(|activities| &activities[..]),
+        };
+        for &target in self.layers[layer].spec.wiring.targets() {
+            let (first, all) = (&mut said.first[target.index()], puts_out[target.index()]);
+            let known = !first.is_empty();
+            // units alone: what lies behind them, a constant row, is no activity
+            for (block, from) in (0..units).step_by(BLOCK_ROWS).enumerate() {
+                let live = (units - from).min(BLOCK_ROWS);
+                let rows = all[block * samples * BLOCK_ROWS..].chunks(BLOCK_ROWS).take(samples);
+                for row in rows {
+                    if first.len() == from {
+                        first.extend_from_slice(&row[..live]);
+                    }
+                    said.differs |= row[..live] != first[from..from + live];
+                }
+            }
+            debug_assert!(known || first.len() == units, "one activity a unit");
+        }
+        said.samples += samples as u64;
+    }
+
+    /// Which layers were mute in the evaluations since the last call, and starts over.
+    pub fn take_mute(&mut self) -> Vec<bool> {
+        let fresh = vec![Said::default(); self.layers.len()];
+        let said = std::mem::replace(&mut self.said, fresh);
+        said.iter().map(|said| said.samples > 1 && !said.differs).collect()
+    }
+}

@@ -1,0 +1,141 @@
+//! What a run takes, weighed before it is taken.
+//!
+//! ```text
+//! wanted = sum over arrays of cells x ( 1 or 2 planes + 2 of a residual + 1 of pruned bits + 4 of a checkpoint )
+//! left   = least of: memory the system can give, what the group of processes may take, what this process may address
+//! ```
+//!
+//! Each cell of a checkpoint is two bytes, once as a tensor and once in the file. What is small is not weighed.
+#![expect(clippy::disallowed_methods, reason = "the system tells its memory in files")]
+
+use std::fmt;
+use std::fs;
+
+use super::RunError;
+use crate::chip::crossbar::layout::Layout;
+use crate::chip::hardware::{FloorKind, Hardware};
+use crate::chip::layer::LayerSpec;
+
+/// Bytes that every system has: runs below are not weighed.
+const SMALL: u64 = 64 << 20;
+
+/// An amount of memory.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Memory(u64);
+
+impl Memory {
+    /// So many bytes.
+    #[must_use]
+    pub const fn of(bytes: u64) -> Self {
+        Self(bytes)
+    }
+
+    /// In bytes.
+    #[must_use]
+    pub const fn bytes(self) -> u64 {
+        self.0
+    }
+
+    /// What is left for this process; `None` where the system does not say.
+    #[must_use]
+    pub fn left() -> Option<Self> {
+        let read = |path: &str| fs::read_to_string(path).ok();
+        let number = |text: &str| text.split_whitespace().find_map(|word| word.parse::<u64>().ok());
+        let line = |text: &str, head: &str| {
+            text.lines().find_map(|line| line.strip_prefix(head)).and_then(number)
+        };
+        let free = read("/proc/meminfo").and_then(|text| line(&text, "MemAvailable:"));
+        let free = free.map(|kib| kib.saturating_mul(1024));
+        let group =
+            |name: &str| read(&format!("/sys/fs/cgroup/memory.{name}")).and_then(|t| number(&t));
+        let group = group("max").map(|most| most.saturating_sub(group("current").unwrap_or(0)));
+        let limits = read("/proc/self/limits");
+        let may = limits.and_then(|text| line(&text, "Max address space"));
+        let used = read("/proc/self/status").and_then(|text| line(&text, "VmSize:"));
+        let own = may.map(|may| may.saturating_sub(used.unwrap_or(0).saturating_mul(1024)));
+        [free, group, own].into_iter().flatten().min().map(Self)
+    }
+
+    /// What the arrays of a network take, and a copy of their state.
+    #[must_use]
+    pub fn of_network(layers: &[LayerSpec], hardware: &Hardware) -> Self {
+        let planes = if hardware.cell.level_bits.get() > 8 { 2 } else { 1 };
+        let residual = if hardware.write.residual_bits.get() > 0 { 2 } else { 0 };
+        let pruned = u64::from(hardware.cell.floor_kind == FloorKind::Absorbing);
+        let of = |layer: &LayerSpec| {
+            let rows = layer.inputs + usize::from(layer.constant_row);
+            let layout = Layout { rows, columns: layer.units };
+            let arrays = layer.wiring.pathways().len() as u64;
+            let cells = |cells: usize| (cells as u64).saturating_mul(arrays);
+            let stored = cells(layout.cells_padded()).saturating_mul(planes + residual + pruned);
+            stored.saturating_add(cells(layout.cells()).saturating_mul(4))
+        };
+        Self(layers.iter().map(of).fold(0, u64::saturating_add))
+    }
+}
+
+impl fmt::Display for Memory {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let mut amount = self.0 as f64;
+        let mut units = ["bytes", "KiB", "MiB", "GiB", "TiB", "PiB", "EiB"].into_iter();
+        let mut unit = units.next().unwrap_or("bytes");
+        while amount >= 1024.0
+            && let Some(next) = units.next()
+        {
+            (amount, unit) = (amount / 1024.0, next);
+        }
+        if unit == "bytes" { write!(f, "{amount} {unit}") } else { write!(f, "{amount:.1} {unit}") }
+    }
+}
+
+/// Whether a network fits into what is left.
+///
+/// # Errors
+/// When it does not, with both amounts.
+pub(crate) fn weigh(
+    layers: &[LayerSpec],
+    hardware: &Hardware,
+    left: Option<Memory>,
+) -> Result<(), RunError> {
+    let wanted = Memory::of_network(layers, hardware);
+    match left {
+        Some(left) if wanted.0 > SMALL && wanted > left => Err(RunError::Memory { wanted, left }),
+        _ => Ok(()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::lab::config::{Sources, load};
+
+    #[test]
+    fn amounts_are_shown_in_three_digits_or_so() {
+        let shown = [0, 1023, 1024, 3 << 29, u64::MAX].map(|bytes| Memory(bytes).to_string());
+        assert_eq!(shown, ["0 bytes", "1023 bytes", "1.0 KiB", "1.5 GiB", "16.0 EiB"]);
+    }
+
+    #[test]
+    fn a_network_that_no_machine_holds_is_refused_with_both_amounts() {
+        let settings =
+            ["network.hidden=[65535, 65535, 65535]".to_owned(), "hw.tile.count=default".to_owned()];
+        let config = load(&Sources { settings: &settings, ..Sources::default() }).unwrap();
+        let experiment = config.experiment(64, 10, None).unwrap();
+        let (layers, hardware) = (&experiment.network.layers, &experiment.hardware);
+        // two layers of 65535 x 65535 in four pathways: a byte, a plane padded, and four of the checkpoint
+        let wanted = Memory::of_network(layers, hardware);
+        let cells = 2 * 4 * 65_535u64.pow(2);
+        assert!((5 * cells..6 * cells).contains(&wanted.bytes()), "{wanted}");
+        let error = weigh(layers, hardware, Some(Memory::of(24 << 30))).unwrap_err().to_string();
+        assert!(error.contains("160.") && error.contains("24.0 GiB"), "{error}");
+        assert!(weigh(layers, hardware, None).is_ok(), "who knows nothing refuses nothing");
+        let small = config.experiment(4, 2, None);
+        assert!(small.is_ok());
+    }
+
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn this_system_says_what_is_left() {
+        assert!(Memory::left().is_some_and(|left| left.bytes() > 0));
+    }
+}
