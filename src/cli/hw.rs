@@ -212,7 +212,7 @@ fn saved(model: &Model, config: &Config, settings: &[String]) -> String {
         "# {} with {}, by `dalean hw show`\n{}",
         model.name,
         settings.join(", "),
-        config.hardware_toml(&format!("{}-changed", model.name))
+        config.hardware_toml(&format!("{}-changed", model.name), settings)
     )
 }
 

@@ -343,8 +343,13 @@ impl Config {
     /// The data in one word, for folder names and titles.
     #[must_use]
     pub fn data_name(&self) -> String {
-        let own = || self.data.format.clone().unwrap_or_else(|| "data".into());
-        self.data.set.clone().unwrap_or_else(own)
+        let own = || {
+            let file = Path::new(self.data.train.as_deref()?).file_name()?.to_string_lossy();
+            let stem = file.split('.').find(|part| !part.is_empty())?.to_owned();
+            Some(stem)
+        };
+        let format = || self.data.format.clone().unwrap_or_else(|| "data".into());
+        self.data.set.clone().or_else(own).unwrap_or_else(format)
     }
 }
 

@@ -23,8 +23,8 @@ const SHOWN_MAX: usize = 6;
 const WORD_MAX: usize = 20;
 
 /// Keys that say what numbers are of and not what a chip does.
-const PROSE: [&str; 7] =
-    ["source", "summary", "not_simulated", "node_nm", "constants_for", "at", "modes"];
+const PROSE: [&str; 8] =
+    ["source", "kind", "summary", "not_simulated", "node_nm", "constants_for", "at", "modes"];
 
 /// A key whose value is another than by saying nothing.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -43,7 +43,6 @@ fn flatten(prefix: &str, table: &toml::Table, into: &mut Vec<(String, String)>) 
         let full = if prefix.is_empty() { key.clone() } else { format!("{prefix}.{key}") };
         match value {
             _ if PROSE.contains(&&**key) => {}
-            _ if key == "kind" && !full.starts_with("hw.adc") => {}
             toml::Value::Table(table) => flatten(&full, table, into),
             value => into.push((full, value.to_string())),
         }

@@ -99,34 +99,44 @@ fn short(number: f64) -> String {
 }
 
 impl Config {
-    /// Its chip as a model file that can be saved and used: every number written out, with its source; tables that no
-    /// file gave are said to be this program's.
+    /// Its chip as a model file that can be saved and used: every number written out, with its source. Tables that no file
+    /// gave are said to be this program's, and those that `settings` change are no longer what their source says.
     ///
     /// # Panics
     /// Never: every key has a TOML form.
     #[must_use]
-    pub(crate) fn hardware_toml(&self, name: &str) -> String {
+    pub(crate) fn hardware_toml(&self, name: &str, settings: &[String]) -> String {
         let ChipFile(mut hw) = self.resolved.hw.clone().unwrap_or_default();
         hw.name = Some(name.to_owned());
-        complete(&mut hw);
+        complete(&mut hw, settings);
         toml::to_string(&hw).expect("every key has a TOML form")
     }
 }
 
-/// Gives a source to tables that have none.
-fn complete(hw: &mut HardwareFile) {
+/// Gives a source to tables that have none, and takes their claim from those that are changed.
+fn complete(hw: &mut HardwareFile, settings: &[String]) {
+    let changed = |table: &str| {
+        let prefix = format!("hw.{table}.");
+        settings.iter().any(|setting| setting.trim().starts_with(&prefix))
+    };
+    let settle = |name: &str, source: &mut Option<String>, kind: &mut Option<String>| {
+        let claim = source.get_or_insert_with(|| "this program's default".into());
+        if changed(name) {
+            *claim = format!("changed by hand; before: {claim}");
+            *kind = Some("assumed".into());
+        }
+        kind.get_or_insert_with(|| "assumed".into());
+    };
     macro_rules! tables {
         ($($name:ident)*) => {$(
             if let Some(table) = &mut hw.$name {
-                table.source.get_or_insert_with(|| "set by hand, or this program's default".into());
-                table.kind.get_or_insert_with(|| "assumed".into());
+                settle(stringify!($name), &mut table.source, &mut table.kind);
             }
         )*};
     }
     tables!(cell tile drive lut error write timing);
     if let Some(AdcFile::Finite(table)) = &mut hw.adc {
-        table.source.get_or_insert_with(|| "set by hand".into());
-        table.kind.get_or_insert_with(|| "assumed".into());
+        settle("adc", &mut table.source, &mut table.kind);
     }
 }
 
@@ -165,7 +175,7 @@ mod tests {
             let settings = if model == "ideal" { &settings[..] } else { &[] };
             let sources = Sources { hardware: Some(model), settings, ..Sources::default() };
             let config = load(&sources).unwrap();
-            let again = used(&config.hardware_toml("saved"));
+            let again = used(&config.hardware_toml("saved", settings));
             assert_eq!(again.hardware, config.hardware, "{model}");
             assert_eq!(again.constants, config.constants, "{model}");
             assert_eq!(again.hardware_name, "saved");

@@ -65,6 +65,14 @@ impl Prices {
     }
 }
 
+/// What real chips do and a run did not.
+///
+/// # Errors
+/// When the folder is not that of a run.
+pub fn absent(path: &Path) -> Result<Vec<Absent>, RunError> {
+    Ok(read_config(path)?.0.absent())
+}
+
 /// Reads a finished run, and another model if one is named.
 ///
 /// # Errors

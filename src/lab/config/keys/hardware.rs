@@ -238,6 +238,7 @@ const WRITE: &[KeyEntry] = &[
     key("train_slots", KeyValues::PowerOfTwo(1, 4))
         .law("at most write.increment_max")
         .unit("slots")
+        .default("4")
         .otherwise("the greatest power of two up to write.increment_max, at most 32")
         .only("with write.scheme = \"rank1\"", &["hw.write.scheme=rank1", "learning.mode=replay"]),
     PROVENANCE[0],

@@ -135,8 +135,13 @@ const NUMBER: &str =
     "{ low = 1, typical = 2, high = 3, source = \"where it is from\", kind = \"assumed\" }";
 
 fn line(key: &KeyShown) -> String {
-    let (takes, default) = (key.entry.takes(), key.entry.default_text());
-    let default = if default.is_empty() { String::new() } else { format!("  [{default}]") };
+    let takes = key.entry.takes();
+    let default = match (key.entry.default, key.entry.otherwise) {
+        ("", "") => String::new(),
+        ("", otherwise) => format!("; without it: {otherwise}"),
+        (default, "") => format!("; default {default}"),
+        (default, otherwise) => format!("; default {default} ({otherwise})"),
+    };
     format!("  {:28} {takes}{default}\n", key.full())
 }
 
