@@ -95,9 +95,9 @@ keys! {
         /// Number of classes; default: as many as there are different labels.
         classes: usize,
         /// CSV: `first`, `last`, a number from 0, or a header; default: told from the table, and said.
-        label_column: String,
+        label_column: ColumnFile,
         /// CSV: columns left out, each a number from 0 or a header; default: those without a name that number the rows.
-        ignore_columns: Vec<String>,
+        ignore_columns: Vec<ColumnFile>,
         /// CSV: whether the first line names the columns; default: told from the table.
         header: bool,
         /// CSV: `,`, `;`, `tab`, `|`; default: what cuts the first lines alike.
@@ -404,6 +404,32 @@ impl<'de> Deserialize<'de> for ChipFile {
             }
             fn visit_map<M: MapAccess<'de>>(self, map: M) -> Result<ChipFile, M::Error> {
                 HardwareFile::deserialize(de::value::MapAccessDeserializer::new(map)).map(ChipFile)
+            }
+        }
+        deserializer.deserialize_any(Either)
+    }
+}
+
+/// A column of a table: a word, or a number from 0 with or without quotes.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[serde(transparent)]
+pub struct ColumnFile(pub String);
+
+impl<'de> Deserialize<'de> for ColumnFile {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct Either;
+        impl Visitor<'_> for Either {
+            type Value = ColumnFile;
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str("a column: `first`, `last`, a number from 0, or a header")
+            }
+            fn visit_str<E: de::Error>(self, text: &str) -> Result<ColumnFile, E> {
+                Ok(ColumnFile(text.into()))
+            }
+            fn visit_i64<E: de::Error>(self, number: i64) -> Result<ColumnFile, E> {
+                let found = de::Unexpected::Signed(number);
+                let number = u64::try_from(number).map_err(|_| E::invalid_value(found, &self))?;
+                Ok(ColumnFile(number.to_string()))
             }
         }
         deserializer.deserialize_any(Either)
