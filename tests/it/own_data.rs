@@ -282,6 +282,11 @@ fn tables_that_cannot_be_right_are_refused_with_a_cure() {
         refused(what, load(folder.path(), &keys), words);
     }
     let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("own.csv"), sound(400)).unwrap();
+    let words: &[&str] =
+        &["every 6th example", "none of those is of the class `0`", "shuffle its examples"];
+    refused("classes in step with the cut", load(folder.path(), own), words);
+    let folder = tempfile::tempdir().unwrap();
     let latin = b"a,label\n1,caf\xe9\n2,caf\xe8\n".repeat(12);
     std::fs::write(folder.path().join("own.csv"), latin).unwrap();
     let words: &[&str] = &["line 2 is not UTF-8", "save the file as UTF-8"];
