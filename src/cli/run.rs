@@ -9,6 +9,7 @@ use serde_json::json;
 
 use super::progress::Meter;
 use super::{Done, Failure, Moved, Shared, configuration, environment, known, note, say, usage};
+use crate::lab::config::absent_words;
 use crate::lab::price::{EnergySplit, PerImage};
 use crate::lab::run::{self, Machine, RunError, RunEvent, Trained, Verdict};
 use crate::lab::runs;
@@ -241,6 +242,7 @@ pub(super) fn eval(args: &EvalArgs) -> Done {
     let (test, state_hash) =
         run::evaluate(&args.run, &args.moved.root(shared.data_root()), shared.machine()?)?;
     let TestOutcome::Classify(TestRecord { epoch, ref select, score, .. }) = test;
+    let absent = run::absent(&args.run)?;
     if shared.json {
         say(&json!({
             "event": "done",
@@ -250,6 +252,7 @@ pub(super) fn eval(args: &EvalArgs) -> Done {
             "epochs": epoch,
             "train_seconds": 0.0,
             "images_per_second": null,
+            "not_simulated": absent,
         })
         .to_string());
     } else {
@@ -259,6 +262,9 @@ pub(super) fn eval(args: &EvalArgs) -> Done {
             score.correct,
             score.total,
         ));
+        if !shared.quiet {
+            say(&format!("beside this {}: see the page of the run", absent_words(&absent)));
+        }
     }
     Ok(())
 }
