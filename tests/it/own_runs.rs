@@ -10,7 +10,7 @@ use super::program::{Ran, dalean, finished, run};
 /// A table of three classes that a small net tells apart.
 fn table(rows: usize) -> String {
     let line = |row: usize| {
-        let class = row % 3;
+        let class = (row * 7919 >> 4) % 3;
         let value = |column: usize| if column == class { 200 + row % 50 } else { row * 7 % 40 };
         format!("{},{},{},{}\n", value(0), value(1), value(2), ["ash", "beech", "oak"][class])
     };

@@ -6,7 +6,7 @@ use super::train::read_config;
 use super::{RunError, records};
 use crate::chip::hardware::Hardware;
 use crate::lab::config::{Absent, Config, Constants, Model, load_model};
-use crate::lab::price::{Bill, Change, Cost, Footprint, Images, changes, price};
+use crate::lab::price::{Bill, Change, Cost, Footprint, Images, areas, changes, price};
 use crate::lab::store::folder::{self, FolderError, names};
 use crate::lab::store::hash;
 use crate::lab::store::ledger::LedgerRecord;
@@ -132,6 +132,13 @@ impl Repriced {
     #[must_use]
     pub fn bill(&self) -> Bill<'_> {
         price(&self.ledger, &self.plan, &self.hardware, &self.constants, &self.changes)
+    }
+
+    /// Square millimetres of the network's converters, if the model gives them for this chip.
+    #[must_use]
+    pub fn converters_mm2(&self) -> Option<f64> {
+        let all = areas(&self.plan, &self.hardware, &self.constants);
+        all.into_iter().find(|(name, _)| *name == "adc").map(|(_, area)| area[1] * 1e6)
     }
 
     /// Its totals.
