@@ -255,7 +255,7 @@ fn show(model: &Model, config: &Config, quiet: bool) {
         say(&format!("  {name:16} {value}"));
     }
     if let Some(timing) = config.hardware.timing {
-        say(&format!("  {:16} {}", "conversion", conversion_text(&config, &timing)));
+        say(&format!("  {:16} {}", "conversion", conversion_text(config, &timing)));
         say(&format!("  {:16} {}", "timing", timing_text(&timing)));
         say("\nOn a full tile, ten error words:");
         for figure in figures(&config.hardware, WORDS) {
