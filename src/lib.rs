@@ -73,8 +73,9 @@ pub use crate::task::classify::{
 /// ```
 pub mod hardware {
     pub use crate::chip::hardware::{
-        Adc, AdcRange, CellSpec, DigitalSpec, DitherBits, DitherPattern, DriveSpec, FloorKind,
-        PulseCode, Subtract, TileSpec, Timing, Window, WriteScheme, WriteSpec,
+        Adc, AdcRange, CellSpec, ConverterKind, DigitalSpec, DitherBits, DitherPattern, DriveSpec,
+        FloorKind, PulseCode, SliceTime, SliceTimes, Subtract, TileSpec, Timing, Window,
+        WriteScheme, WriteSpec,
     };
     pub use crate::num::fixed::{
         AdcBits, DriveBits, ErrorBits, IncrementMax, LevelBits, LutBits, OutOfRange, ResidualBits,

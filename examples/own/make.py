@@ -1,4 +1,4 @@
-"""Makes the files of this folder: 240 pictures of 4 x 4, each a bright row, column or diagonal in noise.
+"""Makes the files of this folder: 240 pictures of 4 x 4, each with a bright beam at the left, in the middle or at the right.
 
     python3 examples/own/make.py          (NumPy)
 """
@@ -11,28 +11,21 @@ import numpy as np
 
 here = pathlib.Path(__file__).parent
 rng = np.random.default_rng(7)
-names = ["column", "diagonal", "row"]
+names = ["left", "middle", "right"]
 
 kind = rng.integers(0, 3, 240)
-images = rng.integers(0, 90, (240, 4, 4))
+images = rng.integers(0, 120, (240, 4, 4))
 for image, which in zip(images, kind):
-    at = rng.integers(0, 4)
-    bright = rng.integers(150, 256, 4)
-    if names[which] == "row":
-        image[at, :] = bright
-    elif names[which] == "column":
-        image[:, at] = bright
-    else:
-        image[range(4), [(i + at) % 4 for i in range(4)]] = bright
+    image[:, which : which + 2] = rng.integers(90, 256, (4, 2))
 images = images.astype(np.uint8)
 
-with open(here / "lines.csv", "w", newline="") as file:
+with open(here / "beams.csv", "w", newline="") as file:
     table = csv.writer(file)
-    table.writerow(["shape", *(f"pixel{i}" for i in range(16))])
+    table.writerow(["beam", *(f"pixel{i}" for i in range(16))])
     table.writerows([names[k], *row] for k, row in zip(kind, images.reshape(240, 16).tolist()))
 
 np.savez_compressed(
-    here / "lines.npz",
+    here / "beams.npz",
     x_train=images[:200], y_train=kind[:200], x_test=images[200:], y_test=kind[200:],
 )
 
@@ -42,5 +35,5 @@ def idx(array):
     return head + array.astype(np.uint8).tobytes()
 
 
-(here / "lines-images-idx3-ubyte").write_bytes(idx(images))
-(here / "lines-labels-idx1-ubyte").write_bytes(idx(kind))
+(here / "beams-images-idx3-ubyte").write_bytes(idx(images))
+(here / "beams-labels-idx1-ubyte").write_bytes(idx(kind))

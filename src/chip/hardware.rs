@@ -5,8 +5,13 @@ use crate::num::fixed::{
     AdcBits, DriveBits, ErrorBits, IncrementMax, LevelBits, LutBits, OutOfRange, ResidualBits,
 };
 
+pub mod converter;
+pub mod read_time;
 pub mod timing;
 
+pub use converter::ConverterKind;
+pub(crate) use read_time::ReadTime;
+pub use read_time::{SliceTime, SliceTimes};
 pub use timing::{PulseCode, Timing};
 
 /// The programming window of a cell: `floor < ceiling <= level_max`.
@@ -349,6 +354,13 @@ impl Hardware {
         }
         if let Some(timing) = timing {
             timing.check()?;
+            let slices = drive_bits.get().div_ceil(*dac_bits);
+            let listed = timing.slices.map_or(u64::from(slices), |own| own.iter().len() as u64);
+            if listed != u64::from(slices) {
+                let found = format!("are {listed}");
+                let allowed = format!("a drive code of this chip is read in {slices}");
+                return Err(HardwareError { key: "timing.slices", found, allowed });
+            }
         }
         if let WriteScheme::Trains { slots_log2 } = *scheme {
             check_trains(slots_log2, *increment_max, *residual_bits, *timing)?;

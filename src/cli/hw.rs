@@ -14,6 +14,8 @@ use crate::lab::config::{
 };
 use crate::lab::price::{Convention, bounds, figures, peak, prefixed};
 
+mod modes;
+
 /// Error words that `hw show` reckons with: those of ten classes.
 const WORDS: u64 = 10;
 
@@ -90,9 +92,22 @@ pub(super) struct PeakArgs {
     /// Cells of a weight: 2 of a pair, 8 where a design joins eight
     #[arg(long, value_name = "N", default_value_t = 2)]
     cells: u64,
+    /// Every way to use the chip that its model lists under [modes]
+    #[arg(long, conflicts_with = "slices")]
+    modes: bool,
+    /// With --modes, widths of its converters: 8, or 3..10
+    #[arg(long, value_name = "BITS", requires = "modes", value_parser = widths)]
+    adc_bits: Option<Widths>,
     /// One JSON object on standard output
     #[arg(long)]
     json: bool,
+}
+
+/// Widths of a converter.
+type Widths = Vec<i64>;
+
+fn widths(text: &str) -> Result<Widths, String> {
+    modes::widths(text)
 }
 
 pub(super) fn execute(command: &HwCommand) -> Done {
@@ -122,6 +137,7 @@ pub(super) fn execute(command: &HwCommand) -> Done {
             }
             Ok(())
         }
+        HwCommand::Peak(args) if args.modes => modes::show(args),
         HwCommand::Peak(args) => show_peak(args),
         HwCommand::Check { model, json, quiet } => check(model, *json, *quiet),
     }
@@ -206,8 +222,9 @@ fn model_json(model: &Model, config: &Config) -> serde_json::Value {
         .iter()
         .map(|c| {
             json!({"key": c.key, "low": c.value[0], "typical": c.value[1], "high": c.value[2],
-                "kind": c.kind, "source": c.source, "class": c.quantity.class().name(),
-                "scaled": c.scaled(), "not_priced_here": c.not_here()})
+                "kind": c.kind, "source": c.source, "node_nm": c.node_nm,
+                "class": c.quantity.class().name(), "scaled": c.scaled(),
+                "not_priced_here": c.not_here()})
         })
         .collect();
     let times: Vec<_> = config
@@ -233,11 +250,15 @@ fn changed(model: &str, settings: &[String]) -> Result<Config, Failure> {
 }
 
 fn show(model: &Model, config: &Config, quiet: bool) {
-    say(&format!("{}: {}\n", model.name, model.summary));
+    say(&format!("{}: {}\n", config.hardware_name, config.hardware_summary()));
     for (name, value) in numbers(&config.hardware) {
         say(&format!("  {name:16} {value}"));
     }
+    if let Some(nodes) = config.constants.node_words() {
+        say(&format!("  {:16} {nodes}", "node"));
+    }
     if let Some(timing) = config.hardware.timing {
+        say(&format!("  {:16} {}", "conversion", conversion_text(config, &timing)));
         say(&format!("  {:16} {}", "timing", timing_text(&timing)));
         say("\nOn a full tile, ten error words:");
         for figure in figures(&config.hardware, WORDS) {
@@ -279,12 +300,33 @@ fn constant_text(constant: &Constant, unit: &str) -> String {
         }
         _ => bounds(constant.value, unit),
     };
+    let node = constant.node_nm.map_or_else(String::new, |node| format!(", {node} nm"));
     let standing = match &constant.standing {
         Standing::Stated => String::new(),
         Standing::Scaled(law) => format!(", by law: {law}"),
-        Standing::NotHere(why) => format!(", not priced for this setting: {why}"),
+        Standing::NotHere(why) => return format!("not priced for this setting: {why}"),
     };
-    format!("{value:36} {kind}{standing}")
+    format!("{value:36} {kind}{node}{standing}")
+}
+
+/// What a conversion takes, and why.
+fn conversion_text(config: &Config, timing: &Timing) -> String {
+    let kind = config.converter_kind();
+    let steps = match config.hardware.adc {
+        Adc::Finite { bits, .. } => kind.steps(bits.get()),
+        Adc::Ideal => None,
+    };
+    let steps = steps.map_or_else(String::new, |steps| {
+        format!(", {steps} steps of {}", timing.convert / steps.max(1))
+    });
+    let slices = timing.slices.iter().flat_map(|own| own.iter());
+    let slices = slices.map(|slice| format!("{} + {}", slice.settle, slice.convert));
+    let slices: Vec<_> = slices.collect();
+    let slices = match slices.is_empty() {
+        true => String::new(),
+        false => format!("; by phase, settle + convert: {}", slices.join(", ")),
+    };
+    format!("{}: {} cycles{steps}{slices}", kind.name(), timing.convert)
 }
 
 fn timing_text(timing: &Timing) -> String {

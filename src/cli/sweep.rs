@@ -104,7 +104,8 @@ pub(super) fn execute(args: &SweepArgs) -> Done {
     if shared.json {
         say(&json!({"event": "done", "sweep": name, "store": path.display().to_string(),
             "points": plan.points.len(), "runs": runs, "finished": finished, "failed": failed,
-            "seconds": seconds, "page": page.display().to_string()})
+            "seconds": seconds, "page": page.display().to_string(),
+            "not_simulated": made.not_simulated})
         .to_string());
     } else {
         made.text.iter().filter(|_| !shared.quiet).for_each(|text| say(&format!("{text}\n")));
@@ -113,6 +114,15 @@ pub(super) fn execute(args: &SweepArgs) -> Done {
             if failed > 0 { format!(", {failed} failed") } else { String::new() },
             clock(Duration::from_secs_f64(seconds)),
         ));
+        let mut effects: Vec<_> =
+            made.not_simulated.iter().filter_map(|text| text.split(" = ").next()).collect();
+        effects.dedup();
+        if !effects.is_empty() {
+            let count = effects.len();
+            say(&format!(
+                "beside   {count} effects of real chips are not simulated: see the report"
+            ));
+        }
         say(&format!("report   {}", page.display()));
         say(&format!("table    dalean export {} --sweep {name}", path.display()));
     }

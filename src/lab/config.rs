@@ -5,6 +5,7 @@
 //! The result is a [`Config`], which can be written back as one self-contained file.
 
 mod absent;
+mod changed;
 mod check;
 mod chip;
 mod data;
@@ -15,6 +16,7 @@ pub mod file;
 mod given;
 mod hardware;
 pub mod keys;
+mod law;
 mod layers;
 mod quantity;
 pub mod sweep;
@@ -27,6 +29,7 @@ pub use defaults::{SET_DEFAULTS, SetDefaults};
 pub use differs::{Difference, flat};
 pub use file::{ExperimentFile, HardwareFile};
 pub use hardware::{Model, builtin_models, load_model, model_names};
+pub use law::{Law, Setting, SettingValue};
 pub use layers::{Overlay, Sources, anchor, load, overlay, setting, setting_table};
 pub use quantity::{
     Constant, Constants, CostClass, CostTable, Kind, Per, QUANTITIES, Quantity, Standing,

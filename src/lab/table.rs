@@ -22,6 +22,8 @@ pub enum ColumnUnit {
     Seconds,
     /// Joules.
     Joules,
+    /// Square millimetres.
+    SquareMillimetres,
 }
 
 impl ColumnUnit {
@@ -34,6 +36,7 @@ impl ColumnUnit {
             Self::Cycles => "cycles",
             Self::Seconds => "s",
             Self::Joules => "J",
+            Self::SquareMillimetres => "mm2",
         }
     }
 }

@@ -50,6 +50,7 @@ fn timing() -> Timing {
         pulse_code: PulseCode::Unary,
         verify: false,
         active_max: None,
+        slices: None,
     }
 }
 

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use dalean::lab::config::model_names;
+use dalean::lab::config::{Per, model_names};
 use serde_json::Value;
 
 use super::program::{SMALL, dalean, run, trained};
@@ -48,6 +48,14 @@ fn the_example_of_the_documents_is_valid_and_every_quantity_is_described() {
     assert_eq!(ran.code, Some(0), "{ran:?}");
     for quantity in dalean::lab::config::QUANTITIES {
         assert!(text.contains(&format!("`{}`", quantity.name)), "{}", quantity.name);
+        // an event's line ends in the settings that its number belongs to
+        let line = text.lines().find(|line| line.starts_with(&format!("| `{}` |", quantity.name)));
+        if let (Some(line), Per::Event(_)) = (line, quantity.per) {
+            let settings: Vec<_> =
+                quantity.belongs.iter().map(|setting| format!("`{}`", setting.name())).collect();
+            let column = line.trim_end_matches('|').rsplit('|').next().unwrap().trim();
+            assert_eq!(column, settings.join(", "), "{}", quantity.name);
+        }
     }
     for name in model_names() {
         assert!(text.contains(&format!("| `{name}` |")), "{name}");
@@ -172,4 +180,60 @@ fn an_electronic_and_a_photonic_chip_learn_the_same_integers() {
     }
     assert!(hashes.windows(2).all(|two| two[0] == two[1]), "{hashes:?}");
     assert!(times[0] != times[1]);
+}
+
+/// 4, 6, 8 and 12 bits cost the same once: now a conversion takes the steps of its kind, and its energy and area follow the
+/// law that the model states, or have no price and the total says so.
+#[test]
+fn bits_of_a_converter_cost_cycles_energy_and_area() {
+    let act = |settings: &[&str]| {
+        let mut command = dalean();
+        command.args(["profile", SMALL, "--json"]);
+        settings.iter().for_each(|setting| _ = command.args(["--set", setting]));
+        let ran = run(&mut command);
+        assert_eq!(ran.code, Some(0), "{ran:?}");
+        lines(&ran.stdout).into_iter().find(|act| act["act"] == "inference").unwrap()
+    };
+    let conversion = |act: &Value| {
+        let groups = act["by_component"].as_array().unwrap().clone();
+        let found = groups.into_iter().find(|group| group["name"] == "conversion");
+        found.map(|group| numbers(&group["joules"])[1])
+    };
+    let cycles = |act: &Value| act["cycles"]["elapsed"].as_u64().unwrap();
+    let of = |bits: u32| act(&["hw.model=reram", &format!("hw.adc.bits={bits}")]);
+    let acts: Vec<_> = [4, 6, 8, 12].map(of).to_vec();
+    for (two, times) in acts.windows(2).zip([4.0, 4.0, 16.0]) {
+        let [a, b] = [&two[0], &two[1]].map(|act| conversion(act).unwrap());
+        assert!(same(b, times * a), "{a} {b}");
+        assert!(cycles(&two[0]) < cycles(&two[1]));
+        assert!(!two[1]["joules"].is_null(), "every part has a price");
+    }
+    // a flash converter takes a step whatever its bits, and a SAR's energy says nothing of it
+    let flash = act(&["hw.model=reram", "hw.adc.converter=flash"]);
+    assert!(cycles(&flash) < cycles(&acts[1]));
+    assert!(flash["joules"].is_null() && conversion(&flash).is_none());
+    assert_eq!(flash["parts_priced"].as_u64().unwrap() + 1, flash["parts"].as_u64().unwrap());
+    assert!(flash["operations_per_joule"].is_null(), "no efficiency of a partial sum");
+    let why = flash["not_priced"][0]["why"].as_str().unwrap();
+    assert!(why.contains("converter sar") && why.contains("flash"), "{why}");
+}
+
+/// One command prints what the model predicts for every pair of input and output bits.
+#[test]
+fn the_modes_of_a_chip_are_printed_by_one_command() {
+    let command = ["hw", "peak", "neurram", "--modes", "--adc-bits", "3..10"];
+    let ran = run(dalean().args(command));
+    assert_eq!(ran.code, Some(0), "{ran:?}");
+    let line = |name: &str| -> Vec<f64> {
+        let line = ran.stdout.lines().find(|line| line.trim().starts_with(name)).unwrap();
+        line.split_whitespace().skip(2).map(|number| number.parse().unwrap()).collect()
+    };
+    for (inputs, outputs, tops) in [(1, 3, 2.1113), (4, 6, 0.7845), (8, 10, 0.2769)] {
+        let found = line(&format!("{inputs}-bit"))[outputs - 3];
+        assert!((found - tops).abs() < 1e-3, "({inputs}, {outputs}): {found}");
+    }
+    let ran = run(dalean().args(command).arg("--json"));
+    assert_eq!(lines(&ran.stdout).len(), 64);
+    let ran = run(dalean().args(["hw", "peak", "reram", "--modes"]));
+    assert_eq!((ran.code, ran.stderr.contains("lists no [modes]")), (Some(2), true), "{ran:?}");
 }

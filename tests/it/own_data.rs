@@ -133,7 +133,7 @@ fn tables_that_cannot_be_right_are_refused_with_a_cure() {
         (
             "two columns of text",
             at(""),
-            "a,kind,colour\n1,cat,red\n2,dog,blue\n".repeat(1),
+            "a,kind,colour\n1,cat,red\n2,dog,blue\n".into(),
             &["`kind`, `colour` may each be the label", "data.label_column = \"kind\""],
         ),
         (
@@ -281,6 +281,16 @@ fn tables_that_cannot_be_right_are_refused_with_a_cure() {
         std::fs::write(folder.path().join("own.csv"), &text).unwrap();
         refused(what, load(folder.path(), &keys), words);
     }
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("own.csv"), sound(400)).unwrap();
+    let words: &[&str] =
+        &["every 6th example", "none of those is of the class `0`", "shuffle its examples"];
+    refused("classes in step with the cut", load(folder.path(), own), words);
+    let folder = tempfile::tempdir().unwrap();
+    let latin = b"a,label\n1,caf\xe9\n2,caf\xe8\n".repeat(12);
+    std::fs::write(folder.path().join("own.csv"), latin).unwrap();
+    let words: &[&str] = &["line 2 is not UTF-8", "save the file as UTF-8"];
+    refused("Latin-1, whose words could become one", load(folder.path(), own), words);
 }
 
 /// An error that holds all these words.
@@ -356,13 +366,16 @@ fn parts_that_do_not_belong_together_are_refused_with_a_cure() {
     );
 }
 
+/// What it is, the array of values, the array of labels, and words of the refusal.
+type ArrayCase<'a> = (&'a str, Vec<u8>, Vec<u8>, &'a [&'a str]);
+
 #[test]
 fn arrays_that_cannot_be_right_are_refused_with_a_cure() {
     let own = "format = \"npz\"\ntrain = \"x.npy\"\ntrain_labels = \"y.npy\"";
     let twelve: Vec<u8> = (0..12).collect();
     let (x, y) = (floats(&[0.5, 0.25, 1.0, 0.0].repeat(3)), whole(&[0, 1].repeat(6)));
     let bad = |x: f32| floats(&[&[x, 0.5][..], &[0.25; 10]].concat());
-    let cases: Vec<(&str, Vec<u8>, Vec<u8>, &[&str])> = vec![
+    let cases: [ArrayCase<'_>; 14] = [
         ("NaN", bad(f32::NAN), y.clone(), &["hold NaN", "a missing value", "nan_to_num"]),
         ("infinity", bad(f32::INFINITY), y.clone(), &["hold inf", "fill the gap"]),
         ("standardised values", bad(-1.5), y.clone(), &["reach from -1.5 to 0.5", "(x - least)"]),

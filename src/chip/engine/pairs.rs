@@ -37,6 +37,7 @@ fn engine(adc: Adc, backend: Backend) -> Engine {
         pulse_code: PulseCode::Unary,
         verify: false,
         active_max: None,
+        slices: None,
     };
     let chip = Hardware::reference().with(|h| {
         (h.tile.rows, h.tile.columns) = (64, 32);

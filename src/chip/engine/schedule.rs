@@ -22,8 +22,8 @@
 use std::ops::Range;
 
 use super::Write;
-use crate::chip::hardware::Hardware;
 use crate::chip::hardware::timing::{Timing, tree_levels};
+use crate::chip::hardware::{Hardware, ReadTime};
 use crate::chip::layer::Layer;
 use crate::chip::ledger::{Cycles, During, Interval, Part};
 use crate::chip::population::Stream;
@@ -148,7 +148,7 @@ enum Segment {
 #[derive(Debug, Clone)]
 pub(super) struct Schedule {
     timing: Timing,
-    slices: u64,
+    reads: ReadTime,
     shapes: Vec<Shape>,
     segment: Segment,
 }
@@ -169,7 +169,7 @@ impl Schedule {
         };
         Self {
             timing,
-            slices: u64::from(hardware.slices()),
+            reads: ReadTime::new(hardware, timing),
             shapes: layers.iter().map(shape).collect(),
             segment: Segment::Nothing,
         }
@@ -187,14 +187,14 @@ impl Schedule {
         if samples == 0 {
             return;
         }
-        let (t, shape, ns) = (self.timing, self.shapes[layer], self.slices);
+        let (t, shape) = (self.timing, self.shapes[layer]);
         let joins = matches!(self.segment, Segment::Reads { next, .. } if next == layer);
         if !joins {
             self.settle(cycles);
             self.segment = Segment::Reads { next: layer, samples: 0, latency: 0, again: 0 };
         }
-        let one = t.accept() + t.read(ns, shape.columns, shape.levels[0]);
-        let front = t.accept() + t.read_again(ns, shape.columns);
+        let one = t.accept() + self.reads.read(1, shape.columns, shape.levels[0]);
+        let front = t.accept() + self.reads.again(1, shape.columns);
         if let Segment::Reads { next, samples: count, latency, again } = &mut self.segment {
             *next = layer + 1;
             *count = samples as u64;
@@ -203,21 +203,21 @@ impl Schedule {
         }
         let count = samples as u64;
         cycles.occupy(layer, During::ForwardRows, count * front);
-        self.engage_read(cycles, layer, count * ns, count, shape.columns, shape.levels[0]);
+        self.engage_read(cycles, layer, [count, 1], shape.columns, shape.levels[0]);
     }
 
+    /// So many reads, each of which goes through all slices so many times.
     fn engage_read(
         &self,
         cycles: &mut Cycles,
         layer: usize,
-        slices: u64,
-        reads: u64,
+        [reads, times]: [u64; 2],
         lines: u64,
         levels: u64,
     ) {
         let t = self.timing;
-        cycles.engage(layer, Part::Arrays, slices * t.settle);
-        cycles.engage(layer, Part::Converters, slices * t.conversion());
+        cycles.engage(layer, Part::Arrays, reads * times * self.reads.arrays);
+        cycles.engage(layer, Part::Converters, reads * times * self.reads.converters);
         cycles.engage(layer, Part::Tree, reads * t.beat * levels);
         cycles.engage(layer, Part::Lanes, reads * t.beat * t.groups(lines));
     }
@@ -286,8 +286,8 @@ impl Schedule {
         {
             self.settle(cycles);
         }
-        let (t, shape, slices) = (self.timing, self.shapes[layer], 2 * self.slices);
-        let one = t.accept() + t.read(slices, shape.rows, shape.levels[1]);
+        let (t, shape) = (self.timing, self.shapes[layer]);
+        let one = t.accept() + self.reads.read(2, shape.rows, shape.levels[1]);
         for round in self.rounds(cycles, &(0..samples)) {
             round.close();
             round.passed[Interval::Columns as usize] += one;
@@ -296,9 +296,9 @@ impl Schedule {
             *columns = true;
         }
         let count = samples as u64;
-        let front = t.accept() + t.read_again(slices, shape.rows);
+        let front = t.accept() + self.reads.again(2, shape.rows);
         cycles.occupy(layer, During::ForwardColumns, count * front);
-        self.engage_read(cycles, layer, count * slices, count, shape.rows, shape.levels[1]);
+        self.engage_read(cycles, layer, [count, 2], shape.rows, shape.levels[1]);
     }
 
     /// `UPD(add)`.

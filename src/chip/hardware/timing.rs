@@ -4,6 +4,7 @@
 //! FWD, samples and holds overlapped   T_A + (NS - 1) max(T_A, conv) + conv + T_tree + NG      conv = S T_C
 //! FWD, not overlapped                 NS (T_A + conv) + T_tree + NG                           NG = ceil(C / U)
 //! until the next FWD                  max(NS period, NG)            period = max(T_A, conv), or T_A + conv
+//! slices that take unequal times      see `read_time`
 //! words formed in the error unit       ceil(CE N / U)              of N words, each a sum of CE
 //! ERR                                 CE + H + NG
 //! UPD add                             rows NG
@@ -14,6 +15,7 @@
 //! `beat` cycles where these formulas say one. See docs/TILE.md and docs/MODEL.md, 4.5.
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
+use super::read_time::SliceTimes;
 use super::{HardwareError, between};
 
 /// How the pulses of a row are given.
@@ -44,6 +46,7 @@ pub enum PulseCode {
 ///     pulse_code: PulseCode::Unary,
 ///     verify: false,
 ///     active_max: None,
+///     slices: None,
 /// };
 /// assert!(Hardware::reference().with(|parts| parts.timing = Some(timing)).is_ok());
 /// let stuck = Timing { lanes: 0, ..timing };
@@ -56,9 +59,9 @@ pub struct Timing {
     /// Cycles of a digital action (look-up group, bus word, tree level, accumulation, row turn-around): 1, or the
     /// symbols of a digital clock on a chip whose clock is optical.
     pub beat: u64,
-    /// `T_A`: cycles to settle and sample.
+    /// `T_A`: cycles to settle and sample, of the first slice.
     pub settle: u64,
-    /// `T_C`: cycles of a conversion.
+    /// `T_C`: cycles of a conversion, of the first slice and of a read that verifies.
     pub convert: u64,
     /// `S`: columns that share a converter.
     pub share: u64,
@@ -76,6 +79,8 @@ pub struct Timing {
     pub verify: bool,
     /// `W`: cells that can be pulsed at a time; `None` is a whole row of both banks.
     pub active_max: Option<u64>,
+    /// What each slice takes, where not all take what the first one does.
+    pub slices: Option<SliceTimes>,
 }
 
 /// Most cycles of one action: 0.1 s at 1 GHz.
@@ -97,6 +102,7 @@ impl Timing {
             pulse_code: _,
             verify: _,
             active_max,
+            slices,
         } = *self;
         between("timing.clock_mhz", clock_khz, [1, 1_000_000_000])?;
         between("timing.beat_cycles", beat, [1, 1_000_000])?;
@@ -107,6 +113,9 @@ impl Timing {
         between("timing.lanes", lanes, [1, 32_768])?;
         between("timing.bus_hops", hops, [0, 1_000_000])?;
         between("timing.pulse_cycles", pulse, [1, CYCLES_MAX])?;
+        if let Some(slices) = slices {
+            slices.check(settle, convert)?;
+        }
         active_max.map_or(Ok(()), |cells| between("timing.write_active_max", cells, [1, 65_536]))
     }
 
@@ -116,36 +125,10 @@ impl Timing {
         self.share * self.convert
     }
 
-    /// Cycles from one slice to the next.
-    #[must_use]
-    pub(crate) const fn period(&self) -> u64 {
-        if !self.overlapped {
-            self.settle + self.conversion()
-        } else if self.settle > self.conversion() {
-            self.settle
-        } else {
-            self.conversion()
-        }
-    }
-
     /// `NG`: turns in which the lanes see all of so many columns.
     #[must_use]
     pub(crate) const fn groups(&self, columns: u64) -> u64 {
         columns.div_ceil(self.lanes)
-    }
-
-    /// Busy cycles of a read in so many slices, of this many columns, whose tiles are added in `levels` steps.
-    #[must_use]
-    pub(crate) const fn read(&self, slices: u64, columns: u64, levels: u64) -> u64 {
-        let tail = self.conversion() + self.beat * (levels + self.groups(columns));
-        self.settle + (slices - 1) * self.period() + tail
-    }
-
-    /// Busy cycles until the front end takes the next read.
-    #[must_use]
-    pub(crate) const fn read_again(&self, slices: u64, columns: u64) -> u64 {
-        let (front, lanes) = (slices * self.period(), self.beat * self.groups(columns));
-        if front > lanes { front } else { lanes }
     }
 
     /// Busy cycles of `ERR` with so many words.
@@ -220,21 +203,8 @@ mod tests {
         pulse_code: PulseCode::Unary,
         verify: false,
         active_max: None,
+        slices: None,
     };
-
-    #[test]
-    fn a_read_is_what_the_formula_says() {
-        // conv 16 > settle 10: 10 + 3 x 16 + 16 + 2 + ceil(18 / 4)
-        assert_eq!(TIMING.read(4, 18, 2), 10 + 48 + 16 + 2 + 5);
-        assert_eq!(TIMING.read_again(4, 18), 64);
-        let apart = Timing { overlapped: false, ..TIMING };
-        assert_eq!((apart.read(4, 18, 2), apart.read_again(4, 18)), (4 * 26 + 2 + 5, 4 * 26));
-        let analog = Timing { settle: 20, ..TIMING };
-        assert_eq!((analog.read(4, 18, 2), analog.read_again(4, 18)), (20 + 60 + 16 + 7, 80));
-        // one lane for 100 columns is slower than one slice
-        let slow = Timing { lanes: 1, ..TIMING };
-        assert_eq!((slow.read_again(1, 16), slow.read_again(1, 17)), (16, 17));
-    }
 
     #[test]
     fn a_verified_pulse_is_read() {

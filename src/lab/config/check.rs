@@ -4,11 +4,14 @@
 use std::collections::BTreeMap;
 use std::fmt::Display;
 
+use super::changed::{self, UnderModel};
 use super::defaults::SetDefaults;
 use super::file::{ChipFile, DataFile, ExperimentFile, LearningFile, NetworkFile, PerLayer};
-use super::quantity::Constants;
+use super::hardware::check_marks;
+use super::law::{kind_of, settings};
+use super::quantity::{Constants, constants_of};
 use super::{ConfigError, Sources, chip, data};
-use crate::chip::hardware::Hardware;
+use crate::chip::hardware::{ConverterKind, Hardware};
 use crate::lab::near;
 use crate::learn::error::Centre;
 use crate::learn::route::Route;
@@ -168,12 +171,14 @@ pub(super) fn positive(key: &str, value: f64) -> Result<Positive, ConfigError> {
 }
 
 /// Checks a whole configuration.
-pub(super) fn config(mut file: ExperimentFile) -> Result<Config, ConfigError> {
+pub(super) fn config(mut file: ExperimentFile, model: &UnderModel) -> Result<Config, ConfigError> {
     word("task", &mut file.task, "classify", &[("classify", ())])?;
     let seed = *file.seed.get_or_insert(1);
     let ChipFile(hw) = file.hw.get_or_insert_with(ChipFile::default);
     let hardware = chip::resolve(hw, "hw.")?;
-    let constants = Constants::new(hw, "hw.")?;
+    check_marks(hw, "hw.")?;
+    changed::settle(hw, model, &settings(&hardware, kind_of(hw)));
+    let constants = constants_of(hw, &hardware, "hw.")?;
     let hardware_name = hw.name.get_or_insert_with(|| "unnamed".into()).clone();
     let not_simulated = hw.not_simulated.clone().unwrap_or_default();
     let data = data::resolve(file.data.get_or_insert_with(DataFile::default))?;
@@ -287,6 +292,23 @@ impl Config {
     #[must_use]
     pub const fn constants(&self) -> &Constants {
         &self.constants
+    }
+
+    /// What the chip is, in a sentence, and what was changed of its model.
+    pub(crate) fn hardware_summary(&self) -> &str {
+        let hw = self.resolved.hw.as_ref();
+        hw.and_then(|hw| hw.summary.as_deref()).unwrap_or_default()
+    }
+
+    /// Name of the model under the chip, whatever was laid over it.
+    pub(crate) fn model_name(&self) -> &str {
+        self.hardware_name.strip_suffix(changed::SUFFIX).unwrap_or(&self.hardware_name)
+    }
+
+    /// What kind of converters the chip has.
+    #[must_use]
+    pub(crate) fn converter_kind(&self) -> ConverterKind {
+        self.resolved.hw.as_ref().map_or(ConverterKind::Fixed, |hw| kind_of(hw))
     }
 
     /// The configuration as one self-contained file, every default written out.

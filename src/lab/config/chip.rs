@@ -8,9 +8,9 @@ use super::file::{
 };
 use crate::chip::hardware::timing::CYCLES_MAX;
 use crate::chip::hardware::{
-    Adc, AdcRange, CellSpec, DigitalSpec, DitherBits, DitherPattern, DriveSpec, FloorKind,
-    Hardware, HardwareError, HardwareSpec, PulseCode, Subtract, TileSpec, Timing, Window,
-    WriteScheme, WriteSpec,
+    Adc, AdcRange, CellSpec, ConverterKind, DigitalSpec, DitherBits, DitherPattern, DriveSpec,
+    FloorKind, Hardware, HardwareError, HardwareSpec, PulseCode, SliceTime, SliceTimes, Subtract,
+    TileSpec, Timing, Window, WriteScheme, WriteSpec, converter,
 };
 use crate::num::fixed::{
     AdcBits, DriveBits, ErrorBits, IncrementMax, LevelBits, LutBits, ResidualBits,
@@ -20,14 +20,24 @@ use crate::num::fixed::{
 const MOST: i64 = CYCLES_MAX.cast_signed();
 
 /// How a drive code is put on a row.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq)]
 enum DriveMode {
     /// A voltage of `dac_bits` a slice.
     Voltage,
-    /// A pulse whose length is the code, phase by phase; one takes so many cycles.
-    PulseWidth { phase_cycles: i64 },
+    /// A pulse whose length is the code, phase by phase; each takes so many cycles.
+    PulseWidth { phase_cycles: Vec<u64> },
     /// The amplitude of light: one slice, and a difference of currents.
     Amplitude,
+}
+
+/// How long a conversion takes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct ConverterTime {
+    kind: ConverterKind,
+    bits: u32,
+    step_cycles: u64,
+    /// Whether a phase is converted to the bits that earlier ones left.
+    owed: bool,
 }
 
 /// Checks `[hw]` or a model file and writes defaults back; `prefix` is put before keys in messages.
@@ -53,10 +63,14 @@ pub(super) fn resolve(file: &mut HardwareFile, prefix: &str) -> Result<Hardware,
     let bits = *drive.bits.get_or_insert(8);
     let drive_bits = range(&key("drive.bits"), DriveBits::new(bits))?;
     let (mode, dac_bits) = drive_mode(drive, bits, &key)?;
+    let dac_bits = u32::try_from(dac_bits).expect("1..=8");
 
-    let adc = match file.adc.get_or_insert_with(|| AdcFile::Ideal("ideal".into())) {
-        AdcFile::Ideal(_) => Adc::Ideal,
-        AdcFile::Finite(table) => converters(table, &key)?,
+    let (adc, converter) = match file.adc.get_or_insert_with(|| AdcFile::Ideal("ideal".into())) {
+        AdcFile::Ideal(_) => (Adc::Ideal, None),
+        AdcFile::Finite(table) => {
+            let adc = converters(table, &key)?;
+            (adc, converter_time(table, &mode, &key)?)
+        }
     };
 
     if mode == DriveMode::Amplitude
@@ -89,11 +103,12 @@ pub(super) fn resolve(file: &mut HardwareFile, prefix: &str) -> Result<Hardware,
     let residual_bits = range(&key("write.residual_bits"), ResidualBits::new(bits))?;
 
     let scheme = scheme(write, &key, increments)?;
-    let timing = file.timing.as_mut().map(|table| timing(table, mode, &key)).transpose()?;
+    let slices = Slices { mode, converter, count: drive_bits.get().div_ceil(dac_bits), dac_bits };
+    let timing = file.timing.as_mut().map(|table| timing(table, &slices, &key)).transpose()?;
     let spec = HardwareSpec {
         cell: CellSpec { level_bits, window, floor_kind },
         tile: TileSpec { rows: tile_rows, columns: tile_columns, count_max, transposed_read },
-        drive: DriveSpec { bits: drive_bits, dac_bits: u32::try_from(dac_bits).expect("1..=8") },
+        drive: DriveSpec { bits: drive_bits, dac_bits },
         adc,
         digital: DigitalSpec { lut_bits, error_bits },
         write: WriteSpec { increment_max, dither_bits, dither_pattern, residual_bits, scheme },
@@ -192,6 +207,85 @@ fn converters(table: &mut AdcTable, key: &dyn Fn(&str) -> String) -> Result<Adc,
     Ok(Adc::Finite { bits, subtract, range })
 }
 
+/// How long a conversion takes, where its bits decide that; `None` where it is given.
+fn converter_time(
+    table: &mut AdcTable,
+    mode: &DriveMode,
+    key: &dyn Fn(&str) -> String,
+) -> Result<Option<ConverterTime>, ConfigError> {
+    let words = |text: &str| ConverterKind::NAMES.iter().any(|(name, _)| *name == text);
+    if let Some(mark) = table.kind.as_deref().filter(|mark| words(mark)) {
+        let allowed = format!(
+            "`kind` says how far to trust the numbers: measured, fitted or assumed. The kind of a converter is \
+             adc.converter = \"{mark}\""
+        );
+        return Err(wrong(&key("adc.kind"), format!("is \"{mark}\""), allowed));
+    }
+    // absent is fixed, and is not written back: a chip that does not ask is described as it was
+    let kind = match &table.converter {
+        None => ConverterKind::Fixed,
+        Some(_) => {
+            word(&key("adc.converter"), &mut table.converter, "fixed", ConverterKind::NAMES)?
+        }
+    };
+    let phases = match mode {
+        DriveMode::PulseWidth { phase_cycles } => phase_cycles.len(),
+        DriveMode::Voltage | DriveMode::Amplitude => 1,
+    };
+    if kind == ConverterKind::Fixed {
+        let given = [
+            ("step_cycles", table.step_cycles.map(|cycles| cycles.to_string())),
+            ("phase_bits", table.phase_bits.clone()),
+        ];
+        if let Some((name, found)) = given.into_iter().find_map(|(n, v)| Some((n, v?))) {
+            let allowed = "a fixed converter takes timing.convert_cycles whatever its bits: give adc.converter = \"sar\", \
+                           \"counter\", \"ramp\" or \"flash\", or remove the key";
+            return Err(wrong(&key(&format!("adc.{name}")), format!("is {found}"), allowed));
+        }
+        return Ok(None);
+    }
+    if phases == 1
+        && let Some(found) = &table.phase_bits
+    {
+        let allowed = "only a drive.mode = \"pulse_width\" of several drive.phases has phases that owe fewer bits; \
+                       remove the key";
+        return Err(wrong(&key("adc.phase_bits"), format!("is \"{found}\""), allowed));
+    }
+    let words = [("owed", true), ("all", false)];
+    let owed = phases > 1 && word(&key("adc.phase_bits"), &mut table.phase_bits, "owed", &words)?;
+    let step_cycles = *table.step_cycles.get_or_insert(1);
+    let step_cycles = between(&key("adc.step_cycles"), step_cycles, 1, MOST)?.unsigned_abs();
+    let bits = u32::try_from(table.bits.expect("checked before")).expect("2..=16");
+    Ok(Some(ConverterTime { kind, bits, step_cycles, owed }))
+}
+
+/// What decides how long the slices of a read take.
+struct Slices {
+    mode: DriveMode,
+    converter: Option<ConverterTime>,
+    count: u32,
+    dac_bits: u32,
+}
+
+impl Slices {
+    /// Times of each, when settling takes so many cycles beside its pulses and a conversion that is given so many.
+    fn times(&self, settle: u64, convert: u64) -> Vec<SliceTime> {
+        let time = |slice: u32| {
+            let slots = match &self.mode {
+                DriveMode::PulseWidth { phase_cycles } => phase_cycles[slice as usize],
+                DriveMode::Voltage | DriveMode::Amplitude => 0,
+            };
+            let convert = self.converter.map_or(convert, |time| {
+                let carried = if time.owed { slice * self.dac_bits } else { 0 };
+                let steps = time.kind.steps(converter::owed(time.bits, carried));
+                steps.map_or(convert, |steps| steps.saturating_mul(time.step_cycles))
+            });
+            SliceTime { settle: settle + slots, convert }
+        };
+        (0..self.count).map(time).collect()
+    }
+}
+
 /// How rows are driven, and the bits of a slice.
 fn drive_mode(
     drive: &mut DriveFile,
@@ -244,14 +338,21 @@ fn drive_mode(
     }
     let slot_cycles = *drive.slot_cycles.get_or_insert(1);
     let slot_cycles = between(&key("drive.slot_cycles"), slot_cycles, 1, MOST / slots)?;
-    Ok((DriveMode::PulseWidth { phase_cycles: slots * slot_cycles }, dac_bits))
+    // a phase is as long as its own greatest code, unless all are said to take as many slots
+    let slots_of = |phase: i64| {
+        let left = bits - phase * dac_bits;
+        drive.slots.unwrap_or((1 << left.min(dac_bits)) - 1)
+    };
+    let phase_cycles = (0..phases).map(|phase| (slots_of(phase) * slot_cycles).unsigned_abs());
+    Ok((DriveMode::PulseWidth { phase_cycles: phase_cycles.collect() }, dac_bits))
 }
 
 fn timing(
     table: &mut TimingFile,
-    mode: DriveMode,
+    slices: &Slices,
     key: &dyn Fn(&str) -> String,
 ) -> Result<Timing, ConfigError> {
+    let step_key = key("adc.step_cycles");
     let key = |name: &str| key(&format!("timing.{name}"));
     let Some(clock_mhz) = table.clock_mhz else {
         let allowed = "give the clock that counts cycles, such as clock_mhz = 1000.0; without [timing] no cycles are \
@@ -263,21 +364,43 @@ fn timing(
         return Err(wrong(&key("clock_mhz"), format!("is {clock_mhz}"), allowed));
     }
     // a phase takes its slots; what is said here comes on top of them
-    let (slots, least) = match mode {
-        DriveMode::PulseWidth { phase_cycles } => (phase_cycles, 0),
-        DriveMode::Voltage | DriveMode::Amplitude => (0, 1),
-    };
+    let least = i64::from(!matches!(slices.mode, DriveMode::PulseWidth { .. }));
     let count = |name: &str, value: &mut Option<i64>, least: i64, most: i64| {
         let value = *value.get_or_insert(least);
         between(&key(name), value, least, most).map(i64::unsigned_abs)
     };
     let settle = count("settle_cycles", &mut table.settle_cycles, least, MOST)?;
+    let convert = match (slices.converter, table.convert_cycles) {
+        (None, _) => count("convert_cycles", &mut table.convert_cycles, 1, MOST)?,
+        (Some(_), None) => 1,
+        (Some(ConverterTime { kind, bits, .. }), Some(cycles)) => {
+            let steps = kind.steps(bits).map_or_else(String::new, |steps| format!("{steps} "));
+            let allowed = format!(
+                "a {} converter of {bits} bits takes {steps}steps of adc.step_cycles: remove the key, or give \
+                 adc.converter = \"fixed\"",
+                kind.name()
+            );
+            return Err(wrong(&key("convert_cycles"), format!("is {cycles}"), allowed));
+        }
+    };
+    let times = slices.times(settle, convert);
+    let SliceTime { settle, convert } = times[0];
+    if convert > CYCLES_MAX {
+        let allowed = format!(
+            "a conversion takes at most {CYCLES_MAX} cycles: give fewer, or fewer adc.bits"
+        );
+        return Err(wrong(&step_key, format!("makes conversions of {convert} cycles"), allowed));
+    }
+    let unequal = times.iter().any(|time| *time != times[0]);
+    let own = SliceTimes::new(&times).map_err(|HardwareError { found, allowed, .. }| {
+        wrong(&key("settle_cycles"), found, allowed)
+    })?;
     let pulse_codes = [("unary", PulseCode::Unary), ("amplitude", PulseCode::Amplitude)];
     Ok(Timing {
         clock_khz: (clock_mhz * 1000.0).round() as u64,
         beat: count("beat_cycles", &mut table.beat_cycles, 1, 1_000_000)?,
-        settle: settle + slots.unsigned_abs(),
-        convert: count("convert_cycles", &mut table.convert_cycles, 1, MOST)?,
+        settle,
+        convert,
         share: count("columns_per_adc", &mut table.columns_per_adc, 1, 32_768)?,
         overlapped: *table.overlap.get_or_insert(false),
         lanes: count("lanes", &mut table.lanes, 1, 32_768)?,
@@ -291,6 +414,7 @@ fn timing(
                 Some(between(&key("write_active_max"), cells, 1, 65_536).map(i64::unsigned_abs)?)
             }
         },
+        slices: unequal.then_some(own),
     })
 }
 
@@ -337,6 +461,58 @@ mod tests {
     }
 
     #[test]
+    fn a_conversion_takes_the_steps_of_its_kind() {
+        let convert = |adc: &str| {
+            let (hardware, file) =
+                chip(&format!("adc = {{ {adc} }}\ntiming.clock_mhz = 1")).unwrap();
+            assert_eq!(chip(&toml::to_string(&file).unwrap()).unwrap().0, hardware, "{adc}");
+            hardware.timing.unwrap().convert
+        };
+        for (kind, bits, cycles) in [
+            ("sar", 2, 3),
+            ("sar", 6, 7),
+            ("sar", 16, 17),
+            ("counter", 4, 16),
+            ("ramp", 10, 1024),
+            ("flash", 4, 1),
+            ("flash", 12, 1),
+        ] {
+            let text = format!("bits = {bits}, converter = \"{kind}\"");
+            assert_eq!(convert(&text), cycles, "{text}");
+            assert_eq!(convert(&format!("{text}, step_cycles = 30")), 30 * cycles, "{text}");
+        }
+        let fixed = "adc = { bits = 6, converter = \"fixed\" }\ntiming = { clock_mhz = 1, convert_cycles = 9 }";
+        assert_eq!(chip(fixed).unwrap().0.timing.unwrap().convert, 9);
+        // a chip that does not ask for a kind is written out as it always was
+        let (_, file) = chip("adc = { bits = 6 }\ntiming.clock_mhz = 1").unwrap();
+        assert!(!toml::to_string(&file).unwrap().contains("converter"));
+    }
+
+    /// NeuRRAM: seven magnitude bits in phases of four and three, each a comparison an owed bit and one step more.
+    #[test]
+    fn a_phase_is_as_long_as_its_own_bits_and_owes_what_earlier_ones_left() {
+        let times = |drive: &str, adc: &str| {
+            let text = format!(
+                "drive = {{ bits = 7, mode = \"pulse_width\", phases = 2, slot_cycles = 27{drive} }}\n\
+                 adc = {{ bits = 10, subtract = \"current\"{adc} }}\ntiming = {{ clock_mhz = 100, settle_cycles = 0 }}"
+            );
+            let (hardware, file) = chip(&text).unwrap();
+            assert_eq!(chip(&toml::to_string(&file).unwrap()).unwrap().0, hardware, "{text}");
+            let timing = hardware.timing.unwrap();
+            let all = timing.slices.map(|own| own.iter().map(|s| [s.settle, s.convert]).collect());
+            all.unwrap_or_else(|| vec![[timing.settle, timing.convert]])
+        };
+        let sar = ", converter = \"sar\", step_cycles = 30";
+        assert_eq!(times("", sar), [[27 * 15, 30 * 11], [27 * 7, 30 * 7]]);
+        let all = ", converter = \"sar\", step_cycles = 30, phase_bits = \"all\"";
+        assert_eq!(times("", all), [[27 * 15, 30 * 11], [27 * 7, 30 * 11]]);
+        assert_eq!(times(", slots = 20", all), [[27 * 20, 30 * 11]]);
+        assert_eq!(times("", ", converter = \"counter\""), [[405, 1024], [189, 64]]);
+        // fixed converters: only the pulses differ
+        assert_eq!(times("", ""), [[405, 1], [189, 1]]);
+    }
+
+    #[test]
     fn finite_converters_track_unless_they_are_told_otherwise() {
         let range = |text: &str| {
             let (hardware, file) = chip(text).unwrap();
@@ -377,6 +553,22 @@ mod tests {
             ("adc = { bits = 8, range = 4, headroom = 0 }", "`hw.adc.headroom` is 0"),
             ("adc = { bits = 8, recalibrate = \"epoch\" }", "`hw.adc.recalibrate` is \"epoch\""),
             ("adc = { bits = 8, range = \"tracked\" }", "it is \"tracking\", \"calibrated\""),
+            ("adc = { bits = 8, converter = \"slow\" }", "fixed, sar, counter, ramp, flash"),
+            ("adc = { bits = 8, kind = \"sar\" }", "adc.converter = \"sar\""),
+            ("adc = { bits = 8, step_cycles = 2 }", "`hw.adc.step_cycles` is 2; a fixed converter"),
+            ("adc = { bits = 8, converter = \"sar\", step_cycles = 0 }", "adc.step_cycles"),
+            (
+                "adc = { bits = 8, converter = \"sar\", phase_bits = \"all\" }",
+                "several drive.phases",
+            ),
+            (
+                "adc = { bits = 8, converter = \"sar\" }\ntiming = { clock_mhz = 1, convert_cycles = 9 }",
+                "`hw.timing.convert_cycles` is 9; a sar converter of 8 bits takes 9 steps",
+            ),
+            (
+                "adc = { bits = 16, converter = \"ramp\", step_cycles = 2000 }\ntiming.clock_mhz = 1",
+                "makes conversions of 131072000 cycles",
+            ),
         ] {
             let error = chip(text).unwrap_err();
             assert!(error.contains(wanted), "{text}: {error}");

@@ -3,7 +3,7 @@
 use std::path::{Component, Path, PathBuf};
 
 use super::check::wrong;
-use super::file::DataFile;
+use super::file::{ColumnFile, DataFile};
 use super::{Config, ConfigError};
 use crate::lab::data::csv::{self, Reading};
 use crate::lab::data::{self, Data, DataError, DataRoot, FileSet, PartFile, Source, Told};
@@ -197,7 +197,7 @@ fn reading(data: &DataFile) -> Result<Reading, ConfigError> {
             wrong("data.separator", format!("is {key:?}"), allowed)
         })?),
     };
-    let key = |text: &String| match text.parse() {
+    let key = |ColumnFile(text): &ColumnFile| match text.parse() {
         Ok(key) => key,
         Err(never) => match never {},
     };
@@ -236,9 +236,10 @@ fn tell(data: &mut DataFile, told: &Told) {
         }
     }
     if let Some(table) = &told.table {
-        data.label_column.get_or_insert_with(|| table.label_column.clone());
+        data.label_column.get_or_insert_with(|| ColumnFile(table.label_column.clone()));
         if !table.ignore_columns.is_empty() {
-            data.ignore_columns.get_or_insert_with(|| table.ignore_columns.clone());
+            let columns = || table.ignore_columns.iter().cloned().map(ColumnFile).collect();
+            data.ignore_columns.get_or_insert_with(columns);
         }
         data.header = data.header.or(table.header);
         if let Some(separator) = table.separator {

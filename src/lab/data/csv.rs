@@ -170,7 +170,7 @@ pub fn read(
     };
     let range = range(&scan, &layout, reading, header)?;
     let kind = range.kind()?;
-    if comma && range_has_commas(&text, separator, &layout, header) {
+    if comma && has_decimal_commas(&text, separator, &layout, header) {
         said.push("numbers have decimal commas".into());
     }
     let label = &scan.columns[layout.label];
@@ -226,9 +226,7 @@ fn by_places(
             return Err(CsvError::Width { found: columns, wanted: like.columns });
         }
         Some(like) => {
-            if like.names.is_empty() == names.is_empty() {
-                // neither has names
-            } else {
+            if like.names.is_empty() != names.is_empty() {
                 said.push(
                     "its columns are told by their places: not every part has a header".into(),
                 );
@@ -346,7 +344,7 @@ fn range(
     };
     if let Some((at, (line, found))) = first(|column| column.text.as_ref()) {
         let key = layout.key(at);
-        let advice = if separator_is_comma_like(layout.separator, found) {
+        let advice = if layout.separator == b',' && found.contains(',') {
             "for decimal commas separate the fields by semicolons".into()
         } else if *line == 1 && !header {
             "if the first line names the columns, say data.header = true".into()
@@ -377,13 +375,8 @@ fn range(
     Ok(range)
 }
 
-/// Whether a field that is no number looks like one with a decimal comma.
-fn separator_is_comma_like(separator: u8, found: &str) -> bool {
-    separator == b',' && found.contains(',')
-}
-
 /// Whether a number of the first examples is written with a decimal comma.
-fn range_has_commas(text: &[u8], separator: u8, layout: &TableLayout, header: bool) -> bool {
+fn has_decimal_commas(text: &[u8], separator: u8, layout: &TableLayout, header: bool) -> bool {
     let mut lines = scan::reader(text, separator);
     let rows = lines.byte_records().filter_map(Result::ok).skip(usize::from(header)).take(1000);
     let comma = |row: &::csv::ByteRecord| layout.values.iter().any(|&at| row[at].contains(&b','));

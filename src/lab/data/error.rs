@@ -224,6 +224,24 @@ pub enum DataError {
         /// Number of classes.
         classes: usize,
     },
+    /// A file whose order of classes and a cut keep step.
+    #[error(
+        "{path}: the {part} part would be every {every}th example, but none of those is of the class `{class}`, of which \
+         there are {there}: the file repeats its classes in step with the cut; shuffle its examples, or name a file for \
+         data.{part}", path = .path.display()
+    )]
+    Step {
+        /// The training file.
+        path: PathBuf,
+        /// The part that was to be cut.
+        part: &'static str,
+        /// One in so many.
+        every: usize,
+        /// Name of the class.
+        class: String,
+        /// Its examples.
+        there: usize,
+    },
     /// Two parts that are the same.
     #[error(
         "the {one} and the {other} part are the same {what}, so the score would be one of examples that were learnt; \

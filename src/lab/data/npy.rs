@@ -263,9 +263,9 @@ pub fn labels(bytes: &[u8]) -> Result<(Vec<usize>, Labels), NpyError> {
 
 /// Code points of four bytes each.
 fn unicode(bytes: &[u8], big: bool) -> Option<String> {
-    let point = |b: &[u8]| match b {
-        &[a, b, c, d] if big => u32::from_be_bytes([a, b, c, d]),
-        &[a, b, c, d] => u32::from_le_bytes([a, b, c, d]),
+    let point = |b: &[u8]| match *b {
+        [a, b, c, d] if big => u32::from_be_bytes([a, b, c, d]),
+        [a, b, c, d] => u32::from_le_bytes([a, b, c, d]),
         _ => u32::MAX,
     };
     bytes.chunks(4).map(|b| char::from_u32(point(b))).collect()

@@ -21,6 +21,8 @@ use super::numbers::NumberKind;
 use super::source::{FileSet, ImageShape};
 use crate::task::classify::{Examples, Split};
 
+/// Cuts' worth of examples of a class, of which a cut that meets none is no chance.
+const CUTS: usize = 8;
 const TEST_EVERY: usize = 6;
 const VALIDATION_EVERY: usize = 12;
 /// A part this many times darker than the training part is one of another scale.
@@ -96,6 +98,7 @@ pub(crate) fn load(files: &FileSet) -> Result<Data, DataError> {
             .map_err(|source| DataError::Examples { path, source })?;
         made[name as usize] = Some(examples);
     }
+    let class = |class: usize| names.get(class).cloned().unwrap_or_else(|| class.to_string());
     let [train, validation, test] = made;
     let mut train = train.expect("the training part is always there");
     let mut note = String::new();
@@ -104,14 +107,14 @@ pub(crate) fn load(files: &FileSet) -> Result<Data, DataError> {
         Some(test) => test,
         None => {
             note += "; test is every 6th example of the file";
-            cut(&mut train, TEST_EVERY, PartName::Test, path)?
+            cut(&mut train, TEST_EVERY, PartName::Test, path, &class)?
         }
     };
     let validation = match validation {
         Some(validation) => validation,
         None => {
             note += "; validation is every 12th example of the training part";
-            cut(&mut train, VALIDATION_EVERY, PartName::Validation, path)?
+            cut(&mut train, VALIDATION_EVERY, PartName::Validation, path, &class)?
         }
     };
     if (1..train.len()).all(|e| train.values(e) == train.values(0)) {
@@ -119,7 +122,6 @@ pub(crate) fn load(files: &FileSet) -> Result<Data, DataError> {
     }
     let split = Split { train, validation, test };
     said.extend(known(&split, cut_test));
-    let class = |class: usize| names.get(class).cloned().unwrap_or_else(|| class.to_string());
     said.extend(missing(&split, count, &class));
     if files.classes.is_none()
         && let Some(at) = (0..count).find(|&at| !has(&split.train, at))
@@ -233,6 +235,7 @@ fn cut(
     every: usize,
     part: PartName,
     path: &Path,
+    name: &dyn Fn(usize) -> String,
 ) -> Result<Examples, DataError> {
     let found = from.len();
     if found < every {
@@ -247,6 +250,16 @@ fn cut(
             .expect("examples of a checked set are checked")
     };
     let (kept, taken) = (pick(false), pick(true));
+    let count = |part: &Examples, class: usize| {
+        part.labels().iter().filter(|&&label| usize::from(label) == class).count()
+    };
+    let lost = (0..from.classes())
+        .map(|class| (class, count(from, class)))
+        .find(|&(class, there)| there >= CUTS * every && count(&taken, class) == 0);
+    if let Some((class, there)) = lost {
+        let (part, path) = (part.key(), path.to_owned());
+        return Err(DataError::Step { path, part, every, class: name(class), there });
+    }
     *from = kept;
     Ok(taken)
 }

@@ -103,6 +103,7 @@ pub fn changes(run: &Hardware, other: &Hardware) -> Vec<Change> {
                 pulse_code,
                 verify,
                 active_max,
+                slices,
             } = a;
             differ("timing.settle_cycles", settle != b.settle, &[], true);
             differ("timing.convert_cycles", convert != b.convert, &[], true);
@@ -115,6 +116,8 @@ pub fn changes(run: &Hardware, other: &Hardware) -> Vec<Change> {
             differ("timing.pulses", pulse_code != b.pulse_code, PULSES, true);
             differ("timing.verify", verify != b.verify, PULSES, true);
             differ("timing.write_active_max", active_max != b.active_max, PULSES, true);
+            // phases of unequal length
+            differ("drive.phases", slices != b.slices, &[], true);
         }
         (a, b) => {
             let verified = |timing: Option<Timing>| timing.is_some_and(|timing| timing.verify);

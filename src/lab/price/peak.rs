@@ -1,8 +1,8 @@
 //! What a model says before anything runs: times of a full tile, peak rates of the whole chip, areas.
 //!
 //! ```text
-//! alone        1 + read(NS, C, 0) cycles                     one read after the other
-//! back to back 1 + read_again(NS, C) cycles                   the front end never waits
+//! alone        1 + read(C, 0) cycles                          one read after the other
+//! back to back 1 + again(C) cycles                            the front end never waits
 //! TOPS         operations of 2 R C tiles products / time
 //! ```
 //!
@@ -12,7 +12,7 @@
 use super::convention::Convention;
 use super::plan::Footprint;
 use super::total::Range;
-use crate::chip::hardware::{Hardware, Timing};
+use crate::chip::hardware::{Hardware, ReadTime, Timing};
 use crate::lab::config::{Constants, CostTable};
 
 /// A duration on a full tile.
@@ -36,12 +36,12 @@ fn seconds(timing: &Timing, cycles: u64) -> f64 {
 pub fn figures(hardware: &Hardware, words: u64) -> Vec<Figure> {
     let Some(timing) = hardware.timing else { return vec![] };
     let (rows, columns) = (hardware.tile.rows as u64, hardware.tile.columns as u64);
-    let slices = u64::from(hardware.slices());
+    let reads = ReadTime::new(hardware, timing);
     let accept = timing.accept();
     let figure = |name, cycles| Figure { name, cycles, seconds: seconds(&timing, cycles) };
     vec![
-        figure("read", accept + timing.read(slices, columns, 0)),
-        figure("next read after", accept + timing.read_again(slices, columns)),
+        figure("read", accept + reads.read(1, columns, 0)),
+        figure("next read after", accept + reads.again(1, columns)),
         figure("error words", accept + timing.error(words, columns)),
         figure("accumulate", accept + timing.accumulate(rows, columns)),
         figure("write, row without pulses", timing.rows(1, 0)),
@@ -65,10 +65,11 @@ pub struct Peak {
     pub back_to_back: (Figure, f64),
 }
 
-/// Peak rate of reading with `tiles` full tiles, in `slices` slices or phases.
+/// Peak rate of reading with `tiles` full tiles, in `slices` slices or phases: other than the chip's own, all as its first.
 #[must_use]
 pub fn peak(hardware: &Hardware, tiles: u64, slices: u64, convention: Convention) -> Option<Peak> {
     let timing = hardware.timing?;
+    let reads = ReadTime::of(timing, slices);
     let (rows, columns) = (hardware.tile.rows as u64, hardware.tile.columns as u64);
     let products = 2 * tiles * rows * columns;
     let rate = |name, cycles| {
@@ -80,8 +81,8 @@ pub fn peak(hardware: &Hardware, tiles: u64, slices: u64, convention: Convention
         tiles,
         convention,
         macs: convention.macs(products),
-        alone: rate("alone", timing.accept() + timing.read(slices, columns, 0)),
-        back_to_back: rate("back to back", timing.accept() + timing.read_again(slices, columns)),
+        alone: rate("alone", timing.accept() + reads.read(1, columns, 0)),
+        back_to_back: rate("back to back", timing.accept() + reads.again(1, columns)),
     })
 }
 
@@ -93,6 +94,7 @@ pub fn areas(
     constants: &Constants,
 ) -> Vec<(&'static str, Range)> {
     let given = constants.iter().filter(|c| c.quantity.table == CostTable::Area);
+    let given = given.filter(|c| c.not_here().is_none());
     given
         .map(|c| {
             let parts = plan.parts(c.quantity.per, hardware) as f64;

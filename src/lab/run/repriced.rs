@@ -6,7 +6,7 @@ use super::train::read_config;
 use super::{RunError, records};
 use crate::chip::hardware::Hardware;
 use crate::lab::config::{Absent, Config, Constants, Model, load_model};
-use crate::lab::price::{Bill, Change, Cost, Footprint, Images, changes, price};
+use crate::lab::price::{Bill, Change, Cost, Footprint, Images, areas, changes, price};
 use crate::lab::store::folder::{self, FolderError, names};
 use crate::lab::store::hash;
 use crate::lab::store::ledger::LedgerRecord;
@@ -63,6 +63,14 @@ impl Prices {
     pub fn fingerprint(&self) -> String {
         hash::bytes(format!("{self:?}"))[..16].to_owned()
     }
+}
+
+/// What real chips do and a run did not.
+///
+/// # Errors
+/// When the folder is not that of a run.
+pub fn absent(path: &Path) -> Result<Vec<Absent>, RunError> {
+    Ok(read_config(path)?.0.absent())
 }
 
 /// Reads a finished run, and another model if one is named.
@@ -124,6 +132,19 @@ impl Repriced {
     #[must_use]
     pub fn bill(&self) -> Bill<'_> {
         price(&self.ledger, &self.plan, &self.hardware, &self.constants, &self.changes)
+    }
+
+    /// Square millimetres of the network's converters, if the model gives them for this chip.
+    #[must_use]
+    pub fn converters_mm2(&self) -> Option<f64> {
+        let all = areas(&self.plan, &self.hardware, &self.constants);
+        all.into_iter().find(|(name, _)| *name == "adc").map(|(_, area)| area[1] * 1e6)
+    }
+
+    /// The constants it is priced with.
+    #[must_use]
+    pub const fn constants(&self) -> &Constants {
+        &self.constants
     }
 
     /// Its totals.

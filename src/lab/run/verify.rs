@@ -111,6 +111,11 @@ fn compare(
         lines.lines().filter_map(|line| serde_json::from_str(line).ok()).collect();
     let written: Value = parsed(path, names::RECEIPT)?;
     let files = Files::read(path, &receipt)?;
+    let learnt = kept.len().saturating_sub(1);
+    if learnt > config.epochs as usize {
+        let (found, wanted) = (learnt.to_string(), config.epochs.to_string());
+        return Err(differ("number of epochs in the records", &found, &wanted));
+    }
     let last = epochs.map_or(kept.len(), |epochs| kept.len().min(epochs as usize + 1));
     let whole = last == kept.len();
     let finished = receipt.status == "finished";

@@ -342,7 +342,7 @@ pub struct Receipt {
     /// The final test, when finished.
     #[serde(deserialize_with = "Option::deserialize")]
     pub test: Option<TestOutcome>,
-    /// What the run showed, as far as a receipt says it: [`notes`](crate::lab::run::notes) has the rest.
+    /// What the run showed, as far as a receipt says it; `lab::run::notes` has the rest.
     pub notes: Vec<Note>,
     /// Rates of the layers; empty in receipts of earlier programs.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]

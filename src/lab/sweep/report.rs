@@ -25,6 +25,8 @@ pub struct SweepPage {
     pub finished: usize,
     /// Of these, finished once, but their folders are gone.
     pub lost: usize,
+    /// What real chips do and its runs did not: `key = text`.
+    pub not_simulated: Vec<String>,
 }
 
 /// Draws `STORE/NAME.html` and, if `pictures` are wanted, `STORE/figures/NAME-*.svg` and `.png`.
@@ -66,6 +68,7 @@ pub fn report(
         points: found.table.len(),
         finished: found.finished,
         lost: found.lost,
+        not_simulated: found.not_simulated.clone(),
     })
 }
 

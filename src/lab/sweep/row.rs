@@ -49,6 +49,7 @@ struct Facts<'a> {
     /// The record of the epoch whose state read the test set.
     read: &'a EpochRecord,
     cost: Cost,
+    converters_mm2: Option<f64>,
 }
 
 impl Facts<'_> {
@@ -145,6 +146,7 @@ pub const RESULTS: &[ResultColumn] = results![
     "read_joules_digital", "energy to read an image, digital", Joules, Priced, |f| f.image(Phase::Evaluation, Some(CostClass::Digital));
     "read_joules_static", "energy to read an image, static", Joules, Priced, |f| f.image(Phase::Evaluation, Some(CostClass::Static));
     "read_seconds", "time to read an image", Seconds, Priced, |f| f.image_seconds(Phase::Evaluation);
+    "converters_mm2", "area of converters", SquareMillimetres, Priced, |f| f.converters_mm2.and_then(Number::from_f64);
     #[cfg(feature = "grown")] "grown", "what a later program shows", Count, Whole, |f| Some(f.last.grown.into());
 ];
 
@@ -244,7 +246,13 @@ pub fn row_as(path: &Path, prices: Option<Prices>) -> Result<(Row, f64), SweepEr
     }
     let tested = receipt.test.as_ref().map(TestOutcome::epoch);
     let read = records.iter().find(|record| Some(record.epoch) == tested).unwrap_or(last);
-    let facts = Facts { receipt: &receipt, last, read, cost: priced.cost() };
+    let facts = Facts {
+        receipt: &receipt,
+        last,
+        read,
+        cost: priced.cost(),
+        converters_mm2: priced.converters_mm2(),
+    };
     let task = last.outcome.task();
     let columns = RESULTS.iter().filter(|column| column.task.is_none_or(|of| of == task));
     let results = columns.filter_map(|column| {

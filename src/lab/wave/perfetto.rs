@@ -24,6 +24,13 @@ struct Slice {
     args: Value,
 }
 
+/// Tracks of one part, or of the commands of a layer.
+#[derive(Default)]
+struct Tracks {
+    /// Number of each in the trace, and when it is free.
+    all: Vec<(usize, u64)>,
+}
+
 /// The text of a trace. `grids`: pairs of banks, tiles down and across of each layer.
 pub(super) fn text(
     spans: &[Span],
@@ -50,10 +57,10 @@ pub(super) fn text(
         events.push(json!({"ph": "M", "name": "process_sort_index", "pid": pid, "args": {"sort_index": pid}}));
     }
     // tracks of a group, each with its number and when it is free; numbers are never used twice in a trace
-    let mut tracks: BTreeMap<(usize, (usize, usize)), Vec<(usize, u64)>> = BTreeMap::new();
+    let mut tracks: BTreeMap<_, Tracks> = BTreeMap::new();
     let mut next = 0;
     for slice in slices {
-        let own = tracks.entry((slice.pid, slice.order)).or_default();
+        let own = &mut tracks.entry((slice.pid, slice.order)).or_default().all;
         let free = own.iter_mut().find(|(_, free)| *free <= slice.start);
         let tid = if let Some((tid, free)) = free {
             *free = slice.end;

@@ -7,8 +7,8 @@ use std::fmt::Display;
 
 use dalean::hardware::{
     Adc, AdcBits, AdcRange, CellSpec, DigitalSpec, DitherBits, DitherPattern, DriveBits, DriveSpec,
-    ErrorBits, FloorKind, IncrementMax, LevelBits, LutBits, PulseCode, ResidualBits, Subtract,
-    TileSpec, Timing, Window, WriteScheme, WriteSpec,
+    ErrorBits, FloorKind, IncrementMax, LevelBits, LutBits, PulseCode, ResidualBits, SliceTime,
+    SliceTimes, Subtract, TileSpec, Timing, Window, WriteScheme, WriteSpec,
 };
 use dalean::network::{
     Activation, Augment, Batch, Centre, Decay, DrivenBy, LayerSpec, Positive, RateMantissa, Route,
@@ -78,6 +78,21 @@ fn shown(error: &impl Display) {
     assert!(!error.to_string().is_empty(), "an error says something");
 }
 
+/// The same with slices of their own, mostly as many as a drive code has.
+fn unequal(c: &mut Choices<'_>, timing: Timing) -> Timing {
+    let first = SliceTime { settle: timing.settle, convert: timing.convert };
+    let slices = (0..c.size(0, 9)).map(|at| match at {
+        0 => first,
+        _ => SliceTime {
+            settle: c.near(1, 200_000_000) as u64,
+            convert: c.near(1, 100_000_000) as u64,
+        },
+    });
+    let slices: Vec<_> = slices.take(1 << 10).collect();
+    let slices = or(SliceTimes::new(&slices).map(Some), None);
+    Timing { slices, ..timing }
+}
+
 fn hardware(c: &mut Choices<'_>) -> Hardware {
     let reference = Hardware::reference();
     if c.one_in(4) {
@@ -117,7 +132,9 @@ fn hardware(c: &mut Choices<'_>) -> Hardware {
         pulse_code: c.of(&[PulseCode::Unary, PulseCode::Amplitude]),
         verify: c.one_in(2),
         active_max: c.one_in(2).then(|| c.near(1, 65_536) as u64),
+        slices: None,
     });
+    let timing = timing.map(|timing| if c.one_in(3) { unequal(c, timing) } else { timing });
     let trains = c.one_in(4);
     let spec = HardwareSpec {
         cell: CellSpec {

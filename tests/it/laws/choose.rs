@@ -1,8 +1,8 @@
 //! Any valid chip, any small network on it, any list of choices.
 
 use dalean::chip::hardware::{
-    Adc, AdcRange, DitherBits, DitherPattern, FloorKind, Hardware, HardwareSpec, PulseCode,
-    Subtract, Timing, Window, WriteScheme,
+    Adc, AdcRange, ConverterKind, DitherBits, DitherPattern, FloorKind, Hardware, HardwareSpec,
+    PulseCode, SliceTime, SliceTimes, Subtract, Timing, Window, WriteScheme, converter,
 };
 use dalean::chip::layer::{Delivery, DrivenBy, LayerSpec, Taps, WordSource};
 use dalean::chip::population::Wiring;
@@ -277,8 +277,39 @@ pub(crate) fn timing() -> impl Strategy<Value = Timing> {
             pulse_code,
             verify,
             active_max,
+            slices: None,
         },
     )
+}
+
+/// The same on a chip whose converters are of any kind, whose phases are as long as their bits, or both; or whose slices
+/// take any times at all.
+fn by_kind(hardware: &Hardware, timing: Timing, numbers: &mut Numbers) -> Timing {
+    let slices = hardware.slices();
+    let any = numbers.within(0, 3) == 0;
+    let kind = ConverterKind::NAMES[numbers.within(0, 4) as usize].1;
+    let (slot, owes) = (numbers.within(0, 2) as u64, numbers.within(0, 1) == 1);
+    let times = (0..slices).map(|slice| {
+        let first = slice * hardware.drive.dac_bits;
+        if any {
+            let [settle, convert] = [9, 3].map(|most| numbers.within(1, most) as u64);
+            return SliceTime { settle, convert };
+        }
+        let driven = hardware.drive.dac_bits.min(hardware.drive.bits.get() - first);
+        let convert = match hardware.adc {
+            Adc::Finite { bits, .. } => {
+                // counters of 16 bits would be played for days
+                let bits = bits.get().min(5);
+                let bits = if owes { converter::owed(bits, first) } else { bits };
+                kind.steps(bits).map_or(timing.convert, |steps| steps * timing.convert.min(2))
+            }
+            _ => timing.convert,
+        };
+        SliceTime { settle: timing.settle + slot * ((1 << driven.min(5)) - 1), convert }
+    });
+    let times: Vec<SliceTime> = times.collect();
+    let SliceTime { settle, convert } = times[0];
+    Timing { settle, convert, slices: Some(SliceTimes::new(&times).unwrap()), ..timing }
 }
 
 /// A small network of one to three layers on a chip that counts cycles.
@@ -286,7 +317,11 @@ pub(crate) fn timed_net() -> impl Strategy<Value = Net> {
     let side = || prop_oneof![4 => 1usize..=9, 1 => 10usize..=18];
     let sides = prop::collection::vec(side(), 2..=4);
     let trains = prop::option::weighted(0.15, 0u32..=5);
-    (net(sides), timing(), trains).prop_map(|(mut net, mut timing, trains)| {
+    let kinds = prop::option::weighted(0.6, any::<u64>());
+    (net(sides), timing(), trains, kinds).prop_map(|(mut net, mut timing, trains, kinds)| {
+        if let Some(seed) = kinds {
+            timing = by_kind(&net.hardware, timing, &mut Numbers(seed));
+        }
         net.change(|h| {
             if let Some(slots_log2) = trains {
                 h.write.scheme = WriteScheme::Trains { slots_log2 };

@@ -111,7 +111,7 @@ const DATA: &[KeyEntry] = &[
     other("label_column", "`first`, `last`, a number from 0, or a header")
         .only("with data.format = \"csv\"", CSV)
         .otherwise("told from the table, and said"),
-    other("ignore_columns", "a list of columns, each a number from 0 or a header, in quotes")
+    other("ignore_columns", "a list of columns, each a number from 0 or a header")
         .only("with data.format = \"csv\"", CSV)
         .otherwise("columns without a name that number the rows"),
     flag("header").only("with data.format = \"csv\"", CSV).otherwise("told from the table"),

@@ -72,6 +72,9 @@ const ROOT: &[KeyEntry] = &[
     other("energy", "a table of physical numbers").otherwise("no energy is reckoned"),
     other("power", "a table of physical numbers"),
     other("area", "a table of physical numbers"),
+    other("node_nm", "nanometres"),
+    other("constants_for", "a table of settings").otherwise("numbers are for the chip as it is"),
+    other("modes", "a table of lists of settings, such as \"drive.bits=4\""),
     other("not_simulated", "a table of texts"),
 ];
 
@@ -144,6 +147,10 @@ const DRIVE: &[KeyEntry] =
 const FINITE: &[&str] = &["hw.adc.bits=8"];
 const CALIBRATED: &[&str] = &["hw.adc.bits=8", "hw.adc.range=calibrated"];
 
+const STEPS: &[&str] = &["hw.adc.bits=8", "hw.adc.converter=sar"];
+const PHASES: &[&str] =
+    &["hw.adc.bits=8", "hw.adc.converter=sar", "hw.drive.mode=pulse_width", "hw.drive.phases=2"];
+
 const ADC: &[KeyEntry] = &[
     whole("bits", 2, 16).unit("bits").otherwise("the table needs it"),
     other("range", "\"tracking\", \"calibrated\", \"full\", or a shift in 0..=40")
@@ -169,6 +176,31 @@ const ADC: &[KeyEntry] = &[
     )
     .default("\"digital\"")
     .only("", FINITE),
+    words(
+        "converter",
+        &[
+            ("fixed", "takes `timing.convert_cycles`, whatever its bits"),
+            ("sar", "bits + 1 steps: a comparison a bit, and one to sample"),
+            ("counter", "2^bits steps: counts"),
+            ("ramp", "2^bits steps: compares with a rising reference"),
+            ("flash", "one step: a comparator a code"),
+        ],
+    )
+    .otherwise("fixed")
+    .only("", FINITE),
+    whole("step_cycles", 1, 100_000_000)
+        .unit("cycles")
+        .default("1")
+        .only("with an adc.converter that steps", STEPS),
+    words(
+        "phase_bits",
+        &[
+            ("owed", "the bits of the output that earlier phases have not carried, at least one"),
+            ("all", "all bits, in each phase"),
+        ],
+    )
+    .default("\"owed\"")
+    .only("with such a converter and several drive.phases", PHASES),
     PROVENANCE[0],
     PROVENANCE[1],
 ];
@@ -222,7 +254,11 @@ const TIMING: &[KeyEntry] = &[
         .unit("cycles")
         .default("1")
         .only("", COUNTED),
-    whole("convert_cycles", 1, 100_000_000).unit("cycles").default("1").only("", COUNTED),
+    whole("convert_cycles", 1, 100_000_000)
+        .law("of fixed converters: others have adc.step_cycles")
+        .unit("cycles")
+        .default("1")
+        .only("", COUNTED),
     whole("columns_per_adc", 1, 32_768).unit("columns").default("1").only("", COUNTED),
     flag("overlap").default("false").only("", COUNTED),
     whole("lanes", 1, 32_768).unit("columns").default("1").only("", COUNTED),
@@ -253,4 +289,8 @@ const NUMBER: &[KeyEntry] = &[
     other("high", "a number of 0 or more").law("low <= typical <= high"),
     PROVENANCE[0],
     PROVENANCE[1],
+    other("scales", "a law, or a table of laws by setting: constant, linear, walden, schreier, comparators, steps")
+        .otherwise("at another setting it prices nothing"),
+    other("at", "a table of settings, such as { adc_bits = 8 }").otherwise("those of its model"),
+    other("node_nm", "nanometres").otherwise("those of its model"),
 ];

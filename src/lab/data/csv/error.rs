@@ -201,6 +201,14 @@ pub enum CsvError {
     /// A text that cannot be read.
     #[error("is UTF-16 that breaks off or is damaged; save it as UTF-8")]
     Utf16,
+    /// Another encoding.
+    #[error(
+        "line {line} is not UTF-8 (Latin-1, or a code page of Windows?); save the file as UTF-8"
+    )]
+    Encoding {
+        /// Line, counted from 1.
+        line: usize,
+    },
     /// No text.
     #[error("holds zero bytes, so it is no text, or UTF-16 without a mark; save it as UTF-8")]
     Binary,

@@ -45,13 +45,21 @@ pub(super) fn decode(bytes: &[u8], limit: u64) -> Result<Cow<'_, [u8]>, CsvError
     if start.contains(&0) {
         return Err(CsvError::Binary);
     }
-    Ok(match bytes {
+    let text = match bytes {
         Cow::Borrowed(bytes) => Cow::Borrowed(bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes)),
         Cow::Owned(bytes) => match bytes.strip_prefix(b"\xef\xbb\xbf") {
             Some(text) => Cow::Owned(text.to_vec()),
             None => Cow::Owned(bytes),
         },
-    })
+    };
+    // two words of another encoding must not become one
+    match std::str::from_utf8(&text) {
+        Ok(_) => Ok(text),
+        Err(error) => {
+            let line = text[..error.valid_up_to()].iter().filter(|byte| **byte == b'\n').count();
+            Err(CsvError::Encoding { line: line + 1 })
+        }
+    }
 }
 
 /// What separates the fields of a text.
@@ -123,6 +131,7 @@ mod tests {
         assert!(text(&gz[..gz.len() - 9]).unwrap_err().contains("cut short"));
         assert!(text(b"\xff\xfea").unwrap_err().contains("UTF-16"));
         assert!(text(b"1\0,\x002\0").unwrap_err().contains("zero bytes"));
+        assert!(text(b"1,a\n2,caf\xe9\n").unwrap_err().contains("line 2 is not UTF-8"));
         assert!(text(b"PK\x03\x04xxxx").unwrap_err().contains("spreadsheet"));
     }
 

@@ -34,8 +34,8 @@ function wordsOf(node, place) {
     if (style.textTransform === "capitalize") words = words.replace(/\b\w/g, (letter) => letter.toUpperCase());
     const { fontBoundingBoxAscent: up, fontBoundingBoxDescent: down } = scribe.measureText(words);
     const [x, y] = place(line.left, line.top + (line.height * up) / (up + down));
-    const mono = /monospace/.test(style.fontFamily) ? "monospace" : "sans-serif";
-    return `<text class="own" x="${x}" y="${y}" textLength="${near(line.right - line.left)}" lengthAdjust="spacingAndGlyphs" style="font:${style.fontWeight} ${style.fontSize} ${mono};fill:${style.color}">${escaped(words)}</text>`;
+    const family = style.fontFamily.replaceAll('"', "'");
+    return `<text class="own" x="${x}" y="${y}" textLength="${near(line.right - line.left)}" lengthAdjust="spacingAndGlyphs" style="font:${style.fontWeight} ${style.fontSize} ${family};fill:${style.color}">${escaped(words)}</text>`;
   });
 }
 
@@ -98,7 +98,7 @@ function snapshot(card) {
   visit(card);
   root.colorScheme = before;
   const [width, height] = [Math.ceil(Math.max(frame.width, card.scrollWidth)), Math.ceil(frame.height)];
-  const own = ".own{white-space:pre}svg text{font-family:sans-serif}";
+  const own = `.own{white-space:pre}svg text{font-family:${getComputedStyle(document.body).fontFamily}}`;
   const svg = `<svg xmlns="http://www.w3.org/2000/svg" width="${width}" height="${height}" viewBox="0 0 ${width} ${height}"><title>${escaped(document.title)}</title><style>${chartStyle}${own}</style><rect width="${width}" height="${height}" fill="#fff"/>${parts.join("")}</svg>\n`;
   return { svg, width, height };
 }

@@ -103,6 +103,7 @@ fn column(settings: &Settings<'_>, column: &Column) -> Value {
         ColumnUnit::Cycles => "cycles",
         ColumnUnit::Seconds => "seconds",
         ColumnUnit::Joules => "joules",
+        ColumnUnit::SquareMillimetres => "mm2",
     };
     let role = match column.role {
         Role::Axis => "axis",

@@ -47,7 +47,7 @@ impl<'a> Measure<'a> {
         let middle = if most / least > 1e4 { (least * most).sqrt() } else { most };
         let thousands = (middle.log10() / 3.0 + 1e-12).floor();
         let (by, prefix) = match column.unit {
-            ColumnUnit::Plain => (1.0, ""),
+            ColumnUnit::Plain | ColumnUnit::SquareMillimetres => (1.0, ""),
             ColumnUnit::Fraction => (100.0, ""),
             ColumnUnit::Seconds if middle >= 7200.0 => (1.0 / 3600.0, "h"),
             ColumnUnit::Seconds if middle >= 120.0 => (1.0 / 60.0, "min"),

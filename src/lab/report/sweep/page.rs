@@ -204,6 +204,7 @@ fn print(value: f64, unit: ColumnUnit) -> String {
         ColumnUnit::Cycles | ColumnUnit::Seconds | ColumnUnit::Joules => {
             prefixed(value, unit.sign())
         }
+        ColumnUnit::SquareMillimetres => format!("{} {}", significant(value), unit.sign()),
         ColumnUnit::Plain | ColumnUnit::Count => significant(value),
     }
 }

@@ -67,9 +67,13 @@ pub fn text(view: &SweepView<'_>) -> Option<String> {
             let _ = write!(out, "  {text:>width$}", width = wide(head));
         }
     }
-    let width = first.max(x.axis.label.chars().count()).max(measure.column.label.chars().count());
+    let explained = [Some(x), series, panel].into_iter().flatten().map(|axis| &axis.axis.label);
+    let explained = explained.chain([&measure.column.label]).map(|label| label.chars().count());
+    let width = explained.max().unwrap_or(first);
     let mut explain = |head: &str, words: &str| {
-        let _ = write!(out, "\n{head:>width$}  {words}");
+        if !words.is_empty() {
+            let _ = write!(out, "\n{head:>width$}  {words}");
+        }
     };
     explain(&measure.column.label, &meaning(measure.column));
     let half = all().any(|one| one.half.is_some()) && !pooled;

@@ -1,7 +1,7 @@
 //! Sizes and configuration registers of a tile: docs/TILE.md, 1.
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
-use crate::chip::hardware::PulseCode;
+use crate::chip::hardware::{PulseCode, SliceTime};
 
 /// Sizes a tile is built with.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -99,6 +99,8 @@ pub struct TileConfig {
 pub struct More {
     /// Shift of each slice; empty: the converter's own.
     pub adc_shifts: Vec<u32>,
+    /// Times of each slice; empty: all take `settle` and `convert`.
+    pub slice_times: Vec<SliceTime>,
     /// Whether accumulators leave the tile for a tree outside.
     pub tree_outside: bool,
     /// Words a column adds; empty: the modulo tap.
@@ -127,6 +129,7 @@ impl Default for More {
     fn default() -> Self {
         Self {
             adc_shifts: vec![],
+            slice_times: vec![],
             tree_outside: false,
             taps: vec![],
             tap_shift: 0,
@@ -148,12 +151,27 @@ impl TileConfig {
         self.share as u64 * self.convert
     }
 
-    /// Cycles of a slice.
-    pub(super) fn period(&self) -> u64 {
+    /// `T_A` of a slice; reads from the columns go through all of them twice.
+    pub(super) fn settle_of(&self, slice: u32) -> u64 {
+        let own = self.more.slice_times.get((slice % self.slices) as usize);
+        own.map_or(self.settle, |own| own.settle)
+    }
+
+    /// `T_C` of a slice.
+    pub(super) fn convert_of(&self, slice: u32) -> u64 {
+        let own = self.more.slice_times.get((slice % self.slices) as usize);
+        own.map_or(self.convert, |own| own.convert)
+    }
+
+    /// Cycles of a slice: it settles, and its successor is not sampled before its own conversions are done.
+    pub(super) fn period(&self, slice: u32) -> u64 {
+        let conversion = self.share as u64 * self.convert_of(slice);
+        let done = self.settle_of(slice) + conversion;
         if self.overlap {
-            self.settle.max(self.conversion())
+            let early = self.settle_of(slice + 1).min(conversion);
+            done - early
         } else {
-            self.settle + self.conversion()
+            done
         }
     }
 }

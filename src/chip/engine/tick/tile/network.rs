@@ -108,7 +108,7 @@ impl Tile {
         let in_slice = front.slice < self.read_slices(front.way);
         let words = self.config.hops + self.config.words;
         [
-            front.busy && in_slice && front.phase < self.config.settle,
+            front.busy && in_slice && front.phase < self.config.settle_of(front.slice),
             self.conv.busy,
             self.lane.busy,
             self.bus_wanted(),

@@ -28,7 +28,8 @@ impl Tile {
     /// Cycles the front end stays busy after its last slice, so that the lanes keep up.
     fn slack(&self, way: Way) -> u64 {
         let lanes = self.config.more.beat * self.groups(self.read_lines(way)) as u64;
-        lanes.saturating_sub(u64::from(self.read_slices(way)) * self.config.period())
+        let periods = (0..self.read_slices(way)).map(|slice| self.config.period(slice));
+        lanes.saturating_sub(periods.sum())
     }
 
     pub(super) fn front_end(&mut self) {
@@ -41,11 +42,11 @@ impl Tile {
             if self.front.phase == 0 {
                 self.drive_lines(way);
             }
-            if self.front.phase == self.config.settle - 1 {
+            if self.front.phase == self.config.settle_of(self.front.slice) - 1 {
                 self.sample(way);
             }
             self.front.phase += 1;
-            if self.front.phase == self.config.period() {
+            if self.front.phase == self.config.period(self.front.slice) {
                 self.front.phase = 0;
                 self.front.slice += 1;
             }
@@ -90,6 +91,7 @@ impl Tile {
             self.bank_events[bank].cell_reads += (rows * columns) as u64;
             self.bank_events[bank].holds += lines as u64;
         }
+        assert!(!self.conv.busy, "a slice is sampled when the one before is converted");
         self.conv.busy = true;
         self.conv.slice = self.front.slice;
         self.conv.slot = self.front.slot;
@@ -128,7 +130,7 @@ impl Tile {
             return;
         }
         self.conv.count += 1;
-        if self.conv.count < self.config.convert {
+        if self.conv.count < self.config.convert_of(self.conv.slice) {
             return;
         }
         self.conv.count = 0;

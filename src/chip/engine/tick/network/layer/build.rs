@@ -60,6 +60,7 @@ pub(super) fn config(
         absorbing: hardware.cell.floor_kind == FloorKind::Absorbing,
         more: More {
             adc_shifts: shifts,
+            slice_times: timing.slices.iter().flat_map(|own| own.iter()).collect(),
             tree_outside: true,
             taps: own.collect(),
             tap_shift: taps.shift,
