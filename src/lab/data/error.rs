@@ -108,7 +108,7 @@ pub enum DataError {
         /// The file.
         path: PathBuf,
         /// What is wrong with it.
-        source: IdxError,
+        source: Box<IdxError>,
     },
     /// An NPZ file.
     #[error("{path} {source}", path = .path.display())]
@@ -116,7 +116,7 @@ pub enum DataError {
         /// The file.
         path: PathBuf,
         /// What is wrong with it.
-        source: NpzError,
+        source: Box<NpzError>,
     },
     /// A CSV file.
     #[error("{path} {source}", path = .path.display())]
@@ -124,7 +124,7 @@ pub enum DataError {
         /// The file.
         path: PathBuf,
         /// What is wrong with it.
-        source: CsvError,
+        source: Box<CsvError>,
     },
     /// Labels that are not one number an example.
     #[error(
@@ -160,7 +160,7 @@ pub enum DataError {
         /// The training file.
         path: PathBuf,
         /// What is wrong.
-        source: LabelsError,
+        source: Box<LabelsError>,
     },
     /// Values above the full scale.
     #[error(
@@ -309,7 +309,7 @@ pub enum DataError {
         /// The file.
         path: PathBuf,
         /// What is wrong.
-        source: ExamplesError,
+        source: Box<ExamplesError>,
     },
     /// A full scale of 0.
     #[error(

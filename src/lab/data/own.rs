@@ -81,7 +81,7 @@ pub(crate) fn load(files: &FileSet) -> Result<Data, DataError> {
         parts.iter().map(|(name, part)| (name.word(), &part.labels)).collect();
     let path = train.path();
     let classes = labels::classes(&of, files.classes)
-        .map_err(|source| DataError::Classless { path: path.to_owned(), source })?;
+        .map_err(|source| DataError::Classless { path: path.to_owned(), source: Box::new(source) })?;
     said.extend(named(&classes));
     let (features, image) = (parts[0].1.features, files.image.or(parts[0].1.image));
     if let Some(image) = image.filter(|image| image.values() != Some(features)) {
@@ -95,7 +95,7 @@ pub(crate) fn load(files: &FileSet) -> Result<Data, DataError> {
             return Err(DataError::Features { path, found, wanted: features });
         }
         let examples = Examples::new(values, labels, features, full_scale, count)
-            .map_err(|source| DataError::Examples { path, source })?;
+            .map_err(|source| DataError::Examples { path, source: Box::new(source) })?;
         made[name as usize] = Some(examples);
     }
     let class = |class: usize| names.get(class).cloned().unwrap_or_else(|| class.to_string());

@@ -55,7 +55,7 @@ impl<'a> Reader<'a> {
     }
 
     fn names(&mut self, path: &Path) -> Result<Vec<String>, DataError> {
-        let wrong = |source| DataError::Npz { path: path.to_owned(), source };
+        let wrong = |source| DataError::Npz { path: path.to_owned(), source: Box::new(source) };
         Ok(Archive::open(self.bytes(path)?).map_err(wrong)?.names())
     }
 
@@ -141,7 +141,7 @@ impl<'a> Reader<'a> {
             PartFile::Idx { values, labels } => {
                 let read = |path: &Path| {
                     idx::read(&read_own(path)?)
-                        .map_err(|source| DataError::Idx { path: path.to_owned(), source })
+                        .map_err(|source| DataError::Idx { path: path.to_owned(), source: Box::new(source) })
                 };
                 let (values, labels) = (read(values)?, read(labels)?);
                 let of = labels.data.iter().map(|&label| Label::Number(label.into())).collect();
@@ -155,7 +155,7 @@ impl<'a> Reader<'a> {
                 let bytes = self.array(path, &values)?;
                 let wrong = |path: &Path, name: &str, source| DataError::Npz {
                     path: path.to_owned(),
-                    source: NpzError::Array { name: name.to_owned(), source },
+                    source: Box::new(NpzError::Array { name: name.to_owned(), source }),
                 };
                 let array = npy::values(&bytes, scale).map_err(|e| wrong(path, &values, e))?;
                 drop(bytes);
@@ -177,7 +177,7 @@ impl<'a> Reader<'a> {
     }
 
     fn array(&mut self, path: &Path, name: &str) -> Result<Vec<u8>, DataError> {
-        let wrong = |source| DataError::Npz { path: path.to_owned(), source };
+        let wrong = |source| DataError::Npz { path: path.to_owned(), source: Box::new(source) };
         let mut archive = Archive::open(self.bytes(path)?).map_err(wrong)?;
         archive.read(name).map_err(wrong)
     }
@@ -191,7 +191,7 @@ impl<'a> Reader<'a> {
         let bytes = read_own(path)?;
         let like = self.tables.first().map(|(_, layout)| layout);
         let table = csv::read(&bytes, reading, like, self.scale, FILE_BYTES_MAX)
-            .map_err(|source| DataError::Csv { path: path.to_owned(), source })?;
+            .map_err(|source| DataError::Csv { path: path.to_owned(), source: Box::new(source) })?;
         let csv::CsvTable { features, values, labels, range, kind, layout, said } = table;
         let of = |line: String| {
             if name == PartName::Train { line } else { format!("{}: {line}", name.word()) }
