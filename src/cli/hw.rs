@@ -160,7 +160,6 @@ fn new(name: &Path, json: bool, quiet: bool) -> Done {
     }
     let path = name.with_extension("toml");
     let place = path.display().to_string();
-    #[expect(clippy::disallowed_methods, reason = "the file the user named")]
     let made = std::fs::File::create_new(&path)
         .and_then(|mut file| file.write_all(config::template(chip).as_bytes()));
     made.map_err(|error| Failure {

@@ -1,10 +1,13 @@
-//! Standard output: one writer for all commands.
+//! Standard output: one writer for all commands; and files that the user names.
 //!
 //! A line that cannot be written is an error of the command, whatever else went well: who reads a table that ends early
 //! must not be told that all is done. Only a reader that has gone away (`| head`) is no fault, and ends quietly.
 
 use std::io::{self, ErrorKind, Write};
+use std::path::Path;
 use std::sync::{Mutex, PoisonError};
+
+use super::{Done, Failure};
 
 /// The first line that could not be written, and why.
 static FAULT: Mutex<Option<io::Error>> = Mutex::new(None);
@@ -33,4 +36,12 @@ pub(super) fn fault() -> Option<String> {
     let gone = fault.kind() == ErrorKind::BrokenPipe;
     (!gone)
         .then(|| format!("cannot write to standard output: {fault}; what was printed is not whole"))
+}
+
+/// Writes a file that the user named.
+pub(super) fn write(path: &Path, bytes: &[u8]) -> Done {
+    crate::lab::store::place::write_out(path, bytes).map_err(|error| Failure {
+        code: 1,
+        message: format!("cannot write {}: {error}", path.display()),
+    })
 }

@@ -119,7 +119,7 @@ pub(super) fn compare(args: &CompareArgs) -> Done {
     let comparison = runs::compare(&args.runs)?;
     if let Some(path) = &args.out {
         let page = html(&comparison, env!("CARGO_PKG_VERSION"));
-        super::trace::write(path, page.as_bytes())?;
+        super::out::write(path, page.as_bytes())?;
     }
     let page = args.out.as_ref().map(|path| path.display().to_string());
     if args.json {

@@ -1,6 +1,6 @@
 //! `trace`: one update, cycle by cycle, as files for viewers.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use clap::Args;
 use serde_json::json;
@@ -53,7 +53,7 @@ pub(super) fn execute(args: &TraceArgs) -> Done {
     let mut written = Vec::new();
     for (path, bytes) in [(&args.vcd, &wave.vcd[..]), (&args.perfetto, wave.perfetto.as_bytes())] {
         if let Some(path) = path {
-            write(path, bytes)?;
+            super::out::write(path, bytes)?;
             written.push(path.display().to_string());
         }
     }
@@ -76,14 +76,6 @@ pub(super) fn execute(args: &TraceArgs) -> Done {
         ));
     }
     Ok(())
-}
-
-/// Writes a file that the user named.
-pub(super) fn write(path: &Path, bytes: &[u8]) -> Done {
-    crate::lab::store::place::write_out(path, bytes).map_err(|error| Failure {
-        code: 1,
-        message: format!("cannot write {}: {error}", path.display()),
-    })
 }
 
 /// `0,p,0,0`.

@@ -80,8 +80,10 @@ pub(crate) fn load(files: &FileSet) -> Result<Data, DataError> {
     let of: Vec<(&'static str, &Labels)> =
         parts.iter().map(|(name, part)| (name.word(), &part.labels)).collect();
     let path = train.path();
-    let classes = labels::classes(&of, files.classes)
-        .map_err(|source| DataError::Classless { path: path.to_owned(), source: Box::new(source) })?;
+    let classes = labels::classes(&of, files.classes).map_err(|source| DataError::Classless {
+        path: path.to_owned(),
+        source: Box::new(source),
+    })?;
     said.extend(named(&classes));
     let (features, image) = (parts[0].1.features, files.image.or(parts[0].1.image));
     if let Some(image) = image.filter(|image| image.values() != Some(features)) {

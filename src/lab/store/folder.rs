@@ -1,5 +1,4 @@
 //! The folder of a run: files written whole, read with limits, held by one process at a time.
-
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};

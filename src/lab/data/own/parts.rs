@@ -140,8 +140,10 @@ impl<'a> Reader<'a> {
         match file {
             PartFile::Idx { values, labels } => {
                 let read = |path: &Path| {
-                    idx::read(&read_own(path)?)
-                        .map_err(|source| DataError::Idx { path: path.to_owned(), source: Box::new(source) })
+                    idx::read(&read_own(path)?).map_err(|source| DataError::Idx {
+                        path: path.to_owned(),
+                        source: Box::new(source),
+                    })
                 };
                 let (values, labels) = (read(values)?, read(labels)?);
                 let of = labels.data.iter().map(|&label| Label::Number(label.into())).collect();
