@@ -254,6 +254,9 @@ fn show(model: &Model, config: &Config, quiet: bool) {
     for (name, value) in numbers(&config.hardware) {
         say(&format!("  {name:16} {value}"));
     }
+    if let Some(nodes) = config.constants.node_words() {
+        say(&format!("  {:16} {nodes}", "node"));
+    }
     if let Some(timing) = config.hardware.timing {
         say(&format!("  {:16} {}", "conversion", conversion_text(config, &timing)));
         say(&format!("  {:16} {}", "timing", timing_text(&timing)));

@@ -6,7 +6,7 @@ use clap::Args;
 use serde_json::json;
 
 use super::{Done, Shared, configuration, known, say};
-use crate::lab::config::{Config, absent_words};
+use crate::lab::config::{Config, Constants, absent_words};
 use crate::lab::price::{Bill, Convention, EnergySplit, Group, Images, areas, bounds, prefixed};
 use crate::lab::run::{self, Act, ModeUse, Profile, Repriced};
 
@@ -82,7 +82,7 @@ fn price_json(args: &PriceArgs, run: &Repriced) -> serde_json::Value {
     let mut object = json!({"event": "price", "run": args.run.display().to_string(),
         "made_on": run.made_on, "priced_as": run.priced_as,
         "changes": changes.collect::<Vec<_>>(), "cycles": run.ledger.elapsed(),
-        "not_simulated": run.absent});
+        "nodes": nodes_json(run.constants()), "not_simulated": run.absent});
     merge(&mut object, run.bill().to_json(&run.images));
     object
 }
@@ -91,6 +91,7 @@ fn show_price(run: &Repriced, quiet: bool) {
     let bill = run.bill();
     if !quiet {
         say(&format!("run on {}, constants of {}", run.made_on, run.priced_as));
+        show_nodes(run.constants());
     }
     if !run.changes.is_empty() && !quiet {
         let keys: Vec<_> = run.changes.iter().map(|change| change.key).collect();
@@ -203,6 +204,7 @@ pub(super) fn profile(args: &ProfileArgs) -> Done {
         config.hardware_name,
         profile.plan.cells()
     ));
+    show_nodes(&profile.constants);
     for (name, area) in areas(&profile.plan, &profile.hardware, &profile.constants) {
         let [low, typical, high] = area.map(|area| area * 1e6);
         say(&format!("area of {name}: {typical:.3} mm2 ({low:.3} to {high:.3})"));
@@ -241,6 +243,18 @@ fn rates(act: &Act, bill: &Bill<'_>) -> (Option<f64>, Option<f64>) {
     (rate, joules.map(|joules| operations / joules))
 }
 
+/// Of which technology the constants are: sums of several nodes are those of no chip.
+fn show_nodes(constants: &Constants) {
+    if let Some(nodes) = constants.node_words() {
+        say(&format!("node     {nodes}"));
+    }
+}
+
+fn nodes_json(constants: &Constants) -> serde_json::Value {
+    let nodes = constants.nodes().into_iter();
+    nodes.map(|(node, numbers)| json!({"node_nm": node, "numbers": numbers})).collect()
+}
+
 /// What the network takes of the chip.
 fn plan_json(config: &Config, profile: &Profile) -> serde_json::Value {
     let Profile { plan, hardware, constants, .. } = profile;
@@ -249,6 +263,7 @@ fn plan_json(config: &Config, profile: &Profile) -> serde_json::Value {
         areas.map(|(name, area)| json!({"name": name, "square_metres": area})).collect();
     json!({"event": "plan", "data": config.data_name(), "hardware": config.hardware_name,
         "cells": plan.cells(), "tiles": plan.tiles(hardware), "areas": areas,
+        "nodes": nodes_json(constants),
         "warnings": profile.warnings})
 }
 

@@ -12,6 +12,8 @@ use super::{Done, Failure, Moved, Shared, configuration, environment, known, not
 use crate::lab::config::absent_words;
 use crate::lab::price::{EnergySplit, PerImage};
 use crate::lab::run::{self, Machine, RunError, RunEvent, Trained, Verdict};
+use crate::lab::runs;
+use crate::lab::store::folder::FolderError;
 use crate::lab::store::index::{INDEX, Store};
 use crate::lab::store::record::{TestOutcome, TestRecord};
 use crate::lab::sweep::{self, Finding, Sampled};
@@ -80,7 +82,12 @@ impl From<RunError> for Failure {
             RunError::Config(_) | RunError::Network(_) => 2,
             _ => 1,
         };
-        Self { code, message: error.to_string() }
+        let meant = match &error {
+            RunError::Folder(FolderError::Io { path, .. }) => runs::meant(path),
+            _ => None,
+        };
+        let meant = meant.map(|run| format!(" Did you mean {}?", run.display()));
+        Self { code, message: format!("{error}{}", meant.unwrap_or_default()) }
     }
 }
 

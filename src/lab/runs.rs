@@ -4,4 +4,4 @@ mod compare;
 mod list;
 
 pub use compare::compare;
-pub use list::{ListedRun, RunStatus, list};
+pub use list::{ListedRun, RunStatus, list, meant};

@@ -366,13 +366,16 @@ fn parts_that_do_not_belong_together_are_refused_with_a_cure() {
     );
 }
 
+/// What it is, the array of values, the array of labels, and words of the refusal.
+type ArrayCase<'a> = (&'a str, Vec<u8>, Vec<u8>, &'a [&'a str]);
+
 #[test]
 fn arrays_that_cannot_be_right_are_refused_with_a_cure() {
     let own = "format = \"npz\"\ntrain = \"x.npy\"\ntrain_labels = \"y.npy\"";
     let twelve: Vec<u8> = (0..12).collect();
     let (x, y) = (floats(&[0.5, 0.25, 1.0, 0.0].repeat(3)), whole(&[0, 1].repeat(6)));
     let bad = |x: f32| floats(&[&[x, 0.5][..], &[0.25; 10]].concat());
-    let cases: [(&str, Vec<u8>, Vec<u8>, &[&str]); 14] = [
+    let cases: [ArrayCase<'_>; 14] = [
         ("NaN", bad(f32::NAN), y.clone(), &["hold NaN", "a missing value", "nan_to_num"]),
         ("infinity", bad(f32::INFINITY), y.clone(), &["hold inf", "fill the gap"]),
         ("standardised values", bad(-1.5), y.clone(), &["reach from -1.5 to 0.5", "(x - least)"]),

@@ -2,7 +2,7 @@
 //! is verified wherever it and its data are.
 
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::Command;
 
 use super::program::{Ran, dalean, finished, run};
@@ -10,7 +10,7 @@ use super::program::{Ran, dalean, finished, run};
 /// A table of three classes that a small net tells apart.
 fn table(rows: usize) -> String {
     let line = |row: usize| {
-        let class = (row * 7919 >> 4) % 3;
+        let class = ((row * 7919) >> 4) % 3;
         let value = |column: usize| if column == class { 200 + row % 50 } else { row * 7 % 40 };
         format!("{},{},{},{}\n", value(0), value(1), value(2), ["ash", "beech", "oak"][class])
     };
@@ -206,5 +206,5 @@ fn data_of_one_class_is_refused_and_does_not_panic() {
     let ran = train("1,2,5,0\n4,2,3,0\n", &more);
     assert_eq!(ran.code, Some(0), "{ran:?}");
     assert!(ran.stderr.contains("the training part has no example of class 1"), "{ran:?}");
-    assert!(Path::new(&project.path("a/runs")).exists());
+    assert!(project.path("a/runs").exists());
 }

@@ -67,6 +67,13 @@ fn runs_are_named_listed_and_compared_by_what_differs() {
     assert_eq!(found["results"]["test_accuracy"][1], done["test_accuracy"]);
     let ran = run(dalean().arg("compare").arg(&first));
     assert_eq!(ran.code, Some(2), "{ran:?}");
+    let slip = first.with_file_name(name(&first).replace("optdigits", "optdgits"));
+    for command in ["verify", "price", "report", "eval"] {
+        let ran = run(dalean().arg(command).arg(&slip));
+        assert_eq!(ran.code, Some(1), "{ran:?}");
+        let wanted = format!("Did you mean {}?", first.display());
+        assert!(ran.stderr.contains(&wanted), "{command}: {ran:?}");
+    }
 }
 
 #[test]

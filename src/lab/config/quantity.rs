@@ -16,6 +16,7 @@ use serde::de::{self, Deserializer};
 use serde::{Deserialize, Serialize};
 
 mod class;
+mod node;
 
 pub use class::CostClass;
 

@@ -141,6 +141,12 @@ impl Repriced {
         all.into_iter().find(|(name, _)| *name == "adc").map(|(_, area)| area[1] * 1e6)
     }
 
+    /// The constants it is priced with.
+    #[must_use]
+    pub const fn constants(&self) -> &Constants {
+        &self.constants
+    }
+
     /// Its totals.
     #[must_use]
     pub fn cost(&self) -> Cost {

@@ -4,11 +4,13 @@
     reason = "the order of a list, and nothing else, depends on when files were written"
 )]
 
+use std::ffi::OsStr;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::time::SystemTime;
 
 use crate::lab::config::Difference;
+use crate::lab::near;
 use crate::lab::run::{self, RunError};
 use crate::lab::store::folder::{self, FolderError, names};
 use crate::lab::store::index::{INDEX, Store};
@@ -85,6 +87,29 @@ pub fn list(root: &Path) -> Result<Vec<ListedRun>, SweepError> {
     let mut runs: Vec<ListedRun> = folders.into_iter().map(listed).collect();
     runs.sort_by(|a, b| b.written.cmp(&a.written).then_with(|| a.folder.cmp(&b.folder)));
     Ok(runs)
+}
+
+/// The run beside a folder that is not there whose name is nearest: for messages about a file in it, or about itself.
+#[must_use]
+pub fn meant(path: &Path) -> Option<PathBuf> {
+    let folder =
+        path.ancestors().take(2).find(|path| path.extension().is_none_or(|end| !is_file(end)))?;
+    let parent = folder.parent().filter(|parent| !parent.as_os_str().is_empty());
+    let parent = parent.unwrap_or_else(|| Path::new("."));
+    if folder.exists() {
+        return None;
+    }
+    let entries = fs::read_dir(parent).ok()?.flatten().map(|entry| entry.path());
+    let runs = entries.filter(|path| path.join(names::CONFIG).is_file());
+    let names: Vec<String> =
+        runs.filter_map(|path| Some(path.file_name()?.to_str()?.to_owned())).collect();
+    let near = near::nearest(folder.file_name()?.to_str()?, names.iter().map(String::as_str))?;
+    Some(folder.with_file_name(near))
+}
+
+/// Whether an ending is that of a file of a run: names of runs hold dots too.
+fn is_file(ending: &OsStr) -> bool {
+    ["toml", "json", "jsonl", "safetensors", "html"].iter().any(|known| ending == *known)
 }
 
 fn listed(path: PathBuf) -> ListedRun {

@@ -17,6 +17,9 @@ const POLICY: &str = "default-src 'none'; script-src 'unsafe-inline' 'unsafe-eva
 const PATIENCE: Duration = Duration::from_secs(150);
 const NAMES: [&str; 3] = ["chromium", "chromium-browser", "google-chrome"];
 
+/// A window is at least this wide.
+const WINDOW_MIN: u32 = 500;
+
 /// One browser at a time: they are heavy, and times are measured.
 static ALONE: Mutex<()> = Mutex::new(());
 
@@ -63,6 +66,14 @@ pub(crate) fn open_at(page: &str, steps: &str, graphics: Graphics, width: u32) -
     assert_eq!((page.matches("<head>").count(), page.matches("\n</body>").count()), (1, 1));
     fs::write(&path, page.replace("<head>", &head).replace("\n</body>", &tail)).unwrap();
 
+    let around = folder.path().join("around.html");
+    let frame = format!(
+        "<!DOCTYPE html><html><head><script>{WATCH}addEventListener('message', ({{ data }}) => data.all && answer(data.all));\
+         </script></head><body style=\"margin:0\"><iframe src=\"page.html\" scrolling=\"no\" style=\"border:0;width:{width}px;height:1000px\">\
+         </iframe></body></html>"
+    );
+    fs::write(&around, frame).unwrap();
+    let path = if width < WINDOW_MIN { around } else { path };
     let answer = folder.path().join("dom.html");
     let mut command = Command::new(browser);
     command
@@ -75,7 +86,7 @@ pub(crate) fn open_at(page: &str, steps: &str, graphics: Graphics, width: u32) -
         ])
         .args(["--disable-background-networking", "--disable-component-update", "--disable-sync"])
         .args(["--host-resolver-rules=MAP * ~NOTFOUND", "--dump-dom"])
-        .arg(format!("--window-size={width},1000"))
+        .arg(format!("--window-size={},1000", width.max(WINDOW_MIN)))
         .arg(format!("--user-data-dir={}", folder.path().join("profile").display()));
     match graphics {
         Graphics::Played | Graphics::Software => {

@@ -69,7 +69,9 @@ pub fn text(view: &SweepView<'_>) -> Option<String> {
     }
     let width = first.max(x.axis.label.chars().count()).max(measure.column.label.chars().count());
     let mut explain = |head: &str, words: &str| {
-        let _ = write!(out, "\n{head:>width$}  {words}");
+        if !words.is_empty() {
+            let _ = write!(out, "\n{head:>width$}  {words}");
+        }
     };
     explain(&measure.column.label, &meaning(measure.column));
     let half = all().any(|one| one.half.is_some()) && !pooled;
