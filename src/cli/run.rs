@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex};
+use std::sync::{Arc, Mutex, OnceLock};
 
 use clap::Args;
 use serde_json::json;
@@ -104,6 +104,17 @@ pub(super) fn stop_flag() -> Arc<AtomicBool> {
     flag
 }
 
+/// Asks whether the user wants to stop. Signals are caught from the first question on: before, while files are read and
+/// networks built, there is nothing to keep, and a signal ends the program as it ends any other.
+#[derive(Debug, Default)]
+struct Stop(OnceLock<Arc<AtomicBool>>);
+
+impl Stop {
+    fn asked(&self) -> bool {
+        self.0.get_or_init(stop_flag).load(Ordering::SeqCst)
+    }
+}
+
 pub(super) fn train(args: &TrainArgs) -> Done {
     let shared = &args.shared;
     let machine = shared.machine()?;
@@ -113,7 +124,7 @@ pub(super) fn train(args: &TrainArgs) -> Done {
              data.train=FILE or in its file",
         ));
     }
-    let stop = stop_flag();
+    let stop = Stop::default();
     let config = match &args.resume {
         Some(_) => None,
         None => {
@@ -169,7 +180,7 @@ pub(super) fn train(args: &TrainArgs) -> Done {
                 }
             }
         }
-        !stop.load(Ordering::SeqCst)
+        !stop.asked()
     };
     let data = args.moved.root(shared.data_root());
     let outcome = match (&args.resume, &config) {
@@ -271,7 +282,7 @@ pub(super) fn eval(args: &EvalArgs) -> Done {
 
 pub(super) fn verify(args: &VerifyArgs) -> Done {
     let shared = &args.shared;
-    let stop = stop_flag();
+    let stop = Stop::default();
     let machine = shared.machine()?;
     if let Some(count) = args.sample {
         return sample(args, count as usize, machine, &stop);
@@ -290,7 +301,7 @@ pub(super) fn verify(args: &VerifyArgs) -> Done {
         args.epochs,
         &mut |progress| {
             meter.batch(progress);
-            !stop.load(Ordering::SeqCst)
+            !stop.asked()
         },
     );
     meter.finish();
@@ -317,7 +328,7 @@ pub(super) fn verify(args: &VerifyArgs) -> Done {
 }
 
 /// Does some runs of a store again.
-fn sample(args: &VerifyArgs, count: usize, machine: Machine, stop: &AtomicBool) -> Done {
+fn sample(args: &VerifyArgs, count: usize, machine: Machine, stop: &Stop) -> Done {
     let shared = &args.shared;
     let store = Store::existing(&args.run)?;
     // whoever made the store shall not know which runs will be looked at
@@ -368,7 +379,7 @@ fn sample(args: &VerifyArgs, count: usize, machine: Machine, stop: &AtomicBool) 
     };
     let mut go_on = |progress| {
         meter().batch(progress);
-        !stop.load(Ordering::SeqCst)
+        !stop.asked()
     };
     let root = args.moved.root(shared.data_root());
     let runs = sweep::sample(&store, count, seed, &root, machine, &mut on_run, &mut go_on)?;

@@ -19,6 +19,7 @@
 )]
 #![cfg(target_os = "linux")]
 
+mod ask;
 mod chance;
 mod start;
 mod world;

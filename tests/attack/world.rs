@@ -151,7 +151,14 @@ impl World {
             let changed = now.iter().find(|(path, bytes)| self.outside.get(*path) != Some(*bytes));
             let gone = self.outside.keys().find(|path| !now.contains_key(*path));
             let path = changed.map(|(path, _)| path).or(gone);
-            return Some(format!("{path:?} outside the folder was changed"));
+            let told = format!("{path:?} outside the folder was changed");
+            // the next start is judged by what it does itself
+            let _ = fs::remove_dir_all(self.root.join("outside"));
+            for (path, bytes) in &self.outside {
+                fs::create_dir_all(path.parent().unwrap()).unwrap();
+                fs::write(path, bytes).unwrap();
+            }
+            return Some(told);
         }
         let mut beside: Vec<_> =
             fs::read_dir(&self.root).unwrap().map(|e| e.unwrap().file_name()).collect();

@@ -133,7 +133,7 @@ fn a_new_chip_is_checked_trained_changed_and_saved() {
 fn completions_offer_kernels_chips_and_sets() {
     for shell in ["bash", "zsh", "fish"] {
         let ran = run(dalean().args(["completions", shell]));
-        for word in ["avx512", "photonic_pcm", "fashion-mnist", "compare", "level_bits"] {
+        for word in ["avx512", "photonic_pcm", "cifar10", "compare", "level_bits"] {
             assert!(ran.stdout.contains(word), "{shell}: {word}");
         }
     }

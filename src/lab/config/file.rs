@@ -74,9 +74,9 @@ keys! {
     }
     /// `[data]`: a named set, or files of one's own.
     DataFile {
-        /// `optdigits`, `mnist`, `fashion-mnist`, `cifar10`, `xor`, `parity2` to `parity8`.
+        /// A set that this program knows.
         set: String,
-        /// `idx`, `npz`, `csv`: own files.
+        /// What files of one's own are.
         format: String,
         /// File of the training examples; paths in a file are relative to that file.
         train: String,

@@ -2,8 +2,9 @@
 //!
 //! ```text
 //! clipped   of a layer and an epoch, more than 1 in 20 conversions saturated, or more than half of its table indices or
-//!           gates lay at an end, or more than half of its requests were cut by the bound of a write
-//! still     a layer received no pulse in an epoch
+//!           gates lay at an end, or more than half of its requests were cut by the bound of a write; of the outputs,
+//!           which lie at an end where they are sure, more than three quarters of the table indices
+//! still     a layer received no pulse in an epoch, at whose start the schedule had left 1/16 of its rate at least
 //! mute      the units of a layer put out the same whatever was shown
 //! forgot    an epoch knows less than half of the right answers of an earlier one
 //! chance    (correct - constant)^2 <= 9 constant (total - constant) / total, of the test, else of the last epoch;
@@ -17,13 +18,16 @@
 use crate::chip::ledger::Event;
 use crate::lab::store::record::{EpochRecord, Note, Receipt, Score, TestRecord};
 
-/// What ends at a rail or a bound: its name, the event, of what, and more than 1 in how many is too many.
-const CLIPS: [(&str, Event, Event, u64); 4] = [
-    ("conversions", Event::SaturatedConversions, Event::Conversions, 20),
-    ("tables", Event::SaturatedLookUps, Event::LookUps, 2),
-    ("gates", Event::SaturatedGates, Event::Multiplies, 2),
-    ("requests", Event::Bounded, Event::Requested, 2),
+/// What ends at a rail or a bound: its name, the event, of what, and what share is too much of hidden layers and of the
+/// outputs.
+const CLIPS: [(&str, Event, Event, [[u64; 2]; 2]); 4] = [
+    ("conversions", Event::SaturatedConversions, Event::Conversions, [[1, 20]; 2]),
+    ("tables", Event::SaturatedLookUps, Event::LookUps, [[1, 2], [3, 4]]),
+    ("gates", Event::SaturatedGates, Event::Multiplies, [[1, 2]; 2]),
+    ("requests", Event::Bounded, Event::Requested, [[1, 2]; 2]),
 ];
+/// Steps of the shift after which a schedule has left so little that no pulse is no wonder.
+const LATE: u32 = 4;
 /// Answers of fewer examples than this are counted as they are.
 const FEW: u64 = 50;
 
@@ -54,6 +58,8 @@ struct LayerSeen {
     /// Counts of [`CLIPS`] so far.
     counts: [[u64; 2]; CLIPS.len()],
     pulses: u64,
+    /// Shift of the rate at first, and after the last record.
+    shifts: [u32; 2],
     clips: [Worst; CLIPS.len()],
     still: Worst,
     mute: Worst,
@@ -74,6 +80,7 @@ impl Watcher {
         let epoch = record.epoch;
         let mut new = Vec::new();
         self.layers.resize_with(record.layers.len(), LayerSeen::default);
+        let outputs = record.layers.last().map(|layer| layer.layer);
         for (seen, layer) in self.layers.iter_mut().zip(&record.layers) {
             let pathways = || record.pathways.iter().filter(|one| one.layer == layer.layer);
             let total = |event: Event| -> u64 {
@@ -83,12 +90,17 @@ impl Watcher {
             seen.counts = CLIPS.map(|(_, some, all, _)| [total(some), total(all)]);
             seen.pulses = total(Event::PulsesAttempted);
             if epoch == 0 {
+                seen.shifts = [layer.rate_shift; 2];
                 continue;
             }
+            let [first, before_it] = seen.shifts;
+            let late = before_it.saturating_sub(first) > LATE;
+            seen.shifts[1] = layer.rate_shift;
             for (at, (of, _, _, most)) in CLIPS.into_iter().enumerate() {
                 let [some, all] =
                     [0, 1].map(|n| seen.counts[at][n].saturating_sub(before.0[at][n]));
-                if some.saturating_mul(most) > all {
+                let [part, whole] = most[usize::from(outputs == Some(layer.layer))];
+                if some.saturating_mul(whole) > all.saturating_mul(part) {
                     seen.clips[at].see(epoch, some, all);
                     new.extend(
                         clipped(layer.layer, of, seen.clips[at])
@@ -96,7 +108,7 @@ impl Watcher {
                     );
                 }
             }
-            if seen.pulses == before.1 {
+            if seen.pulses == before.1 && !late {
                 seen.still.see(epoch, 1, 1);
                 new.extend(still(layer.layer, seen.still).filter(|_| seen.still.epochs == 1));
             }

@@ -37,7 +37,7 @@ pub fn compare(paths: &[PathBuf]) -> Result<Comparison, SweepError> {
             test: receipt.classified().map(|test| (test.score, test.epoch)),
             cost: if finished { Some(run::reprice_as(path, None)?.cost()) } else { None },
             differs_from,
-            notes: receipt.notes.iter().map(ToString::to_string).collect(),
+            notes: run::notes(&receipt, &records).iter().map(ToString::to_string).collect(),
             records,
         });
         results.push(if finished { sweep::row(path)?.0.results } else { serde_json::Map::new() });

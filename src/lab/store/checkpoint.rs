@@ -220,7 +220,8 @@ impl<'a> Checked<'a> {
         let tensor = self.file.tensor(name).map_err(|_| damaged(name, "is missing"))?;
         if tensor.dtype() != dtype || tensor.shape() != shape {
             let (kind, found) = (tensor.dtype(), tensor.shape());
-            let found = format!("is {kind:?} {found:?}, but should be {dtype:?} {shape:?}");
+            let (found, wanted) = (kind_and_shape(kind, found), kind_and_shape(dtype, shape));
+            let found = format!("holds {found}, but should hold {wanted}");
             return Err(damaged(name, &found));
         }
         Ok(tensor.data())
@@ -235,6 +236,12 @@ impl<'a> Checked<'a> {
         let bytes = self.bytes(name, Dtype::I64, shape)?;
         Ok(bytes.as_chunks::<8>().0.iter().map(|number| i64::from_le_bytes(*number)).collect())
     }
+}
+
+/// `3 x 4 numbers of 16 bits`.
+fn kind_and_shape(kind: Dtype, shape: &[usize]) -> String {
+    let sides: Vec<_> = shape.iter().map(ToString::to_string).collect();
+    format!("{} numbers of {} bits", sides.join(" x "), kind.bitsize())
 }
 
 fn damaged(name: &str, found: &str) -> StateError {

@@ -1,5 +1,4 @@
 //! The folder of a run: files written whole, read with limits, held by one process at a time.
-#![expect(clippy::disallowed_methods, reason = "runs live in files")]
 
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, Read, Seek, SeekFrom, Write};

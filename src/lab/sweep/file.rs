@@ -195,8 +195,7 @@ fn sampled(file: SampleFile) -> Result<Sample, SweepError> {
 const SEEDS_MAX: u32 = 100_000;
 
 fn seeds(file: Option<SeedsFile>) -> Result<Vec<u64>, SweepError> {
-    let allowed =
-        "give 1 to 100000 different ones; ten of them tell a difference of one standard deviation";
+    let allowed = "give 1 to 100000 different ones";
     let wrong = |count: u64| SweepError::key("seeds", &format!("are {count}"), allowed);
     let list = match file {
         None => return Ok(vec![]),

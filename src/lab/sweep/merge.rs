@@ -1,5 +1,4 @@
 //! Putting stores together, and making an index again from the folders.
-#![expect(clippy::disallowed_methods, reason = "stores live in files")]
 
 use std::fs;
 use std::path::Path;

@@ -16,7 +16,7 @@ use crate::lab::run::Memory;
 
 /// Most points of a sweep, before filters.
 const POINTS_MAX: u128 = 2_000_000;
-/// Bytes that a planned point takes, its run and its line in the index included: measured, and rounded up.
+/// Bytes that a planned point takes, its run and its line in the index included: an estimate on the high side.
 const POINT_BYTES: u64 = 2_048;
 
 /// One point.

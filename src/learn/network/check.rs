@@ -130,22 +130,39 @@ fn wiring(network: &NetworkSpec) -> Checked {
         };
         if layer.wiring != wanted {
             let found =
-                format!("does not fit the arrays of layer {at}, which are {:?}", layer.wiring);
+                format!("does not fit the arrays of layer {at}, which {}", wired(layer.wiring));
             let allowed = format!(
-                "error diffusion has two populations and reads one out, baselines have differential pairs: wire it {wanted:?}"
+                "error diffusion has two populations and reads one out, baselines have differential pairs: make arrays that {}",
+                wired(wanted)
             );
             return misfit("learning.rule", found, allowed);
         }
         let drives = if at == 0 { DrivenBy::Shared } else { DrivenBy::Streams };
         if layer.driven_by != drives {
-            let found = format!("has a layer {at} driven by {:?}", layer.driven_by);
+            let shared = |drives: DrivenBy| match drives {
+                DrivenBy::Shared => "one set of drives",
+                DrivenBy::Streams => "a set of drives for each stream",
+            };
+            let found = format!("gives layer {at} {}", shared(layer.driven_by));
             let allowed = format!(
-                "data drive both streams of the first layer alike, and streams those of the others: {drives:?}"
+                "data drive both streams of the first layer alike, and streams those of the others: give it {}",
+                shared(drives)
             );
             return misfit("network.hidden", found, allowed);
         }
     }
     Ok(())
+}
+
+/// What the arrays of a layer do, in words.
+const fn wired(wiring: Wiring) -> &'static str {
+    match wiring {
+        Wiring::Dual => "have two populations above and below",
+        Wiring::DualReadout => "read one of two populations out",
+        Wiring::Single => "are differential pairs",
+        #[cfg(test)]
+        Wiring::DualPairs => "have two populations of differential pairs",
+    }
 }
 
 /// What is centred over, and when it is written.

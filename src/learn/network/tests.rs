@@ -82,13 +82,19 @@ fn everything_that_does_not_fit_together_is_refused_with_its_key() {
         ("network.init_gain", "1025/64", |n| n.layers[0].gain_64ths = [1024, 1025]),
         ("network.init_gain_output", "0/64", |n| n.layers[1].gain_64ths = [0, 1]),
         ("learning.rule", "two classes", |n| n.rule = Rule::Kaneko),
-        ("learning.rule", "wire it Single", |n| {
+        ("learning.rule", "make arrays that are differential pairs", |n| {
             (n.rule, n.route) = (Rule::Dfa, Some(Route::RandomDense { shift: None }));
         }),
-        ("learning.rule", "wire it DualReadout", |n| n.layers[1].wiring = Wiring::Dual),
-        ("learning.rule", "wire it Dual", |n| n.layers[0].wiring = Wiring::Single),
-        ("network.hidden", "Shared", |n| n.layers[0].driven_by = DrivenBy::Streams),
-        ("network.hidden", "Streams", |n| n.layers[1].driven_by = DrivenBy::Shared),
+        ("learning.rule", "read one of two populations out", |n| n.layers[1].wiring = Wiring::Dual),
+        ("learning.rule", "have two populations above and below", |n| {
+            n.layers[0].wiring = Wiring::Single
+        }),
+        ("network.hidden", "give it one set of drives", |n| {
+            n.layers[0].driven_by = DrivenBy::Streams
+        }),
+        ("network.hidden", "give it a set of drives for each stream", |n| {
+            n.layers[1].driven_by = DrivenBy::Shared
+        }),
         ("learning.centre", "one sample has no mean", |n| n.mode = UpdateMode::Online),
         ("learning.centre", "larger learning.batch", |n| n.batch = Batch::new(1).unwrap()),
         ("learning.route", "is missing", |n| n.route = None),

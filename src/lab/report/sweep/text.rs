@@ -67,7 +67,9 @@ pub fn text(view: &SweepView<'_>) -> Option<String> {
             let _ = write!(out, "  {text:>width$}", width = wide(head));
         }
     }
-    let width = first.max(x.axis.label.chars().count()).max(measure.column.label.chars().count());
+    let explained = [Some(x), series, panel].into_iter().flatten().map(|axis| &axis.axis.label);
+    let explained = explained.chain([&measure.column.label]).map(|label| label.chars().count());
+    let width = explained.max().unwrap_or(first);
     let mut explain = |head: &str, words: &str| {
         if !words.is_empty() {
             let _ = write!(out, "\n{head:>width$}  {words}");

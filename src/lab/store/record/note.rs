@@ -141,7 +141,7 @@ impl fmt::Display for Note {
                     ),
                 };
                 let percent = percent(*clipped, *all);
-                write!(f, "layer {layer}: {percent} % {happened} in epoch {epoch}")?;
+                write!(f, "layer {layer}, epoch {epoch}: {percent} % {happened}")?;
                 also(f, *epochs)?;
                 write!(f, ": {cure}")
             }
