@@ -77,7 +77,10 @@ fn another(value: &Value) -> Value {
     match value {
         Value::Number(number) => match number.as_u64() {
             Some(n) => n.wrapping_add(1).into(),
-            None => (number.as_i64().unwrap() + 1).into(),
+            None => match number.as_i64() {
+                Some(n) => (n + 1).into(),
+                None => (number.as_f64().unwrap() + 1.0).into(),
+            },
         },
         Value::String(text) => {
             let first = if text.starts_with('a') { 'b' } else { 'a' };

@@ -26,7 +26,7 @@ fn config(text: &str) -> Config {
 #[test]
 fn examples_of_one_class_are_refused_as_a_single_output_answers_two() {
     let set = Examples::new(vec![0, 1, 1, 0, 1, 1], vec![0; 3], 2, 1, 1).unwrap();
-    let config = config("network.hidden = [3]");
+    let config = config("network.hidden = [3]\nlearning.taps = 1");
     let mut experiment = config.experiment(2, 2, None).unwrap();
     experiment.network.layers[1].units = 1;
     let refused = Classifier::new(experiment, &set, Backend::best()).unwrap_err();

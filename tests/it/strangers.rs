@@ -67,7 +67,7 @@ fn an_export_to_a_device_a_pipe_or_a_link_is_written_into_it() {
     // half a table is no answer
     for format in ["csv", "json", "parquet"] {
         let line = format!("\"$0\" export $1 --format {format} > /dev/full");
-        refused(&shell(&line, &[place.path()]), &["cannot write standard output"]);
+        refused(&shell(&line, &[place.path()]), &["cannot write to standard output"]);
     }
     // nor is half a trace, and the one before stays
     let wave = place.path().join("wave.vcd");

@@ -237,7 +237,7 @@ mod tests {
             (&["network.hidden=[64, 32]"], "optdigits-ed-hidden64x32-seed1"),
             (&["network.hidden=[1024]"], "optdigits-ed-hidden1024-seed1"),
             (&["learning.batch=1"], "optdigits-ed-batch1-seed1"),
-            (&["learning.mode=online"], "optdigits-ed-mode-online-seed1"),
+            (&["learning.mode=online"], "optdigits-ed-learning-mode-online-seed1"),
             (&["learning.batch=8", "learning.rate=18"], "optdigits-ed-batch8-rate18.0-seed1"),
             (&["network.alpha=[4, 4]"], "optdigits-ed-seed1"),
             (&["learning.rule=dfa"], "optdigits-dfa-seed1"),

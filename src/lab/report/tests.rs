@@ -144,7 +144,7 @@ fn check_tags(page: &str) {
         } else {
             open.push(name);
             if name == "script" || name == "style" {
-                rest = &rest[rest.find("</").expect("it closes")..];
+                rest = &rest[rest.find(&format!("</{name}")).expect("it closes")..];
             }
         }
     }

@@ -129,7 +129,7 @@ mod tests {
         let error = weigh(layers, hardware, Some(Memory::of(24 << 30))).unwrap_err().to_string();
         assert!(error.contains("160.") && error.contains("24.0 GiB"), "{error}");
         assert!(weigh(layers, hardware, None).is_ok(), "who knows nothing refuses nothing");
-        let small = config.experiment(4, 2, None);
+        let small = config.experiment(4, 10, None);
         assert!(small.is_ok());
     }
 

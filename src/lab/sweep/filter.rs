@@ -148,7 +148,7 @@ mod tests {
             ("bits >", 6, "a value is missing"),
             ("bits + 1", 0, "it gives 5, not true or false"),
             ("bits = 3", 5, "compare with =="),
-            ("while true {}", 0, "`while` is no axis"),
+            ("while true {}", 11, "`{` is nothing here"),
             ("bits > 3)", 8, "nothing is open"),
             ("(bits > 3", 9, "`)` is missing"),
             ("bits in [1, 2", 13, "`]` is missing"),

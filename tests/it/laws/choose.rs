@@ -44,6 +44,11 @@ pub(crate) struct Net {
 }
 
 impl Net {
+    /// Small factor of the rate, another one in every layer.
+    pub(crate) fn mantissa_of(&self, layer: usize) -> u32 {
+        1 + (self.mantissa - 1 + 4 * u32::try_from(layer).unwrap()) % 15
+    }
+
     /// Changes parts of the chip.
     pub(crate) fn change(&mut self, change: impl FnOnce(&mut HardwareSpec)) {
         self.hardware = self.hardware.with(change).unwrap();

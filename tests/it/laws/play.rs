@@ -338,9 +338,7 @@ pub(crate) fn engine(net: &Net, backend: Backend) -> Engine {
         Layer::new(index, spec.clone(), delivery.clone(), &net.hardware)
     });
     let mut engine = Engine::new(net.hardware.clone(), backend, net.seed, layers.collect());
-    // another one in every layer
-    let mantissas: Vec<u32> =
-        (0..).zip(engine.layers()).map(|(at, _)| 1 + (net.mantissa - 1 + 4 * at) % 15).collect();
+    let mantissas: Vec<u32> = (0..net.specs.len()).map(|layer| net.mantissa_of(layer)).collect();
     engine.set_mantissas(&mantissas);
     engine.set_potentiation_only(net.potentiation_only);
     if matches!(net.hardware.adc, Adc::Finite { range: AdcRange::Tracking, .. }) {

@@ -46,7 +46,8 @@ fn the_tables_hold_the_keys_that_the_reader_of_files_knows_and_no_others() {
 
 fn with(settings: &[String]) -> Result<Config, ConfigError> {
     // a model that is silent, so that defaults are the program's and not a model's
-    let text = "[hw]\nname = \"silent\"";
+    let text =
+        "hw = { name = \"silent\", cell = {}, tile = {}, drive = {}, adc = \"ideal\", write = {} }";
     let experiment = Some(("x", text));
     load(&Sources { experiment, settings, ..Sources::default() })
 }

@@ -49,7 +49,8 @@ mod tests {
             assert_eq!(numbers, constants.iter().count(), "{model}");
             assert!(constants.node_words().unwrap().contains(" nm ("), "{model}");
         }
-        let bare = "hw.name = \"x\"";
+        let bare =
+            "hw = { name = 'x', cell = {}, tile = {}, drive = {}, adc = 'ideal', write = {} }";
         let sources = Sources { experiment: Some(("x", bare)), ..Sources::default() };
         assert_eq!(load(&sources).unwrap().constants.node_words(), None);
     }

@@ -37,6 +37,11 @@ fn chip() -> config::Config {
     let text = "
         [hw]
         name = \"x\"
+        cell = {}
+        tile = {}
+        drive = {}
+        adc = \"ideal\"
+        write = {}
         timing.clock_mhz = 1
         [hw.energy]
         conversion_pj = { low = 1, typical = 2, high = 4, source = \"s\", kind = \"assumed\" }

@@ -176,7 +176,7 @@ impl Shadow {
         let bound = i64::from(hw.write.increment_max.get());
         let (mut requested, mut bounded, mut attempted, mut effective) = (0, 0, 0, 0);
         for (row, column) in (0..rows).flat_map(|row| (0..columns).map(move |c| (row, c))) {
-            let (mantissa, word) = (i64::from(self.net.mantissa), words[row][column]);
+            let (mantissa, word) = (i64::from(self.net.mantissa_of(layer)), words[row][column]);
             let (inside, outside) =
                 if self.is(Fault::MantissaAfterRounding) { (1, mantissa) } else { (mantissa, 1) };
             let rounded = if self.is(Fault::SignAfterRounding) {
