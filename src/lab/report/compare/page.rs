@@ -197,6 +197,7 @@ fn print(value: f64, unit: ColumnUnit) -> String {
     match unit {
         ColumnUnit::Fraction => percent(value, 2),
         ColumnUnit::Seconds | ColumnUnit::Joules => prefixed(value, unit.sign()),
+        ColumnUnit::SquareMillimetres => format!("{} {}", significant(value), unit.sign()),
         ColumnUnit::Cycles | ColumnUnit::Count if value >= 0.0 => short(value.round() as u64),
         _ => significant(value),
     }
