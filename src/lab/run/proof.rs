@@ -56,9 +56,13 @@ pub(super) fn inputs(receipt: &Receipt, session: &Session, text: &str) -> Result
             return Err(RunError::ConfigChanged { what, found, wanted });
         }
     }
+    let content = |found| Err(FolderError::Content { path: names::RECEIPT.into(), found }.into());
     if receipt.data != *data {
-        let found = format!("says that the data has {}, but it has {data}", receipt.data);
-        return Err(FolderError::Content { path: names::RECEIPT.into(), found }.into());
+        return content(format!("says that the data has {}, but it has {data}", receipt.data));
+    }
+    // receipts of earlier programs have none
+    if !receipt.rates.is_empty() && receipt.rates != session.rates() {
+        return content("says other rates than its configuration gives".into());
     }
     Ok(())
 }
@@ -189,10 +193,13 @@ pub(super) fn difference<T: Serialize>(kept: &Value, found: &T) -> Option<Differ
 /// unless nothing was counted.
 const COUNTS: [&str; 6] = ["events", "cycles", "training", "stages", "busy", "used"];
 
+/// What is written down only where it holds: a missing one is wrong unless it does not hold.
+const HOLDS: [&str; 1] = ["mute"];
+
 /// Whether a count, or every count of a table, is 0.
 fn is_nothing(value: &Value) -> bool {
     match value {
-        Value::Null => true,
+        Value::Null | Value::Bool(false) => true,
         Value::Number(number) => number.as_u64() == Some(0),
         Value::Object(map) => map.values().all(is_nothing),
         _ => false,
@@ -206,9 +213,10 @@ fn differs(place: &str, kept: &Value, found: &Value) -> Option<Difference> {
     match (kept, found) {
         (Value::Object(kept), Value::Object(found)) => {
             let counted = place.split('.').any(|part| COUNTS.contains(&part));
-            let lost = found
-                .iter()
-                .filter(|(name, value)| counted && !kept.contains_key(*name) && !is_nothing(value));
+            let lost = found.iter().filter(|(name, value)| {
+                let absent_is_nothing = counted || HOLDS.contains(&name.as_str());
+                absent_is_nothing && !kept.contains_key(*name) && !is_nothing(value)
+            });
             let lost = lost.map(|(name, value)| (name, &nothing, value));
             let pairs =
                 kept.iter().map(|(name, kept)| (name, kept, found.get(name).unwrap_or(&nothing)));
