@@ -65,6 +65,12 @@ fn lines_of(file: &ExperimentFile) -> Vec<(String, String)> {
     lines
 }
 
+/// The default that a key has where its table is there.
+fn own_default(key: &str) -> Option<&'static str> {
+    let shown = keys::matching(key).into_iter().find(|shown| shown.full() == key)?;
+    Some(shown.entry.default).filter(|default| !default.is_empty())
+}
+
 impl Config {
     /// What a user gets by saying nothing but data, rule and chip.
     fn silent(&self) -> Option<ExperimentFile> {
@@ -113,7 +119,11 @@ impl Config {
             .filter(|(key, _)| !["seed", "hw.name"].contains(&&**key) && !key.starts_with("data."));
         let differ = others.filter_map(|(key, value)| {
             let default = silent.iter().find(|(name, _)| *name == key).map(|(_, text)| text);
-            let same = default.is_some_and(|default| same(&value, default));
+            // a table that saying nothing does not have brings its own defaults
+            let same = match default {
+                Some(default) => same(&value, default),
+                None => own_default(&key).is_some_and(|default| same(&value, default)),
+            };
             (!same).then(|| Difference { key, value, default: default.cloned() })
         });
         differ.collect()
@@ -234,6 +244,7 @@ mod tests {
             (&["hw.model=reram"], "optdigits-ed-reram-seed1"),
             (&["hw.model=reram", "hw.cell.level_bits=7"], "optdigits-ed-reram-seed1"),
             (&["hw.model=reram", "hw.adc.bits=4"], "optdigits-ed-reram-adc-bits4-seed1"),
+            (&["hw.adc.bits=4"], "optdigits-ed-adc-bits4-seed1"),
             (&["network.hidden=[64, 32]"], "optdigits-ed-hidden64x32-seed1"),
             (&["network.hidden=[1024]"], "optdigits-ed-hidden1024-seed1"),
             (&["learning.batch=1"], "optdigits-ed-batch1-seed1"),

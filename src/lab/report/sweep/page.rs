@@ -288,7 +288,7 @@ fn notices(view: &SweepView<'_>) -> String {
         let list: String =
             list.map(|text| format!("<li><code>{}</code></li>", escape(text))).collect();
         out += &format!(
-            "<ul class=\"notices\"><li><details><summary>{} effects of real chips are not simulated: {}</summary><ul>{list}</ul></details>\
+            "<ul class=\"notices\"><li class=\"fold\"><details><summary>{} effects of real chips are not simulated: {}</summary><ul>{list}</ul></details>\
              </li></ul>\n",
             names.len(),
             names.join(", ")
