@@ -175,7 +175,7 @@ fault "4 a row does not turn around" $timing \
 fault "4 verifying takes no time" $timing \
     'self.pulse + if self.verify { self.settle + self.conversion() } else { 0 }' \
     'self.pulse' laws::law_4
-fault "4 slow lanes hold nothing up" $timing \
+fault "4 slow lanes hold nothing up" src/chip/hardware/read_time.rs \
     'if front > lanes { front } else { lanes }' 'if front > lanes { front } else { front }' laws::law_4
 fault "4 trains fire in one phase" $timing \
     '2 * slots * self.pulse' 'slots * self.pulse' laws::law_4
@@ -193,7 +193,11 @@ fault "run verify ignores records" $verify \
 fault "run verify ignores the last state" $verify \
     'Some(kept) if kept != state && !seen =>' 'Some(kept) if kept.is_empty() =>' damage
 fault "run a lost count is no difference" src/lab/run/proof.rs \
-    'counted && !kept.contains_key(*name) && !is_nothing(value)' 'false && counted && is_nothing(value)' damage
+    'absent_is_nothing && !kept.contains_key(*name)' 'false && absent_is_nothing && !kept.contains_key(*name)' damage
+fault "run a mute layer is no difference" src/lab/run/proof.rs \
+    'const HOLDS: [&str; 1] = ["mute"];' 'const HOLDS: [&str; 1] = ["deaf"];' damage
+fault "run eval ignores the rates of a receipt" src/lab/run/proof.rs \
+    'receipt.rates != session.rates()' 'false' damage
 fault "run a state need not be what it says" src/lab/store/checkpoint.rs \
     'checked.same("state_hash", &hash::state(state))' 'Ok(())' damage
 fault "run an address has constants in it" src/lab/config/given.rs \
