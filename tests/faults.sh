@@ -193,9 +193,9 @@ fault "run verify ignores records" $verify \
 fault "run verify ignores the last state" $verify \
     'Some(kept) if kept != state && !seen =>' 'Some(kept) if kept.is_empty() =>' damage
 fault "run a lost count is no difference" src/lab/run/proof.rs \
-    'absent_is_nothing && !kept.contains_key(*name)' 'false && absent_is_nothing && !kept.contains_key(*name)' damage
-fault "run a mute layer is no difference" src/lab/run/proof.rs \
-    'const HOLDS: [&str; 1] = ["mute"];' 'const HOLDS: [&str; 1] = ["deaf"];' damage
+    'counted && !kept.contains_key(*name) && !is_nothing(value)' 'false && counted && is_nothing(value)' damage
+fault "run a mute layer may be left out" src/lab/store/folder.rs \
+    '(known || told > 0) && told < record.layers.len()' 'known && told > record.layers.len()' damage
 fault "run eval ignores the rates of a receipt" src/lab/run/proof.rs \
     'receipt.rates != session.rates()' 'false' damage
 fault "run a state need not be what it says" src/lab/store/checkpoint.rs \

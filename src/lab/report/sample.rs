@@ -128,7 +128,7 @@ fn record(layers: &[(usize, usize, &[&str])], epoch: u32) -> EpochRecord {
         currents: [[300, 200], [100, 0]],
         adc_shifts: Vec::new(),
         rate_shift: 4,
-        mute: false,
+        mute: Some(false),
     });
     EpochRecord {
         epoch,

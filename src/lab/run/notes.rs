@@ -112,7 +112,7 @@ impl Watcher {
                 seen.still.see(epoch, 1, 1);
                 new.extend(still(layer.layer, seen.still).filter(|_| seen.still.epochs == 1));
             }
-            if layer.mute {
+            if layer.mute == Some(true) {
                 seen.mute.see(epoch, 1, 1);
                 new.extend(mute(layer.layer, seen.mute).filter(|_| seen.mute.epochs == 1));
             }

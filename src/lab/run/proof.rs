@@ -193,13 +193,10 @@ pub(super) fn difference<T: Serialize>(kept: &Value, found: &T) -> Option<Differ
 /// unless nothing was counted.
 const COUNTS: [&str; 6] = ["events", "cycles", "training", "stages", "busy", "used"];
 
-/// What is written down only where it holds: a missing one is wrong unless it does not hold.
-const HOLDS: [&str; 1] = ["mute"];
-
 /// Whether a count, or every count of a table, is 0.
 fn is_nothing(value: &Value) -> bool {
     match value {
-        Value::Null | Value::Bool(false) => true,
+        Value::Null => true,
         Value::Number(number) => number.as_u64() == Some(0),
         Value::Object(map) => map.values().all(is_nothing),
         _ => false,
@@ -213,10 +210,9 @@ fn differs(place: &str, kept: &Value, found: &Value) -> Option<Difference> {
     match (kept, found) {
         (Value::Object(kept), Value::Object(found)) => {
             let counted = place.split('.').any(|part| COUNTS.contains(&part));
-            let lost = found.iter().filter(|(name, value)| {
-                let absent_is_nothing = counted || HOLDS.contains(&name.as_str());
-                absent_is_nothing && !kept.contains_key(*name) && !is_nothing(value)
-            });
+            let lost = found
+                .iter()
+                .filter(|(name, value)| counted && !kept.contains_key(*name) && !is_nothing(value));
             let lost = lost.map(|(name, value)| (name, &nothing, value));
             let pairs =
                 kept.iter().map(|(name, kept)| (name, kept, found.get(name).unwrap_or(&nothing)));

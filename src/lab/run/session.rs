@@ -255,7 +255,7 @@ impl Session {
                 currents,
                 adc_shifts: this.adc_shifts.clone(),
                 rate_shift: driver.shift(at),
-                mute,
+                mute: Some(mute),
             }
         });
         let layers = layers.collect();

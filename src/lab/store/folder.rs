@@ -357,12 +357,19 @@ pub fn parse_receipt(text: &str) -> Result<Receipt, String> {
 /// What is wrong with them.
 pub fn parse_metrics(text: &str) -> Result<Vec<EpochRecord>, String> {
     let mut records: Vec<EpochRecord> = Vec::new();
+    let mut known = false;
     for (line, text) in text.lines().enumerate() {
         let record: EpochRecord =
             serde_json::from_str(text).map_err(|e| format!("line {}: {e}", line + 1))?;
         if record.epoch as usize != line {
             return Err(format!("line {} is epoch {}, not {line}", line + 1, record.epoch));
         }
+        // a program that knew of it said it of every layer, and went on to
+        let told = record.layers.iter().filter(|layer| layer.mute.is_some()).count();
+        if (known || told > 0) && told < record.layers.len() {
+            return Err(format!("line {}: a layer lacks `mute`, which others have", line + 1));
+        }
+        known |= told > 0;
         records.push(record);
     }
     Ok(records)

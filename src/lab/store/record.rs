@@ -52,9 +52,10 @@ pub struct LayerRecord {
     pub adc_shifts: Vec<Vec<u32>>,
     /// Shift k of the rate at the end of the epoch.
     pub rate_shift: u32,
-    /// Whether its units put out the same whatever was shown in the evaluation of this epoch; absent where they did not.
-    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
-    pub mute: bool,
+    /// Whether its units put out the same whatever was shown in the evaluation of this epoch; absent in records of earlier
+    /// programs.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub mute: Option<bool>,
 }
 
 /// What a task says of an epoch.
