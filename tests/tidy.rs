@@ -28,7 +28,7 @@ const HOUSE: [(&str, &[&str]); 6] = [
         &["state", "hardware", "ledger", "periphery", "crossbar", "population", "layer", "engine"],
     ),
     ("learn", &["error", "route", "statistics", "rule", "driver", "network"]),
-    ("task", &["classify"]),
+    ("task", &["classify", "environment", "policy"]),
     (
         "lab",
         &[

@@ -460,7 +460,7 @@ fn check_trains(
 ) -> Result<(), HardwareError> {
     let wrong = |key, found: String, allowed: String| Err(HardwareError { key, found, allowed });
     let most = WriteScheme::SLOTS_MAX.min(increment_max.get());
-    if 1u64 << slots_log2.min(63) > most.into() {
+    if 1u64 << slots_log2.min(63) > u64::from(most) {
         let allowed = format!(
             "a power of two in 1..={most}: a cell gets at most one pulse a slot, and write.increment_max is {}",
             increment_max.get()

@@ -101,9 +101,21 @@ coded! {
         VerifyReads = 20, "verify_reads";
         /// A bit went into or came out of a digital memory beside the tiles.
         SramBits = 21, "sram_bits";
+        /// An accumulator was squared and added to the sum that a layer is normalised by.
+        Squares = 22, "squares";
+        /// The root of a sum of squares was taken, and its reciprocal.
+        Roots = 23, "roots";
+        /// An accumulator was multiplied with such a reciprocal.
+        Scalings = 24, "scalings";
+        /// The mean of a row's drives was kept or used, of centred updates.
+        RowMeans = 25, "row_means";
+        /// A sum of a cell was squared and added, for an optimiser that looks at a whole layer.
+        SumSquares = 26, "sum_squares";
+        /// An optimiser looked at a cell: what is asked of it was computed, and a word of its own renewed if it has one.
+        OptimiserSteps = 27, "optimiser_steps";
         /// What a later program counts and no run of this one ever does.
         #[cfg(feature = "grown")]
-        Grown = 22, "grown";
+        Grown = 28, "grown";
     }
 }
 

@@ -26,6 +26,12 @@ pub enum Site {
     InitialLevels = 1,
     /// Order of the samples in an epoch.
     Shuffle = 2,
+    /// Actions that a policy tries.
+    Exploration = 7,
+    /// How episodes of an environment begin and go on.
+    Environment = 8,
+    /// Levels that evolution strategies try.
+    Perturbation = 9,
     /// Shifts that augment a training image.
     Augment = 10,
     /// Fixed random error routes and feedback signs.

@@ -70,7 +70,7 @@ fn numbers(network: &NetworkSpec) -> Checked {
             let allowed = "it must be a power of two from 1/256 to 256";
             return misfit("network.weight_max", found, allowed);
         }
-        if let Some(gain) = gain_64ths.iter().find(|gain| !GAIN_64THS.contains(gain)) {
+        if let Some(gain) = gain_64ths.iter().find(|&&gain| !GAIN_64THS.contains(&gain)) {
             let key = if at == last { "network.init_gain_output" } else { "network.init_gain" };
             let found = format!("of layer {at} holds {gain}/64");
             return misfit(key, found, "gains are multiples of 1/64, up to 16");

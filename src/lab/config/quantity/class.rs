@@ -55,6 +55,12 @@ impl CostClass {
             | Event::BusWords
             | Event::Accumulates
             | Event::DeltaComputations
+            | Event::Squares
+            | Event::Roots
+            | Event::Scalings
+            | Event::RowMeans
+            | Event::SumSquares
+            | Event::OptimiserSteps
             | Event::SaturatedLookUps
             | Event::SaturatedErrors
             | Event::SaturatedGates

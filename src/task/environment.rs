@@ -1,0 +1,131 @@
+//! Environments: what a policy acts on, many side by side, in integers.
+//!
+//! A [`VecEnv`] shows observations, takes actions, gives rewards and says how an episode ended. An end has the meaning
+//! that Gymnasium gives it: *terminated* is an end of the task, after which nothing is worth anything; *truncated* is a
+//! stop from outside, most often a limit of time, after which the state would have been worth what it was. An episode
+//! that ended begins again in the same step: what was reached and what the next one begins with are both shown.
+//!
+//! Numbers that are not counts are [`Real`]: 32 bits, 16 of them behind the point. What is drawn is drawn at its place:
+//! site [`Environment`](crate::num::draw::Site::Environment), sub = number of the environment, count = number of its
+//! episode. See docs/MODEL.md, 5.
+#![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
+
+use std::fmt;
+
+use fixed::types::I16F16;
+
+use crate::chip::state::State;
+
+/// An observation, an action or a reward.
+pub type Real = I16F16;
+
+/// What an environment shows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Shown {
+    /// So many numbers.
+    Dense(usize),
+    /// So many lines, of which some are on and the others off.
+    Sparse {
+        /// Lines.
+        lines: usize,
+        /// On at a time, at most.
+        active: usize,
+    },
+}
+
+/// What an environment takes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Taken {
+    /// One of so many actions.
+    Discrete(usize),
+    /// So many numbers from -1 to 1, which the environment scales to what it takes.
+    Continuous(usize),
+}
+
+/// An environment, in words and sizes.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct EnvSpec {
+    /// What it is called, such as `CartPole-v1`.
+    pub id: &'static str,
+    /// What it shows.
+    pub shown: Shown,
+    /// What it takes.
+    pub taken: Taken,
+    /// Steps after which an episode is truncated.
+    pub steps_max: u32,
+    /// Names of the numbers or of groups of lines that it shows, in order, with how many there are of each.
+    pub inputs: Vec<(&'static str, usize)>,
+}
+
+/// What some environments show, one after the other.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Observations {
+    /// `[environment][value]`, of dense ones.
+    pub values: Vec<Real>,
+    /// Lines that are on, environment after environment, rising in each; of sparse ones.
+    pub active: Vec<u32>,
+    /// Where those of an environment end.
+    pub ends: Vec<usize>,
+}
+
+/// What some environments are told to do.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Actions<'a> {
+    /// An action each.
+    Discrete(&'a [u16]),
+    /// `[environment][value]`, from -1 to 1.
+    Continuous(&'a [Real]),
+}
+
+/// What came of a step, an entry an environment.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Outcomes {
+    /// What each reached.
+    pub reached: Observations,
+    /// What each shows now: what it reached, or the beginning of its next episode.
+    pub next: Observations,
+    /// Rewards.
+    pub rewards: Vec<Real>,
+    /// Whose task is over.
+    pub terminated: Vec<bool>,
+    /// Who was stopped. Never both.
+    pub truncated: Vec<bool>,
+}
+
+/// An environment that cannot go on.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("environment {which} of `{id}` {found}; {allowed}")]
+pub struct EnvError {
+    /// What it is called.
+    pub id: String,
+    /// Which of those side by side.
+    pub which: usize,
+    /// What was found.
+    pub found: String,
+    /// What is allowed and what to try.
+    pub allowed: String,
+}
+
+/// Environments of one kind, side by side.
+pub trait VecEnv: State + fmt::Debug + Send {
+    /// What they are.
+    fn spec(&self) -> &EnvSpec;
+
+    /// How many there are.
+    fn count(&self) -> usize;
+
+    /// Begins a new episode in each, and shows it.
+    fn reset(&mut self, shown: &mut Observations);
+
+    /// One step in each. Ended episodes begin again.
+    ///
+    /// # Errors
+    /// When one of them cannot go on; nothing that is shown may then be used.
+    fn step(&mut self, actions: Actions<'_>, outcomes: &mut Outcomes) -> Result<(), EnvError>;
+
+    /// A picture of one of them in characters, for people; empty where there is none.
+    fn picture(&self, which: usize) -> String {
+        let _ = which;
+        String::new()
+    }
+}
