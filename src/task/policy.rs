@@ -11,10 +11,18 @@
 //! See docs/MODEL.md, 5.
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
+mod actor;
+mod agent;
+mod critic;
 mod experiment;
 mod outcome;
+mod prefixed;
+mod rollout;
 mod trainer;
 
+use crate::chip::engine::Engine;
+use number::{Logit, saturated};
+
 pub use experiment::{Evaluating, Evolution, InputCoding, Method, PolicyExperiment, Ppo, Share};
-pub use outcome::{PolicyEpoch, PolicyEvaluation, PolicyProgress, SumOf};
-pub use trainer::{PolicyError, PolicyTrainer, WatchedStep};
+pub use outcome::{PolicyEpoch, PolicyEvaluation, PolicyProgress, SumOf, WatchedStep};
+pub use trainer::{PolicyError, PolicyTrainer};
