@@ -68,6 +68,28 @@ pub struct Observations {
     pub ends: Vec<usize>,
 }
 
+impl Observations {
+    /// Forgets everything and keeps the memory.
+    pub fn clear(&mut self) {
+        self.values.clear();
+        self.active.clear();
+        self.ends.clear();
+    }
+
+    /// The numbers of environment number `which`, of `values` each.
+    #[must_use]
+    pub fn values_of(&self, which: usize, values: usize) -> &[Real] {
+        &self.values[which * values..(which + 1) * values]
+    }
+
+    /// The lines that are on of environment number `which`.
+    #[must_use]
+    pub fn lines_of(&self, which: usize) -> &[u32] {
+        let from = which.checked_sub(1).map_or(0, |before| self.ends[before]);
+        &self.active[from..self.ends[which]]
+    }
+}
+
 /// What some environments are told to do.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Actions<'a> {
