@@ -12,13 +12,23 @@
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
 mod actor;
+pub mod advantage;
 mod agent;
 mod critic;
 mod experiment;
+pub mod function;
+pub mod head;
+pub mod moments;
+pub mod number;
+pub mod observe;
 mod outcome;
 mod prefixed;
+pub mod rank;
+pub mod ratio;
 mod rollout;
+pub mod sample;
 mod trainer;
+pub mod value;
 
 use crate::chip::engine::Engine;
 use number::{Logit, saturated};
@@ -26,3 +36,13 @@ use number::{Logit, saturated};
 pub use experiment::{Evaluating, Evolution, InputCoding, Method, PolicyExperiment, Ppo, Share};
 pub use outcome::{PolicyEpoch, PolicyEvaluation, PolicyProgress, SumOf, WatchedStep};
 pub use trainer::{PolicyError, PolicyTrainer};
+
+/// What the last layer put out, `[sample][output]`, as numbers.
+fn outputs(engine: &Engine, put_out: &mut Vec<Logit>) {
+    let mut sums = Vec::new();
+    engine.readouts(&mut sums);
+    let point = 15;
+    let scaled = |&sum: &i64| saturated(sum << (20 - point));
+    put_out.clear();
+    put_out.extend(sums.iter().map(scaled));
+}

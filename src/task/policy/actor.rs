@@ -153,12 +153,12 @@ impl Actor {
     /// What is likeliest for what was read last.
     pub(super) fn likeliest(&self, tables: &PolicyTables) -> Chosen {
         match self.taken {
-            Taken::Discrete(actions) => Chosen::Discrete(
-                self.logits.chunks_exact(actions).map(sample::likeliest).collect(),
-            ),
-            Taken::Continuous(_) => {
-                Chosen::Continuous(self.logits.iter().map(|&mean| function::tanh(tables, mean)).collect())
+            Taken::Discrete(actions) => {
+                Chosen::Discrete(self.logits.chunks_exact(actions).map(sample::likeliest).collect())
             }
+            Taken::Continuous(_) => Chosen::Continuous(
+                self.logits.iter().map(|&mean| function::tanh(tables, mean)).collect(),
+            ),
         }
     }
 
@@ -188,8 +188,7 @@ impl Actor {
                         let step = step as usize;
                         let entropy = head::softmax(tables, logits, &mut probabilities, &mut logs);
                         let action = usize::from(rollout.choices[step]);
-                        let weight =
-                            weigh(tables, clip, logs[action], rollout, step, epoch);
+                        let weight = weigh(tables, clip, logs[action], rollout, step, epoch);
                         let softmax =
                             Softmax { probabilities: &probabilities, logs: &logs, entropy };
                         head::discrete_errors(&softmax, action, weight, beta, &mut wanted);
@@ -210,7 +209,8 @@ impl Actor {
                             errors.push(error.to_bits());
                             *widen += i64::from(wider.to_bits());
                         }
-                        let entropy = scatters.iter().map(|s| i64::from(s.entropy().to_bits())).sum();
+                        let entropy =
+                            scatters.iter().map(|s| i64::from(s.entropy().to_bits())).sum();
                         epoch.entropy.add(entropy);
                     }
                 }

@@ -105,20 +105,23 @@ impl PolicyExperiment {
     /// # Errors
     /// When something does not, with the key that says it.
     pub fn check(&self, spec: &EnvSpec) -> Result<(), NetworkError> {
-        let misfit = NetworkError::misfit;
         if !(1..=1024).contains(&self.environments) {
             let found = format!("is {}", self.environments);
-            return Err(misfit("environment.count", found, "it must lie in 1..=1024"));
+            return Err(NetworkError::misfit(
+                "environment.count",
+                found,
+                "it must lie in 1..=1024",
+            ));
         }
         let sizes = [("ppo.horizon", self.horizon), ("ppo.rollouts_per_epoch", self.rollouts)];
         if let Some((key, _)) = sizes.into_iter().find(|(_, size)| *size == 0) {
-            return Err(misfit(key, "is 0", "give at least 1"));
+            return Err(NetworkError::misfit(key, "is 0", "give at least 1"));
         }
         let epoch = self.steps_per_epoch();
         if self.steps == 0 || self.steps.div_ceil(epoch) > u64::from(u32::MAX) || epoch > 1 << 24 {
             let found = format!("is {}, in epochs of {epoch}", self.steps);
             let allowed = "give 1 step or more, in 2^32 epochs at most of 2^24 steps at most";
-            return Err(misfit("ppo.steps", found, allowed));
+            return Err(NetworkError::misfit("ppo.steps", found, allowed));
         }
         let networks = [(&self.actor, Self::outputs(spec)), (&self.critic, 1)];
         for (network, outputs) in networks {
@@ -127,16 +130,16 @@ impl PolicyExperiment {
             if first.inputs != self.rows(spec) || last.units != outputs {
                 let found = format!("has {} inputs and {} outputs", first.inputs, last.units);
                 let allowed = format!("{} takes {} and {outputs}", spec.id, self.rows(spec));
-                return Err(misfit("network.hidden", found, allowed));
+                return Err(NetworkError::misfit("network.hidden", found, allowed));
             }
             if last.activation != Activation::Accumulator {
                 let allowed = "a policy reads the accumulators of both streams: use \"p-n\"";
-                return Err(misfit("network.readout", "is not \"p-n\"", allowed));
+                return Err(NetworkError::misfit("network.readout", "is not \"p-n\"", allowed));
             }
         }
         if self.actor.batch != self.critic.batch {
             let allowed = "actor and critic learn from the same minibatches";
-            return Err(misfit("learning.batch", "is not one", allowed));
+            return Err(NetworkError::misfit("learning.batch", "is not one", allowed));
         }
         Ok(())
     }

@@ -327,9 +327,7 @@ fn play(
 
 /// Any action, each as likely as another: from the first word, or words, of the environment.
 fn uniform(taken: Taken, count: usize, place: Place) -> Chosen {
-    let words = |environment: u32| {
-        Place { pathway: 1, sub: environment, ..place }.words()
-    };
+    let words = |environment: u32| Place { pathway: 1, sub: environment, ..place }.words();
     let environments = 0..narrow(count, "at most 1024");
     match taken {
         Taken::Discrete(actions) => {
@@ -342,7 +340,12 @@ fn uniform(taken: Taken, count: usize, place: Place) -> Chosen {
         }
         Taken::Continuous(values) => {
             // from -1 to 1 in steps of 2^-16
-            let one = |word: u32| Real::from_bits(narrow(i64::from(below(word, (2 << 16) + 1)) - (1 << 16), "17 bits"));
+            let one = |word: u32| {
+                Real::from_bits(narrow(
+                    i64::from(below(word, (2 << 16) + 1)) - (1 << 16),
+                    "17 bits",
+                ))
+            };
             Chosen::Continuous(environments.flat_map(|e| words(e).take(values).map(one)).collect())
         }
     }
