@@ -69,6 +69,17 @@ pub struct EnvSpec {
     pub inputs: Vec<(&'static str, usize)>,
 }
 
+impl EnvSpec {
+    /// Numbers that it shows; 0 where it shows lines.
+    #[must_use]
+    pub const fn values(&self) -> usize {
+        match self.shown {
+            Shown::Dense(values) => values,
+            Shown::Sparse { .. } => 0,
+        }
+    }
+}
+
 /// What some environments show, one after the other.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Observations {

@@ -8,8 +8,7 @@
 //! See docs/MODEL.md, 5.
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
-use super::agent::Chosen;
-use super::experiment::Ppo;
+use super::experiment::{Ppo, Share};
 use super::function;
 use super::head::{self, Scatter, Softmax};
 use super::number::{
@@ -24,21 +23,80 @@ use crate::learn::driver::Driver;
 use crate::num::draw::Place;
 use crate::num::fixed::narrow;
 use crate::num::tables::PolicyTables;
-use crate::task::environment::Taken;
+use crate::task::environment::{Actions, Real, Taken};
 
 /// `ln sigma` in 2^-20.
 const LOG_SIGMA: std::ops::RangeInclusive<i64> = -4 << 20..=1 << 20;
+
+/// Actions of all environments.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) enum Chosen {
+    Discrete(Vec<u16>),
+    Continuous(Vec<Real>),
+}
+
+impl Chosen {
+    /// Those of `count` environments, of which `live` are told these; what others are told does not matter.
+    pub(super) fn spread_to(&self, live: &[usize], count: usize) -> Self {
+        match self {
+            Self::Discrete(actions) => {
+                let mut all = vec![0; count];
+                live.iter().zip(actions).for_each(|(&which, &action)| all[which] = action);
+                Self::Discrete(all)
+            }
+            Self::Continuous(values) => {
+                let width = values.len() / live.len();
+                let mut all = vec![Real::ZERO; count * width];
+                for (&which, values) in live.iter().zip(values.chunks_exact(width)) {
+                    all[which * width..(which + 1) * width].copy_from_slice(values);
+                }
+                Self::Continuous(all)
+            }
+        }
+    }
+
+    /// Numbers of actions, or their values with 16 fractional bits.
+    pub(super) fn numbers(&self) -> Vec<i64> {
+        match self {
+            Self::Discrete(actions) => actions.iter().map(|&action| action.into()).collect(),
+            Self::Continuous(values) => values.iter().map(|v| v.to_bits().into()).collect(),
+        }
+    }
+
+    pub(super) fn actions(&self) -> Actions<'_> {
+        match self {
+            Self::Discrete(actions) => Actions::Discrete(actions),
+            Self::Continuous(values) => Actions::Continuous(values),
+        }
+    }
+}
 
 /// The network that acts.
 #[derive(Debug)]
 pub(super) struct Actor {
     pub(super) driver: Driver,
     taken: Taken,
-    ppo: Ppo,
+    law: ActorLaw,
     /// `ln sigma` of each value of an action, 20 fractional bits; empty of discrete actions.
     log_sigma: Vec<i64>,
     /// Room for what is put out.
     logits: Vec<Logit>,
+}
+
+/// What an actor learns by; of no account where nothing is learnt from errors.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct ActorLaw {
+    clip: Share,
+    entropy: Share,
+    log_sigma_start: i32,
+    log_sigma_rate: Share,
+}
+
+impl From<Ppo> for ActorLaw {
+    fn from(ppo: Ppo) -> Self {
+        let Ppo { clip, entropy, log_sigma_start, log_sigma_rate, .. } = ppo;
+        Self { clip, entropy, log_sigma_start, log_sigma_rate }
+    }
 }
 
 /// How likely what was drawn was, and what was tried of continuous actions.
@@ -49,10 +107,10 @@ struct Drawn {
 }
 
 impl Actor {
-    pub(super) fn new(driver: Driver, taken: Taken, ppo: Ppo) -> Self {
+    pub(super) fn new(driver: Driver, taken: Taken, law: ActorLaw) -> Self {
         let values = if let Taken::Continuous(values) = taken { values } else { 0 };
-        let log_sigma = vec![i64::from(ppo.log_sigma_start) << 4; values];
-        Self { driver, taken, ppo, log_sigma, logits: vec![] }
+        let log_sigma = vec![i64::from(law.log_sigma_start) << 4; values];
+        Self { driver, taken, law, log_sigma, logits: vec![] }
     }
 
     /// Numbers it puts out.
@@ -80,15 +138,9 @@ impl Actor {
         &self.logits
     }
 
-    /// Reads what environments show and draws what each is told; the rollout keeps that, and how likely it was.
-    pub(super) fn act(
-        &mut self,
-        tables: &PolicyTables,
-        codes: &[u8],
-        place: Place,
-        rollout: &mut Rollout,
-    ) -> Chosen {
-        let samples = self.read(codes).len() / self.width();
+    /// What is drawn for what was read last, of all environments; the rollout keeps it, and how likely it was.
+    pub(super) fn act(&self, tables: &PolicyTables, place: Place, rollout: &mut Rollout) -> Chosen {
+        let samples = self.logits.len() / self.width();
         let (chosen, drawn) = self.drawn_with(tables, place, 0..samples);
         rollout.logs.extend(drawn.logs);
         rollout.tried.extend(drawn.tried);
@@ -172,9 +224,9 @@ impl Actor {
         epoch: &mut PolicyEpoch,
     ) {
         let scatters = self.scatters(tables);
-        let Self { driver, taken, ppo, logits, log_sigma, .. } = self;
-        let beta = ppo.entropy;
-        let clip = Clip { epsilon: Ratio::from_num(ppo.clip) };
+        let Self { driver, taken, law, logits, log_sigma, .. } = self;
+        let beta = law.entropy;
+        let clip = Clip { epsilon: Ratio::from_num(law.clip) };
         let mut widen = vec![0i64; log_sigma.len()];
         driver.learn(codes, |engine, first, errors| {
             super::outputs(engine, logits);
@@ -218,7 +270,7 @@ impl Actor {
         });
         let steps = batch.len() as i64;
         for (log, widen) in log_sigma.iter_mut().zip(widen) {
-            let rate = i128::from(ppo.log_sigma_rate.to_bits());
+            let rate = i128::from(law.log_sigma_rate.to_bits());
             let (above, below) = (2 * rate * i128::from(widen), i128::from(steps) << 31);
             // halves up
             let by = (above + below).div_euclid(2 * below) as i64;

@@ -11,71 +11,22 @@
 //! the start. See docs/MODEL.md, 5.
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
-use super::actor::Actor;
+use super::actor::Chosen;
 use super::critic::Critic;
 use super::experiment::{PolicyExperiment, Ppo};
-use super::observe::{Standard, Statistics};
 use super::outcome::PolicyEpoch;
-use super::rollout::{Coding, Rollout};
+use super::player::Player;
+use super::rollout::Rollout;
 use crate::chip::state::{Piece, Section, State, StateError, Visitor, visit_counts};
 use crate::num::draw::{self, Place, Site};
 use crate::num::fixed::narrow;
-use crate::num::tables::PolicyTables;
-use crate::task::environment::{Actions, EnvError, EnvSpec, Observations, Outcomes, Real, Shown};
-
-/// Actions of all environments.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) enum Chosen {
-    Discrete(Vec<u16>),
-    Continuous(Vec<Real>),
-}
-
-impl Chosen {
-    /// Those of `count` environments, of which `live` are told these; what others are told does not matter.
-    pub(super) fn spread_to(&self, live: &[usize], count: usize) -> Self {
-        match self {
-            Self::Discrete(actions) => {
-                let mut all = vec![0; count];
-                live.iter().zip(actions).for_each(|(&which, &action)| all[which] = action);
-                Self::Discrete(all)
-            }
-            Self::Continuous(values) => {
-                let width = values.len() / live.len();
-                let mut all = vec![Real::ZERO; count * width];
-                for (&which, values) in live.iter().zip(values.chunks_exact(width)) {
-                    all[which * width..(which + 1) * width].copy_from_slice(values);
-                }
-                Self::Continuous(all)
-            }
-        }
-    }
-
-    /// Numbers of actions, or their values with 16 fractional bits.
-    pub(super) fn numbers(&self) -> Vec<i64> {
-        match self {
-            Self::Discrete(actions) => actions.iter().map(|&action| action.into()).collect(),
-            Self::Continuous(values) => values.iter().map(|v| v.to_bits().into()).collect(),
-        }
-    }
-
-    pub(super) fn actions(&self) -> Actions<'_> {
-        match self {
-            Self::Discrete(actions) => Actions::Discrete(actions),
-            Self::Continuous(values) => Actions::Continuous(values),
-        }
-    }
-}
+use crate::task::environment::{EnvError, Observations, Outcomes};
 
 /// A policy that learns.
 #[derive(Debug)]
 pub(super) struct Agent {
-    pub(super) spec: EnvSpec,
-    pub(super) tables: PolicyTables,
-    pub(super) actor: Actor,
+    pub(super) player: Player,
     pub(super) critic: Critic,
-    pub(super) coding: Coding,
-    pub(super) statistics: Statistics,
-    pub(super) standard: Standard,
     settings: Settings,
     /// What the environments show now.
     shown: Observations,
@@ -104,19 +55,12 @@ impl Agent {
     pub(super) fn new(
         experiment: &PolicyExperiment,
         ppo: Ppo,
-        spec: EnvSpec,
-        actor: Actor,
+        player: Player,
         critic: Critic,
     ) -> Self {
-        let inputs = if let Shown::Dense(values) = spec.shown { values } else { 0 };
-        let statistics = Statistics::new(inputs);
         let environments = experiment.environments as usize;
         Self {
-            coding: Coding::new(experiment.input, experiment.hardware.drive.bits, &spec),
-            tables: PolicyTables::build(),
-            standard: statistics.freeze(),
-            statistics,
-            actor,
+            player,
             critic,
             settings: Settings {
                 seed: experiment.seed,
@@ -125,7 +69,6 @@ impl Agent {
                 minibatch: experiment.actor.batch.get() as usize,
                 ppo,
             },
-            spec,
             shown: Observations::default(),
             going: vec![[0; 2]; environments],
             steps: 0,
@@ -139,23 +82,17 @@ impl Agent {
         self.shown.clone_from(shown);
     }
 
-    /// Takes observations into the statistics before anything is learnt.
-    pub(super) fn look(&mut self, shown: &Observations) {
-        self.statistics.add(&shown.values);
-        self.standard = self.statistics.freeze();
-    }
-
     /// What each environment is told to do now.
     pub(super) fn act(&mut self) -> Chosen {
-        let from = self.rollout.codes.len();
-        for which in 0..self.settings.environments {
-            self.coding.code(&self.standard, &self.shown, which, &mut self.rollout.codes);
+        let Self { player, rollout, shown, settings, .. } = self;
+        let from = rollout.codes.len();
+        for which in 0..settings.environments {
+            player.coding.code(&player.standard, shown, which, &mut rollout.codes);
         }
-        self.rollout.shown.extend_from_slice(&self.shown.values);
-        let codes = &self.rollout.codes[from..];
-        let place = Place::global(self.settings.seed, Site::Exploration, self.steps);
-        let codes = codes.to_vec();
-        self.actor.act(&self.tables, &codes, place, &mut self.rollout)
+        rollout.shown.extend_from_slice(&shown.values);
+        let _ = player.actor.read(&rollout.codes[from..]);
+        let place = Place::global(settings.seed, Site::Exploration, self.steps);
+        player.actor.act(&player.tables, place, rollout)
     }
 
     /// What came of that. `ended` is told the return and length of every episode that ended.
@@ -167,7 +104,7 @@ impl Agent {
         outcomes: &Outcomes,
         epoch: &mut PolicyEpoch,
     ) -> Result<(), EnvError> {
-        outcomes.check(&self.spec, self.settings.environments)?;
+        outcomes.check(&self.player.spec, self.settings.environments)?;
         let first = self.rollout.len();
         for which in 0..self.settings.environments {
             let [gained, length] = &mut self.going[which];
@@ -175,8 +112,8 @@ impl Agent {
             *length += 1;
             if outcomes.truncated[which] {
                 self.rollout.stopped.push(first + which);
-                let codes = &mut self.rollout.reached;
-                self.coding.code(&self.standard, &outcomes.reached, which, codes);
+                let (player, codes) = (&mut self.player, &mut self.rollout.reached);
+                player.codes(&outcomes.reached, &[which], codes);
             }
             if outcomes.truncated[which] || outcomes.terminated[which] {
                 epoch.returns.add(*gained);
@@ -202,11 +139,12 @@ impl Agent {
         let Settings { seed, minibatch, ppo, environments, .. } = self.settings;
         let mut last = Vec::new();
         for which in 0..environments {
-            self.coding.code(&self.standard, &self.shown, which, &mut last);
+            self.player.codes(&self.shown, &[which], &mut last);
         }
         self.critic.judge(&mut self.rollout, &last, ppo, epoch);
         let steps = self.rollout.len();
-        let rows = self.coding.rows();
+        let rows = self.player.coding.rows();
+        let Self { player, critic, rollout, .. } = self;
         let mut codes = Vec::new();
         for _ in 0..ppo.passes {
             let order = draw::shuffled(seed, self.passes, narrow(steps, "a rollout has few steps"));
@@ -215,28 +153,26 @@ impl Agent {
                 codes.clear();
                 for &step in batch {
                     let at = step as usize * rows;
-                    codes.extend_from_slice(&self.rollout.codes[at..at + rows]);
+                    codes.extend_from_slice(&rollout.codes[at..at + rows]);
                 }
-                self.actor.learn(&self.tables, &codes, batch, &self.rollout, epoch);
-                self.critic.learn(&codes, batch, &self.rollout, epoch);
+                player.actor.learn(&player.tables, &codes, batch, rollout, epoch);
+                critic.learn(&codes, batch, rollout, epoch);
                 if !next() {
                     return false;
                 }
             }
         }
-        self.statistics.add(&self.rollout.shown);
-        self.standard = self.statistics.freeze();
-        self.rollout.clear();
+        player.statistics.add(&rollout.shown);
+        player.standard = player.statistics.freeze();
+        rollout.clear();
         true
     }
 }
 
 impl State for Agent {
     fn visit(&mut self, visitor: &mut dyn Visitor) -> Result<(), StateError> {
-        self.actor.visit(visitor)?;
+        self.player.visit(visitor)?;
         self.critic.visit(visitor)?;
-        self.statistics.visit(visitor)?;
-        self.standard = self.statistics.freeze();
         let counts = [&mut self.steps, &mut self.passes];
         visit_counts(visitor, "policy.counts", Section::Task, counts.into_iter())?;
         let going: Vec<i64> = self.going.iter().flatten().copied().collect();

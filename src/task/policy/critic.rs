@@ -11,7 +11,7 @@
 
 use super::advantage::{self, Happened, Horizon};
 use super::experiment::Ppo;
-use super::number::{Logit, StateValue};
+use super::number::{Logit, Value};
 use super::outcome::PolicyEpoch;
 use super::prefixed::Prefixed;
 use super::rollout::Rollout;
@@ -38,7 +38,7 @@ impl Critic {
     }
 
     /// What some states are worth.
-    pub(super) fn values(&mut self, codes: &[u8]) -> Vec<StateValue> {
+    pub(super) fn values(&mut self, codes: &[u8]) -> Vec<Value> {
         let rows = self.driver.engine().layers()[0].spec.inputs;
         let mut values = Vec::with_capacity(codes.len() / rows);
         for codes in codes.chunks(READ_BATCH * rows) {
@@ -58,7 +58,7 @@ impl Critic {
         epoch: &mut PolicyEpoch,
     ) {
         let values = self.values(&rollout.codes);
-        let mut reached = vec![StateValue::ZERO; values.len()];
+        let mut reached = vec![Value::ZERO; values.len()];
         let beyond = self.values(&rollout.reached);
         rollout.stopped.iter().zip(beyond).for_each(|(&step, value)| reached[step] = value);
         let last = self.values(last);
@@ -102,7 +102,7 @@ impl Critic {
 }
 
 /// Variance of targets that values leave, and their variance: both in 2^-20, as sums over the states.
-fn unexplained(values: &[StateValue], targets: &[StateValue]) -> [i64; 2] {
+fn unexplained(values: &[Value], targets: &[Value]) -> [i64; 2] {
     let count = targets.len() as i128;
     let variance = |numbers: &mut dyn Iterator<Item = i64>| {
         let (mut sum, mut squares) = (0i128, 0i128);
@@ -113,7 +113,7 @@ fn unexplained(values: &[StateValue], targets: &[StateValue]) -> [i64; 2] {
         let apart = squares - sum * sum / count.max(1);
         i64::try_from(apart >> 20).unwrap_or(i64::MAX)
     };
-    let bits = |number: &StateValue| i64::from(number.to_bits());
+    let bits = |number: &Value| i64::from(number.to_bits());
     let left = variance(&mut targets.iter().zip(values).map(|(t, v)| bits(t) - bits(v)));
     [left, variance(&mut targets.iter().map(bits))]
 }

@@ -2,7 +2,7 @@
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
 use super::experiment::InputCoding;
-use super::number::{Advantage, LogProbability, Logit, Observed, StateValue};
+use super::number::{Advantage, LogProbability, Logit, Observed, Value};
 use super::observe::{self, Standard};
 use crate::num::fixed::DriveBits;
 use crate::task::environment::{EnvSpec, Observations, Real, Shown};
@@ -34,6 +34,11 @@ impl Coding {
             InputCoding::Split => 2 * self.values + self.lines,
             InputCoding::Offset => self.values + self.lines,
         }
+    }
+
+    /// Numbers of an observation; 0 of sparse ones.
+    pub(super) const fn values(&self) -> usize {
+        self.values
     }
 
     /// Appends the drives of observation number `which`.
@@ -79,7 +84,7 @@ pub(super) struct Rollout {
     pub(super) stopped: Vec<usize>,
     pub(super) advantages: Vec<Advantage>,
     /// Value targets, standardised.
-    pub(super) targets: Vec<StateValue>,
+    pub(super) targets: Vec<Value>,
 }
 
 impl Rollout {

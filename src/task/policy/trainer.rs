@@ -2,19 +2,23 @@
 //!
 //! ```text
 //! calibration   256 steps in all under uniform actions; both networks' converters look at them; then all begin anew
-//! epoch         `rollouts` rollouts with their updates
+//! epoch         `rollouts` rollouts with their updates, or so many generations
 //! evaluation    environments of their own, whose seed has its highest bit turned: the same episodes at every look
 //! ```
 //!
-//! Draws beside those of [`Agent`]: uniform actions at site 7, pathway 1, sub = environment, count = step; drawn actions of
-//! episodes without learning at pathway 2. See docs/MODEL.md, 5.
+//! Draws beside those of a policy that learns: uniform actions at site 7, pathway 1, sub = environment, count = step; drawn
+//! actions of episodes without learning at pathway 2. See docs/MODEL.md, 5.
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
-use super::actor::Actor;
-use super::agent::{Agent, Chosen};
+use super::actor::{Actor, ActorLaw, Chosen};
+use super::agent::Agent;
 use super::critic::Critic;
+use super::evolution::Evolver;
 use super::experiment::{Method, PolicyExperiment};
+use super::observe::Statistics;
 use super::outcome::{PolicyEpoch, PolicyEvaluation, PolicyProgress, WatchedStep};
+use super::player::{Manner, Player};
+use super::rollout::Coding;
 use crate::chip::crossbar::kernel::Backend;
 use crate::chip::engine::Phase;
 use crate::chip::state::{Piece, Section, State, StateError, Visitor};
@@ -23,6 +27,7 @@ use crate::learn::network::{NetworkError, NetworkPlace, NetworkSpec};
 use crate::learn::statistics::{self, FloorMap, PathwayRecord};
 use crate::num::draw::{Place, Site, below};
 use crate::num::fixed::narrow;
+use crate::num::tables::PolicyTables;
 use crate::task::environment::{
     self, EnvError, EnvSpec, Observations, Outcomes, Real, Taken, UnknownEnvironment, VecEnv,
 };
@@ -54,11 +59,48 @@ pub enum PolicyError {
 #[derive(Debug)]
 pub struct PolicyTrainer {
     experiment: PolicyExperiment,
-    agent: Agent,
+    learner: Learner,
     environments: Box<dyn VecEnv>,
     outcomes: Outcomes,
-    start: [FloorMap; 2],
+    start: Vec<FloorMap>,
     epoch: u32,
+}
+
+/// Who learns.
+#[derive(Debug)]
+enum Learner {
+    Ppo(Box<Agent>),
+    Evolution(Box<Evolver>),
+}
+
+impl Learner {
+    fn player(&mut self) -> &mut Player {
+        match self {
+            Self::Ppo(agent) => &mut agent.player,
+            Self::Evolution(evolver) => &mut evolver.player,
+        }
+    }
+
+    const fn spec(&self) -> &EnvSpec {
+        match self {
+            Self::Ppo(agent) => &agent.player.spec,
+            Self::Evolution(evolver) => &evolver.player.spec,
+        }
+    }
+
+    fn networks(&self) -> Vec<&Driver> {
+        match self {
+            Self::Ppo(agent) => vec![&agent.player.actor.driver, &agent.critic.driver],
+            Self::Evolution(evolver) => vec![&evolver.player.actor.driver],
+        }
+    }
+
+    fn networks_mut(&mut self) -> Vec<&mut Driver> {
+        match self {
+            Self::Ppo(agent) => vec![&mut agent.player.actor.driver, &mut agent.critic.driver],
+            Self::Evolution(evolver) => vec![&mut evolver.player.actor.driver],
+        }
+    }
 }
 
 impl PolicyTrainer {
@@ -67,7 +109,6 @@ impl PolicyTrainer {
     /// # Errors
     /// When something does not fit.
     pub fn new(experiment: PolicyExperiment, backend: Backend) -> Result<Self, PolicyError> {
-        let Method::Ppo(ppo) = experiment.method else { unimplemented!("evolution") };
         let count = experiment.environments as usize;
         let environments = environment::make(&experiment.environment, experiment.seed, count)?;
         let spec = environments.spec().clone();
@@ -78,20 +119,39 @@ impl PolicyTrainer {
             let place = NetworkPlace { seed: experiment.seed, first_layer, updates };
             network.build(&experiment.hardware, backend, place)
         };
-        let actor = Actor::new(build(&experiment.actor, 0)?, spec.taken, ppo);
-        let critic = Critic::new(build(&experiment.critic, first_layer)?);
-        let start = [&actor.driver, &critic.driver];
-        let start = start.map(|driver| statistics::floor_map(driver.engine()));
-        let agent = Agent::new(&experiment, ppo, spec, actor, critic);
+        let law = match experiment.method {
+            Method::Ppo(ppo) => ppo.into(),
+            Method::Evolution(_) => ActorLaw::default(),
+        };
+        let statistics = Statistics::new(spec.values());
+        let player = Player {
+            actor: Actor::new(build(&experiment.actor, 0)?, spec.taken, law),
+            coding: Coding::new(experiment.input, experiment.hardware.drive.bits, &spec),
+            tables: PolicyTables::build(),
+            standard: statistics.freeze(),
+            statistics,
+            spec,
+        };
+        let learner = match experiment.method {
+            Method::Ppo(ppo) => {
+                let critic = Critic::new(build(&experiment.critic, first_layer)?);
+                Learner::Ppo(Box::new(Agent::new(&experiment, ppo, player, critic)))
+            }
+            Method::Evolution(law) => {
+                Learner::Evolution(Box::new(Evolver::new(&experiment, law, player)))
+            }
+        };
+        let start = learner.networks().into_iter();
+        let start = start.map(|driver| statistics::floor_map(driver.engine())).collect();
         let outcomes = Outcomes::default();
-        let mut this = Self { experiment, agent, environments, outcomes, start, epoch: 0 };
+        let mut this = Self { experiment, learner, environments, outcomes, start, epoch: 0 };
         this.calibrate()?;
         Ok(this)
     }
 
     /// Looks at what uniform actions lead to, and begins anew.
     fn calibrate(&mut self) -> Result<(), PolicyError> {
-        let Self { experiment, agent, environments, outcomes, .. } = self;
+        let Self { experiment, learner, environments, outcomes, .. } = self;
         let count = environments.count();
         let mut seen = Observations::default();
         let mut shown = Observations::default();
@@ -99,20 +159,21 @@ impl PolicyTrainer {
         for step in 0..CALIBRATION.div_ceil(count) as u64 {
             seen.append(&shown);
             let place = Place::global(experiment.seed, Site::Exploration, step);
-            let actions = uniform(agent.spec.taken, count, place);
+            let actions = uniform(learner.spec().taken, count, place);
             environments.step(actions.actions(), outcomes)?;
-            shown.clone_from(&outcomes.next);
+            std::mem::swap(&mut shown, &mut outcomes.next);
         }
-        agent.look(&seen);
+        let player = learner.player();
+        player.look(&seen);
         let mut codes = Vec::new();
-        for which in 0..CALIBRATION {
-            agent.coding.code(&agent.standard, &seen, which, &mut codes);
-        }
-        for driver in [&mut agent.actor.driver, &mut agent.critic.driver] {
+        player.codes(&seen, &Vec::from_iter(0..CALIBRATION), &mut codes);
+        for driver in learner.networks_mut() {
             let _ = driver.engine_mut().calibrate(&codes);
         }
         environments.reset(&mut shown);
-        agent.begin(&shown);
+        if let Learner::Ppo(agent) = learner {
+            agent.begin(&shown);
+        }
         Ok(())
     }
 
@@ -125,7 +186,7 @@ impl PolicyTrainer {
     /// What is acted on.
     #[must_use]
     pub const fn environment(&self) -> &EnvSpec {
-        &self.agent.spec
+        self.learner.spec()
     }
 
     /// Epochs in all.
@@ -140,7 +201,7 @@ impl PolicyTrainer {
         self.epoch
     }
 
-    /// Steps and updates (of each network) of an epoch.
+    /// Steps (at most, of evolution) and updates (of each network) of an epoch.
     #[must_use]
     pub fn epoch_size(&self) -> (u64, u64) {
         let epochs = u64::from(self.epochs());
@@ -150,7 +211,8 @@ impl PolicyTrainer {
     /// One epoch.
     ///
     /// # Errors
-    /// When `go_on` says to stop (asked after every update), no epoch is left, or the environment cannot go on.
+    /// When `go_on` says to stop (asked after every update, or pair of candidates), no epoch is left, or the environment
+    /// cannot go on.
     pub fn learn(
         &mut self,
         go_on: &mut dyn FnMut(PolicyProgress) -> bool,
@@ -160,26 +222,39 @@ impl PolicyTrainer {
             return Err(PolicyError::Stopped);
         }
         let steps_total = self.experiment.steps_per_epoch();
-        let Self { experiment, agent, environments, outcomes, .. } = self;
+        let Self { experiment, learner, environments, outcomes, .. } = self;
         let mut told = PolicyEpoch::default();
-        let mut steps = 0;
-        for _ in 0..experiment.rollouts {
-            while !agent.is_full() {
-                let chosen = agent.act();
-                environments.step(chosen.actions(), outcomes)?;
-                agent.take(outcomes, &mut told)?;
-                steps += environments.count() as u64;
-            }
-            let (sum, count) = (told.returns.sum, told.returns.count as i64);
-            let progress =
-                PolicyProgress { epoch, epochs, steps, steps_total, returns: [count, sum] };
-            if !agent.learn(&mut told, &mut || go_on(progress)) {
+        let progress = |steps, told: &PolicyEpoch| {
+            let returns = [told.returns.count as i64, told.returns.sum];
+            PolicyProgress { epoch, epochs, steps, steps_total, returns }
+        };
+        for rollout in 1..=experiment.rollouts {
+            let steps = steps_total / u64::from(experiment.rollouts) * u64::from(rollout);
+            let went_on = match &mut *learner {
+                Learner::Ppo(agent) => {
+                    while !agent.is_full() {
+                        let chosen = agent.act();
+                        environments.step(chosen.actions(), outcomes)?;
+                        agent.take(outcomes, &mut told)?;
+                    }
+                    let progress = progress(steps, &told);
+                    agent.learn(&mut told, &mut || go_on(progress))
+                }
+                Learner::Evolution(evolver) => {
+                    let progress = progress(steps, &told);
+                    evolver.evolve(&mut told, &mut || go_on(progress))?
+                }
+            };
+            if !went_on {
                 return Err(PolicyError::Stopped);
             }
         }
         self.epoch += 1;
-        told.steps = u64::from(self.epoch) * steps_total;
-        told.log_sigma = self.agent.actor.log_sigma().to_vec();
+        told.steps = match learner {
+            Learner::Ppo(_) => u64::from(self.epoch) * steps_total,
+            Learner::Evolution(evolver) => evolver.steps,
+        };
+        told.log_sigma = learner.player().actor.log_sigma().to_vec();
         Ok(told)
     }
 
@@ -188,28 +263,28 @@ impl PolicyTrainer {
     /// # Errors
     /// When the environment cannot go on.
     pub fn evaluate(&mut self, episodes: u32) -> Result<PolicyEvaluation, PolicyError> {
-        let Self { experiment, agent, .. } = self;
-        let networks = [&mut agent.actor.driver, &mut agent.critic.driver];
-        let phases = networks.map(|driver| {
-            let (phase, engine) = (driver.engine().phase(), driver.engine_mut());
-            let _ = (engine.take_currents(), engine.take_mute());
-            engine.set_phase(Phase::Evaluation);
-            phase
-        });
-        let count = episodes as usize;
-        let mut told = PolicyEvaluation {
-            returns: vec![0; count],
-            lengths: vec![0; count],
-            ..PolicyEvaluation::default()
-        };
-        if count > 0 {
+        let Self { experiment, learner, .. } = self;
+        let phases: Vec<Phase> = learner
+            .networks_mut()
+            .into_iter()
+            .map(|driver| {
+                let (phase, engine) = (driver.engine().phase(), driver.engine_mut());
+                let _ = (engine.take_currents(), engine.take_mute());
+                engine.set_phase(Phase::Evaluation);
+                phase
+            })
+            .collect();
+        let mut told = PolicyEvaluation::default();
+        if episodes > 0 {
             let seed = experiment.seed ^ ELSEWHERE;
+            let count = episodes as usize;
             let mut environments = environment::make(&experiment.environment, seed, count)?;
-            let deterministic = experiment.evaluation.deterministic;
-            play(agent, &mut *environments, (seed, deterministic), &mut told)?;
+            let drawn = (!experiment.evaluation.deterministic).then_some(drawn_at(seed));
+            let manner = Manner { drawn, steps_max: u32::MAX };
+            let played = learner.player().play(&mut *environments, manner, &mut |_, _| {})?;
+            (told.returns, told.lengths) = (played.returns, played.lengths);
         }
-        let networks = [&mut agent.actor.driver, &mut agent.critic.driver];
-        for (driver, phase) in networks.into_iter().zip(phases) {
+        for (driver, phase) in learner.networks_mut().into_iter().zip(phases) {
             let engine = driver.engine_mut();
             told.currents.extend(engine.take_currents());
             told.mute.extend(engine.take_mute());
@@ -227,7 +302,7 @@ impl PolicyTrainer {
         episode: u32,
         look: &mut dyn FnMut(&WatchedStep) -> bool,
     ) -> Result<(), PolicyError> {
-        let Self { experiment, agent, .. } = self;
+        let Self { experiment, learner, .. } = self;
         let (which, seed) = (episode as usize, experiment.seed ^ ELSEWHERE);
         let mut environments = environment::make(&experiment.environment, seed, which + 1)?;
         let (mut shown, mut outcomes) = (Observations::default(), Outcomes::default());
@@ -235,21 +310,23 @@ impl PolicyTrainer {
         let mut codes = Vec::new();
         for step in 0.. {
             codes.clear();
-            agent.coding.code(&agent.standard, &shown, which, &mut codes);
-            let actor = agent.actor.read(&codes).iter().map(|out| out.to_bits().into()).collect();
-            let chosen = if experiment.evaluation.deterministic {
-                agent.actor.likeliest(&agent.tables)
-            } else {
-                agent.actor.drawn(&agent.tables, drawn_at(seed, step), &[which])
+            let player = learner.player();
+            player.codes(&shown, &[which], &mut codes);
+            let actor = player.actor.read(&codes).iter().map(|out| out.to_bits().into()).collect();
+            let drawn = Place { count: step.into(), ..drawn_at(seed) };
+            let drawn = (!experiment.evaluation.deterministic).then_some(drawn);
+            let chosen = player.choose(&[which], drawn);
+            let value = match learner {
+                Learner::Ppo(agent) => agent.critic.values(&codes)[0].to_bits().into(),
+                Learner::Evolution(_) => 0,
             };
-            let value = agent.critic.values(&codes)[0].to_bits().into();
-            let all = chosen.spread_to(&[which], which + 1);
             let picture = environments.picture(which);
+            let all = chosen.spread_to(&[which], which + 1);
             environments.step(all.actions(), &mut outcomes)?;
             let watched = WatchedStep {
                 step,
                 picture,
-                shown: shown.numbers_of(which, &agent.spec),
+                shown: shown.numbers_of(which, learner.spec()),
                 action: chosen.numbers(),
                 actor,
                 value,
@@ -259,7 +336,7 @@ impl PolicyTrainer {
             if !look(&watched) || ended {
                 break;
             }
-            shown.clone_from(&outcomes.next);
+            std::mem::swap(&mut shown, &mut outcomes.next);
         }
         Ok(())
     }
@@ -267,12 +344,12 @@ impl PolicyTrainer {
     /// Actor, then critic.
     #[must_use]
     pub fn networks(&self) -> Vec<&Driver> {
-        vec![&self.agent.actor.driver, &self.agent.critic.driver]
+        self.learner.networks()
     }
 
     /// The same, to set what changes no result, or to restore.
     pub fn networks_mut(&mut self) -> Vec<&mut Driver> {
-        vec![&mut self.agent.actor.driver, &mut self.agent.critic.driver]
+        self.learner.networks_mut()
     }
 
     /// Statistics of every pathway of both networks.
@@ -283,46 +360,9 @@ impl PolicyTrainer {
     }
 }
 
-/// Where an action is drawn that is not learnt from.
-const fn drawn_at(seed: u64, step: u32) -> Place {
-    Place { pathway: 2, ..Place::global(seed, Site::Exploration, step as u64) }
-}
-
-/// Plays an episode in each environment.
-fn play(
-    agent: &mut Agent,
-    environments: &mut dyn VecEnv,
-    (seed, deterministic): (u64, bool),
-    told: &mut PolicyEvaluation,
-) -> Result<(), PolicyError> {
-    let (mut shown, mut outcomes) = (Observations::default(), Outcomes::default());
-    environments.reset(&mut shown);
-    let count = environments.count();
-    let mut live: Vec<usize> = (0..count).collect();
-    let mut codes = Vec::new();
-    for step in 0.. {
-        codes.clear();
-        for &which in &live {
-            agent.coding.code(&agent.standard, &shown, which, &mut codes);
-        }
-        let _ = agent.actor.read(&codes);
-        let chosen = if deterministic {
-            agent.actor.likeliest(&agent.tables)
-        } else {
-            agent.actor.drawn(&agent.tables, drawn_at(seed, step), &live)
-        };
-        environments.step(chosen.spread_to(&live, count).actions(), &mut outcomes)?;
-        for &which in &live {
-            told.returns[which] += i64::from(outcomes.rewards[which].to_bits());
-            told.lengths[which] += 1;
-        }
-        live.retain(|&which| !(outcomes.terminated[which] || outcomes.truncated[which]));
-        if live.is_empty() {
-            break;
-        }
-        shown.clone_from(&outcomes.next);
-    }
-    Ok(())
+/// Where the actions of an episode are drawn that is not learnt from.
+const fn drawn_at(seed: u64) -> Place {
+    Place { pathway: 2, ..Place::global(seed, Site::Exploration, 0) }
 }
 
 /// Any action, each as likely as another: from the first word, or words, of the environment.
@@ -358,10 +398,15 @@ impl State for PolicyTrainer {
         if let Some(epoch) = visitor.numbers(&piece, &[i64::from(self.epoch)])? {
             self.epoch = u32::try_from(epoch[0]).expect("a visitor keeps to the range");
         }
-        self.agent.visit(visitor)?;
+        match &mut self.learner {
+            Learner::Ppo(agent) => agent.visit(visitor)?,
+            Learner::Evolution(evolver) => evolver.visit(visitor)?,
+        }
         self.environments.visit(visitor)?;
         self.environments.show(&mut self.outcomes.next);
-        self.agent.begin(&self.outcomes.next);
+        if let Learner::Ppo(agent) = &mut self.learner {
+            agent.begin(&self.outcomes.next);
+        }
         Ok(())
     }
 }
