@@ -33,18 +33,27 @@ mod trainer;
 pub mod value;
 
 use crate::chip::engine::Engine;
+use crate::num::fixed::rsh;
 use number::{Logit, saturated};
 
 pub use experiment::{Evaluating, Evolution, InputCoding, Method, PolicyExperiment, Ppo, Share};
 pub use outcome::{PolicyEpoch, PolicyEvaluation, PolicyProgress, SumOf, WatchedStep};
 pub use trainer::{PolicyError, PolicyTrainer};
 
-/// What the last layer put out, `[sample][output]`, as numbers.
+/// What the last layer put out, `[sample][output]`: `floor(readout unit 2^20 + 1/2)`, saturating.
 fn outputs(engine: &Engine, put_out: &mut Vec<Logit>) {
     let mut sums = Vec::new();
     engine.readouts(&mut sums);
-    let point = 15;
-    let scaled = |&sum: &i64| saturated(sum << (20 - point));
+    let [above, below] = engine.readout_unit().ratio();
     put_out.clear();
-    put_out.extend(sums.iter().map(scaled));
+    if above == 1 && below.is_power_of_two() && below >= 1 << 20 {
+        let shift = below.trailing_zeros() - 20;
+        put_out.extend(sums.iter().map(|&sum| saturated(rsh(sum, shift))));
+    } else {
+        let (above, below) = (i128::from(above), i128::from(below));
+        put_out.extend(sums.iter().map(|&sum| {
+            let number = ((i128::from(sum) * above << 21) + below).div_euclid(2 * below);
+            saturated(i64::try_from(number).unwrap_or(if sum < 0 { i64::MIN } else { i64::MAX }))
+        }));
+    }
 }
