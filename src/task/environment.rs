@@ -25,6 +25,7 @@ pub mod fine;
 pub mod mountain_car;
 pub mod one;
 pub mod pendulum;
+mod stream;
 
 use one::SideBySide;
 

@@ -21,7 +21,7 @@ use crate::chip::engine::{Engine, Operation};
 use crate::chip::state::{Section, State, StateError, Visitor, visit_counts};
 use crate::num::draw::{BLOCK_BYTES, Place, Site};
 use crate::num::fixed::narrow;
-use crate::task::environment::{self, EnvError, Observations};
+use crate::task::environment::{EnvError, EnvSource, Observations, Purpose};
 
 /// What distinguishes the episodes of one pair from those of another: an odd number whose multiples lie far apart.
 const APART: u64 = 0x9E37_79B9_7F4A_7C15;
@@ -31,6 +31,7 @@ const APART: u64 = 0x9E37_79B9_7F4A_7C15;
 pub(super) struct Evolver {
     pub(super) player: Player,
     law: Evolution,
+    source: EnvSource,
     environment: String,
     environments: usize,
     seed: u64,
@@ -44,10 +45,16 @@ pub(super) struct Evolver {
 type Levels = Vec<Vec<Vec<u16>>>;
 
 impl Evolver {
-    pub(super) fn new(experiment: &PolicyExperiment, law: Evolution, player: Player) -> Self {
+    pub(super) fn new(
+        experiment: &PolicyExperiment,
+        law: Evolution,
+        player: Player,
+        source: EnvSource,
+    ) -> Self {
         Self {
             player,
             law,
+            source,
             environment: experiment.environment.clone(),
             environments: experiment.environments as usize,
             seed: experiment.seed,
@@ -73,7 +80,8 @@ impl Evolver {
                 self.load_candidate(&base, &signs, up);
                 let number = self.generations * u64::from(self.law.pairs) + u64::from(pair) + 1;
                 let seed = self.seed.wrapping_add(number.wrapping_mul(APART));
-                let made = environment::make(&self.environment, seed, self.environments);
+                let (id, count) = (&self.environment, self.environments);
+                let made = self.source.make(id, seed, count, Purpose::Training);
                 let mut environments = made.expect("it was made before");
                 let manner = Manner { drawn: None, steps_max: self.horizon };
                 let played = self.player.play(&mut *environments, manner, &mut |shown, live| {

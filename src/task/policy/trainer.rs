@@ -29,7 +29,8 @@ use crate::num::draw::{Place, Site, below};
 use crate::num::fixed::narrow;
 use crate::num::tables::PolicyTables;
 use crate::task::environment::{
-    self, EnvError, EnvSpec, Observations, Outcomes, Real, Taken, UnknownEnvironment, VecEnv,
+    self, EnvError, EnvSource, EnvSpec, Observations, Outcomes, Purpose, Real, Record, Taken,
+    UnknownEnvironment, VecEnv,
 };
 
 /// Steps whose observations are looked at before anything is learnt.
@@ -59,6 +60,7 @@ pub enum PolicyError {
 #[derive(Debug)]
 pub struct PolicyTrainer {
     experiment: PolicyExperiment,
+    source: EnvSource,
     learner: Learner,
     environments: Box<dyn VecEnv>,
     outcomes: Outcomes,
@@ -108,9 +110,13 @@ impl PolicyTrainer {
     ///
     /// # Errors
     /// When something does not fit.
-    pub fn new(experiment: PolicyExperiment, backend: Backend) -> Result<Self, PolicyError> {
-        let count = experiment.environments as usize;
-        let environments = environment::make(&experiment.environment, experiment.seed, count)?;
+    pub fn new(
+        experiment: PolicyExperiment,
+        backend: Backend,
+        source: EnvSource,
+    ) -> Result<Self, PolicyError> {
+        let (id, count) = (&experiment.environment, experiment.environments as usize);
+        let environments = source.make(id, experiment.seed, count, Purpose::Training)?;
         let spec = environments.spec().clone();
         experiment.check(&spec)?;
         let first_layer = narrow(experiment.actor.layers.len(), "at most 64 layers");
@@ -138,13 +144,15 @@ impl PolicyTrainer {
                 Learner::Ppo(Box::new(Agent::new(&experiment, ppo, player, critic)))
             }
             Method::Evolution(law) => {
-                Learner::Evolution(Box::new(Evolver::new(&experiment, law, player)))
+                let evolver = Evolver::new(&experiment, law, player, source.clone());
+                Learner::Evolution(Box::new(evolver))
             }
         };
         let start = learner.networks().into_iter();
         let start = start.map(|driver| statistics::floor_map(driver.engine())).collect();
         let outcomes = Outcomes::default();
-        let mut this = Self { experiment, learner, environments, outcomes, start, epoch: 0 };
+        let mut this =
+            Self { experiment, source, learner, environments, outcomes, start, epoch: 0 };
         this.calibrate()?;
         Ok(this)
     }
@@ -263,7 +271,7 @@ impl PolicyTrainer {
     /// # Errors
     /// When the environment cannot go on.
     pub fn evaluate(&mut self, episodes: u32) -> Result<PolicyEvaluation, PolicyError> {
-        let Self { experiment, learner, .. } = self;
+        let Self { experiment, source, learner, .. } = self;
         let phases: Vec<Phase> = learner
             .networks_mut()
             .into_iter()
@@ -278,7 +286,8 @@ impl PolicyTrainer {
         if episodes > 0 {
             let seed = experiment.seed ^ ELSEWHERE;
             let count = episodes as usize;
-            let mut environments = environment::make(&experiment.environment, seed, count)?;
+            let id = &experiment.environment;
+            let mut environments = source.make(id, seed, count, Purpose::Evaluation)?;
             let drawn = (!experiment.evaluation.deterministic).then_some(drawn_at(seed));
             let manner = Manner { drawn, steps_max: u32::MAX };
             let played = learner.player().play(&mut *environments, manner, &mut |_, _| {})?;
@@ -339,6 +348,14 @@ impl PolicyTrainer {
             std::mem::swap(&mut shown, &mut outcomes.next);
         }
         Ok(())
+    }
+
+    /// What environments showed since the last call, or the beginning; nothing unless it is recorded.
+    pub fn take_record(&mut self) -> Option<Record> {
+        match &self.source {
+            EnvSource::Recorded(record) => Some(Record::take(record, &mut *self.environments)),
+            EnvSource::Native | EnvSource::Replayed(_) => None,
+        }
     }
 
     /// Actor, then critic.
