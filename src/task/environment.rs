@@ -26,8 +26,10 @@ pub mod mountain_car;
 pub mod one;
 pub mod pendulum;
 mod stream;
+mod stream;
 
 use one::SideBySide;
+pub use stream::{EnvSource, KeptPiece, Purpose, Record, Replaying, Stream};
 
 /// An observation, an action or a reward.
 pub type Real = I16F16;
