@@ -26,7 +26,6 @@ pub mod mountain_car;
 pub mod one;
 pub mod pendulum;
 mod stream;
-mod stream;
 
 use one::SideBySide;
 pub use stream::{EnvSource, KeptPiece, Purpose, Record, Replaying, Stream};
