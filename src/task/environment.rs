@@ -174,9 +174,12 @@ impl Outcomes {
         }
         for shown in [&self.reached, &self.next] {
             let (fits, lines) = match spec.shown {
-                Shown::Dense(values) => {
-                    (shown.values.len() == count * values && shown.active.is_empty(), 0)
-                }
+                Shown::Dense(values) => (
+                    shown.values.len() == count * values
+                        && shown.ends.is_empty()
+                        && shown.active.is_empty(),
+                    0,
+                ),
                 Shown::Sparse { lines, .. } => {
                     let ends = shown.ends.len() == count
                         && shown.ends.is_sorted()

@@ -32,6 +32,9 @@ pub mod sample;
 mod trainer;
 pub mod value;
 
+#[cfg(test)]
+mod tests;
+
 use crate::chip::engine::Engine;
 use crate::num::fixed::rsh;
 use number::{Logit, saturated};
