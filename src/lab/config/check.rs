@@ -17,7 +17,7 @@ use crate::learn::error::Centre;
 use crate::learn::route::Route;
 use crate::learn::rule::{Rule, UpdateMode};
 use crate::num::fixed::{Batch, OutOfRange, RateMantissa};
-use crate::num::tables::{Activation, Decay, Positive, Rate, Unit};
+use crate::num::tables::{Activation, Decay, FullDrive, Positive, Rate, Unit};
 
 mod learning;
 mod network;
@@ -212,6 +212,7 @@ pub(super) fn config(mut file: ExperimentFile, model: &UnderModel) -> Result<Con
             weight_max_log2,
             level_bits: hardware.cell.level_bits,
             drive_bits: hardware.drive.bits,
+            full_drive: FullDrive::One,
         },
     });
     let mantissas = learning::mantissas(learning, &asked.collect::<Vec<_>>())?;

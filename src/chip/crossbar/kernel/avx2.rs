@@ -55,6 +55,8 @@ pub(super) const OPS: Ops = Ops {
     may_move: fused::may_move,
     pulses,
     levels,
+    squares,
+    scale,
     fused: fused::fused,
     one_sample: one_sample::one_sample,
     peaks: units::peaks,

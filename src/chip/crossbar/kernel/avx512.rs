@@ -67,6 +67,8 @@ pub(super) const OPS: Ops = Ops {
     may_move: fused::may_move,
     pulses,
     levels,
+    squares,
+    scale,
     fused: fused::fused,
     one_sample: one_sample::one_sample,
     peaks: peaks::peaks,
