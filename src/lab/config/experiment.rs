@@ -4,7 +4,7 @@ use std::iter;
 
 use super::check::wrong;
 use super::{Config, ConfigError};
-use crate::chip::layer::{DrivenBy, LayerSpec};
+use crate::chip::layer::{DrivenBy, LayerSpec, Optimiser};
 use crate::chip::population::Wiring;
 use crate::learn::network::NetworkSpec;
 use crate::learn::rule::Rule;
@@ -87,6 +87,8 @@ impl Config {
             mantissas: self.mantissas.clone(),
             rates: self.rates.clone(),
             decay: self.decay,
+            optimisers: vec![Optimiser::Plain; self.hidden.len() + 1],
+            centred: vec![false; self.hidden.len() + 1],
         }
     }
 
