@@ -8,7 +8,7 @@ use dalean::chip::engine::Phase;
 use dalean::chip::hardware::{
     Adc, AdcRange, DitherBits, DitherPattern, FloorKind, Hardware, Subtract, Window,
 };
-use dalean::chip::layer::{DrivenBy, LayerSpec};
+use dalean::chip::layer::{DrivenBy, InitialLevels, LayerSpec, Optimiser};
 use dalean::chip::ledger::{During, Event};
 use dalean::chip::population::Wiring;
 use dalean::learn::error::Centre;
@@ -128,7 +128,9 @@ fn experiment(s: &Value) -> Experiment {
                 driven_by: if l == 0 { DrivenBy::Shared } else { DrivenBy::Streams },
                 activation: activation(&s["act"][l], &s["alpha"][l]),
                 weight_max_log2: int(&s["weight_max"][l]).ilog2() as i32,
-                gain_64ths: if last { [64, 64] } else { [96, 32] },
+                initial: InitialLevels::Uniform {
+                    gain_64ths: if last { [64, 64] } else { [96, 32] },
+                },
                 constant_row: false,
             }
         })
@@ -154,6 +156,8 @@ fn experiment(s: &Value) -> Experiment {
         mantissas: vec![RateMantissa::new(int(&s["mantissa"])).unwrap(); widths.len() - 1],
         rates: s["rate"].as_array().unwrap().iter().map(positive).collect(),
         decay: Decay::Constant,
+        optimisers: vec![Optimiser::Plain; widths.len() - 1],
+        centred: vec![false; widths.len() - 1],
     };
     Experiment {
         seed: text(&s["seed_decimal"]).parse().unwrap(),

@@ -8,6 +8,7 @@
 //! words formed in the error unit       ceil(CE N / U)              of N words, each a sum of CE
 //! ERR                                 CE + H + NG
 //! UPD add                             rows NG
+//! a look at all sums before a write   rows NG + ceil(log2(tiles))
 //! a pulse of a row                    T_W passes, and T_A + conv more when it is verified
 //! ```
 //!
@@ -83,6 +84,9 @@ pub struct Timing {
     pub slices: Option<SliceTimes>,
 }
 
+/// Beats between the last square of a sample and its first scaling: division, root and reciprocal.
+const ROOT_BEATS: u64 = 32;
+
 /// Most cycles of one action: 0.1 s at 1 GHz.
 pub const CYCLES_MAX: u64 = 100_000_000;
 
@@ -143,6 +147,12 @@ impl Timing {
         self.beat * rows * self.groups(columns)
     }
 
+    /// Busy cycles of a pass over the sums of a layer on so many tiles before it is written: all are squared and added.
+    #[must_use]
+    pub(crate) const fn look(&self, rows: u64, columns: u64, tiles: u64) -> u64 {
+        self.accumulate(rows, columns) + self.beat * tree_levels(tiles)
+    }
+
     /// Cycles of the error unit that takes the mean over a batch off every word: `B CE + CE`.
     #[must_use]
     pub(crate) const fn centre(&self, samples: u64, words: u64) -> u64 {
@@ -153,6 +163,12 @@ impl Timing {
     #[must_use]
     pub(crate) const fn form(&self, terms: u64) -> u64 {
         self.beat * terms.div_ceil(self.lanes)
+    }
+
+    /// Cycles of the stage that normalises a sample, of so many columns a tile: squares, root, scalings.
+    #[must_use]
+    pub(crate) const fn normalise(&self, columns: u64) -> u64 {
+        self.beat * (2 * self.groups(columns) + ROOT_BEATS)
     }
 
     /// Cycles of one pass of a pulse.
@@ -210,6 +226,12 @@ mod tests {
     fn a_verified_pulse_is_read() {
         let verified = Timing { verify: true, ..TIMING };
         assert_eq!((TIMING.rows(1, 3), verified.rows(2, 3)), (2 + 15, 4 + 3 * (5 + 26)));
+    }
+
+    #[test]
+    fn the_lanes_see_a_normalised_sample_twice() {
+        let slow = Timing { beat: 3, ..TIMING };
+        assert_eq!((TIMING.normalise(17), slow.normalise(64)), (2 * 5 + 32, 3 * (2 * 16 + 32)));
     }
 
     #[test]

@@ -10,7 +10,7 @@ use crate::chip::hardware::{
     Adc, AdcRange, CellSpec, DigitalSpec, DitherBits, DitherPattern, DriveSpec, FloorKind,
     HardwareSpec, PulseCode, Subtract, TileSpec, Timing, WriteScheme, WriteSpec,
 };
-use crate::chip::layer::{DrivenBy, LayerSpec};
+use crate::chip::layer::{DrivenBy, InitialLevels, LayerSpec, Optimiser};
 use crate::learn::error::Centre;
 use crate::learn::network::NetworkSpec;
 use crate::learn::route::Route;
@@ -70,6 +70,8 @@ const FROZEN: &[(&str, &str)] = &[
     ("timing.active_max", "any"),
     ("timing.slices", "alike"),
     ("layer.mantissa", "1"),
+    ("layer.optimiser", "plain"),
+    ("layer.centred", "false"),
 ];
 
 /// Key and word.
@@ -95,7 +97,19 @@ impl Config {
 fn classify(experiment: &Experiment, train_on: TrainOn, select: Select) -> Vec<Given> {
     // without `..`, here and below: what a run is given is listed or does not compile
     let Experiment { seed, hardware, network, epochs, augment } = experiment;
-    let NetworkSpec { layers, rule, mode, centre, route, batch, mantissas, rates, decay } = network;
+    let NetworkSpec {
+        layers,
+        rule,
+        mode,
+        centre,
+        route,
+        batch,
+        mantissas,
+        rates,
+        decay,
+        optimisers,
+        centred,
+    } = network;
     let mut list = List::default();
     list.put("task", "classify");
     list.put("seed", seed);
@@ -103,12 +117,22 @@ fn classify(experiment: &Experiment, train_on: TrainOn, select: Select) -> Vec<G
         list.layer(number, layer);
         list.put(&format!("layer{number}.rate"), rate.get());
     }
+    for (number, (optimiser, centred)) in optimisers.iter().zip(centred).enumerate() {
+        let optimiser = match optimiser {
+            Optimiser::Plain => "plain",
+            Optimiser::Sign { dead_zone: false } => "sign",
+            Optimiser::Sign { dead_zone: true } => "sign with a dead zone",
+        };
+        list.put(&format!("layer{number}.optimiser"), optimiser);
+        list.put(&format!("layer{number}.centred"), centred);
+    }
     list.put(
         "learning.rule",
         match rule {
             Rule::Ed => "ed",
             Rule::Kaneko => "kaneko",
             Rule::Dfa => "dfa",
+            Rule::EdNonDalean => "ed_non_dalean",
             Rule::Bp => "bp",
         },
     );
@@ -156,6 +180,7 @@ fn classify(experiment: &Experiment, train_on: TrainOn, select: Select) -> Vec<G
         match decay {
             Decay::Constant => "constant",
             Decay::Cosine => "cosine",
+            Decay::Linear => "linear",
         },
     );
     list.put("learning.epochs", epochs);
@@ -209,7 +234,7 @@ impl List {
             driven_by,
             activation,
             weight_max_log2,
-            gain_64ths,
+            initial,
             constant_row,
         } = layer;
         let mut put = |key: &str, word: &dyn ToString| {
@@ -223,15 +248,23 @@ impl List {
             (0, DrivenBy::Shared) | (1.., DrivenBy::Streams) => {}
             (0, DrivenBy::Streams) => put("driven_by", &"streams"),
             (1.., DrivenBy::Shared) => put("driven_by", &"shared"),
+            (_, DrivenBy::Normalised) => put("driven_by", &"normalised"),
         }
         let activation = match activation {
             Activation::Sigmoid(alpha) => format!("sigmoid {}", alpha.get()),
             Activation::Relu => "relu".into(),
             Activation::Identity => "identity".into(),
+            Activation::Rms => "rms".into(),
+            Activation::Accumulator => "accumulator".into(),
         };
         put("activation", &activation);
         put("weight_max_log2", weight_max_log2);
-        put("gain_64ths", &format!("{} {}", gain_64ths[0], gain_64ths[1]));
+        match initial {
+            InitialLevels::Uniform { gain_64ths: [e, i] } => put("gain_64ths", &format!("{e} {i}")),
+            InitialLevels::AbsGaussian { gain: [n, d] } => {
+                put("initial", &format!("abs_gaussian {n}/{d}"));
+            }
+        }
         put("constant_row", constant_row);
     }
 

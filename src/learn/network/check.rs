@@ -3,18 +3,22 @@
 
 use super::{NetworkError, NetworkSpec};
 use crate::chip::hardware::{Adc, Hardware, WriteScheme};
-use crate::chip::layer::{self, DrivenBy, LayerSpec};
+use crate::chip::layer::{self, DrivenBy, InitialLevels, LayerSpec, Optimiser};
 use crate::chip::population::Wiring;
 use crate::learn::error::Centre;
 use crate::learn::route::Route;
-use crate::learn::rule::{Rule, UpdateMode};
+use crate::learn::rule::{Readout, Rule, UpdateMode};
 use crate::num::fixed::OutOfRange;
-use crate::num::tables::{Lut, SHIFT_MAX, STEP_SHIFT_MAX};
+use crate::num::tables::{Activation, Lut, SHIFT_MAX, STEP_SHIFT_MAX};
 
 /// `log2` of the least and the greatest `weight_max`.
 pub const WEIGHT_MAX_LOG2: std::ops::RangeInclusive<i32> = -8..=8;
 /// Initial gains, in 64ths: up to 16.
 pub const GAIN_64THS: std::ops::RangeInclusive<u32> = 1..=1024;
+/// Parts of a gain that is a fraction.
+const GAIN_PART: std::ops::RangeInclusive<u32> = 1..=1024;
+/// Greatest shift of the chance of a pulse: words have as many bits.
+const CHANCE_SHIFT_MAX: u32 = 16;
 /// Words a unit adds, at most.
 const TAPS_MAX: usize = 4;
 /// Shift of a sum of words, at most: nothing is left of it beyond.
@@ -32,9 +36,11 @@ pub(super) fn check(network: &NetworkSpec, hardware: &Hardware) -> Checked {
     numbers(network)?;
     tables(network, hardware)?;
     rule(network, hardware)?;
+    activations(network)?;
     wiring(network)?;
     batches(network, hardware)?;
     routes(network)?;
+    optimisers(network, hardware)?;
     rates(network, hardware)
 }
 
@@ -64,16 +70,28 @@ fn sizes(network: &NetworkSpec) -> Checked {
 /// Weights and gains that levels can stand for.
 fn numbers(network: &NetworkSpec) -> Checked {
     let last = network.layers.len() - 1;
-    for (at, LayerSpec { weight_max_log2, gain_64ths, .. }) in network.layers.iter().enumerate() {
+    for (at, LayerSpec { weight_max_log2, initial, .. }) in network.layers.iter().enumerate() {
         if !WEIGHT_MAX_LOG2.contains(weight_max_log2) {
             let found = format!("of layer {at} is 2^{weight_max_log2}");
             let allowed = "it must be a power of two from 1/256 to 256";
             return misfit("network.weight_max", found, allowed);
         }
-        if let Some(gain) = gain_64ths.iter().find(|&&gain| !GAIN_64THS.contains(&gain)) {
-            let key = if at == last { "network.init_gain_output" } else { "network.init_gain" };
-            let found = format!("of layer {at} holds {gain}/64");
-            return misfit(key, found, "gains are multiples of 1/64, up to 16");
+        let key = if at == last { "network.init_gain_output" } else { "network.init_gain" };
+        match initial {
+            InitialLevels::Uniform { gain_64ths } => {
+                if let Some(gain) = gain_64ths.iter().find(|&&gain| !GAIN_64THS.contains(&gain)) {
+                    let found = format!("of layer {at} holds {gain}/64");
+                    return misfit(key, found, "gains are multiples of 1/64, up to 16");
+                }
+            }
+            InitialLevels::AbsGaussian { gain: [n, d] } => {
+                let fits = GAIN_PART.contains(n) && GAIN_PART.contains(d);
+                if !fits || *n > 16 * *d {
+                    let found = format!("of layer {at} is {n}/{d}");
+                    let allowed = "both parts are 1 to 1024, and a gain is at most 16";
+                    return misfit(key, found, allowed);
+                }
+            }
         }
     }
     Ok(())
@@ -100,7 +118,7 @@ fn tables(network: &NetworkSpec, hardware: &Hardware) -> Checked {
 /// What a rule asks of outputs and chip.
 fn rule(network: &NetworkSpec, hardware: &Hardware) -> Checked {
     match network.rule {
-        Rule::Ed | Rule::Dfa => Ok(()),
+        Rule::Ed | Rule::EdNonDalean | Rule::Dfa => Ok(()),
         Rule::Kaneko if network.outputs() == 1 => Ok(()),
         Rule::Kaneko => {
             let allowed = format!(
@@ -119,15 +137,38 @@ fn rule(network: &NetworkSpec, hardware: &Hardware) -> Checked {
     }
 }
 
-/// Two populations under Dale's law, one stream of differential pairs for the baselines that break it.
+/// Units that are normalised drive others, units that keep their accumulators drive none; what is then read out has errors
+/// that a task hands, from which nothing is subtracted.
+fn activations(network: &NetworkSpec) -> Checked {
+    let last = network.layers.len() - 1;
+    for (at, layer) in network.layers.iter().enumerate() {
+        match layer.activation {
+            Activation::Rms if at == last => {
+                let allowed = "outputs are read one by one, by a table or as accumulators; only hidden layers are normalised";
+                return misfit("network.activation", format!("normalises layer {at}"), allowed);
+            }
+            Activation::Accumulator if at < last => {
+                let allowed =
+                    "units that drive others have activities: give them a table, or normalise them";
+                let found = format!("keeps the accumulators of layer {at}");
+                return misfit("network.activation", found, allowed);
+            }
+            Activation::Accumulator if network.centre != Centre::None => {
+                let allowed = "where accumulators are read out, the task hands the errors and nothing is subtracted: use \
+                               learning.centre = \"none\"";
+                return misfit("learning.centre", "is not \"none\"", allowed);
+            }
+            _ => {}
+        }
+    }
+    Ok(())
+}
+
+/// Two populations under Dale's law; for what breaks it, differential pairs, in two populations or one stream.
 fn wiring(network: &NetworkSpec) -> Checked {
     let last = network.layers.len() - 1;
     for (at, layer) in network.layers.iter().enumerate() {
-        let wanted = match (network.rule.is_dalean(), at == last) {
-            (true, false) => Wiring::Dual,
-            (true, true) => Wiring::DualReadout,
-            (false, _) => Wiring::Single,
-        };
+        let wanted = network.rule.wiring((at == last).then(|| Readout::of(layer.activation)));
         if layer.wiring != wanted {
             let found =
                 format!("does not fit the arrays of layer {at}, which {}", wired(layer.wiring));
@@ -137,11 +178,17 @@ fn wiring(network: &NetworkSpec) -> Checked {
             );
             return misfit("learning.rule", found, allowed);
         }
-        let drives = if at == 0 { DrivenBy::Shared } else { DrivenBy::Streams };
+        let below = at.checked_sub(1).map(|below| network.layers[below].activation);
+        let drives = match below {
+            None => DrivenBy::Shared,
+            Some(Activation::Rms) => DrivenBy::Normalised,
+            Some(_) => DrivenBy::Streams,
+        };
         if layer.driven_by != drives {
             let shared = |drives: DrivenBy| match drives {
                 DrivenBy::Shared => "one set of drives",
                 DrivenBy::Streams => "a set of drives for each stream",
+                DrivenBy::Normalised => "a set of normalised drives for each stream",
             };
             let found = format!("gives layer {at} {}", shared(layer.driven_by));
             let allowed = format!(
@@ -160,8 +207,8 @@ const fn wired(wiring: Wiring) -> &'static str {
         Wiring::Dual => "have two populations above and below",
         Wiring::DualReadout => "read one of two populations out",
         Wiring::Single => "are differential pairs",
-        #[cfg(test)]
         Wiring::DualPairs => "have two populations of differential pairs",
+        Wiring::DualReadoutPairs => "read one of two populations out by differential pairs",
     }
 }
 
@@ -191,7 +238,7 @@ fn routes(network: &NetworkSpec) -> Checked {
     let Some(route) = network.route else {
         return match network.rule {
             Rule::Bp => Ok(()),
-            Rule::Ed | Rule::Kaneko | Rule::Dfa => {
+            Rule::Ed | Rule::EdNonDalean | Rule::Kaneko | Rule::Dfa => {
                 let allowed = "every other rule than \"bp\" has one, such as \"modulo\"";
                 misfit("learning.route", "is missing", allowed)
             }
@@ -206,7 +253,7 @@ fn routes(network: &NetworkSpec) -> Checked {
             let allowed = "direct feedback alignment has random dense feedback; leave the key out";
             return misfit("learning.route", "is not \"random_dense\"", allowed);
         }
-        Rule::Ed | Rule::Kaneko | Rule::Dfa => {}
+        Rule::Ed | Rule::EdNonDalean | Rule::Kaneko | Rule::Dfa => {}
     }
     let most = TAPS_MAX.min(network.outputs());
     let shift = match route {
@@ -244,7 +291,55 @@ fn rates(network: &NetworkSpec, hardware: &Hardware) -> Checked {
         return misfit("learning.rate_mantissa", format!("has {found} numbers"), allowed);
     }
     for (at, rate) in network.rates(hardware).enumerate() {
-        rate.shift().map_err(|error| no_shift(at, &error))?;
+        let k = rate.shift().map_err(|error| no_shift(at, &error))?;
+        let most = CHANCE_SHIFT_MAX - network.layers[at].wiring.shift_extra();
+        if network.optimisers[at].is_sign() && k > most {
+            let found = format!("gives layer {at} a chance of 2^-{k} that a cell is pulsed");
+            let allowed =
+                format!("words of 16 bits give 2^-{most} at least: raise it or its multiplier");
+            return misfit("learning.rate", found, allowed);
+        }
+    }
+    Ok(())
+}
+
+/// An optimiser a layer, on a chip and with a way to write that it makes sense with.
+fn optimisers(network: &NetworkSpec, hardware: &Hardware) -> Checked {
+    let layers = network.layers.len();
+    for (key, found) in [
+        ("learning.optimiser", network.optimisers.len()),
+        ("learning.centred", network.centred.len()),
+    ] {
+        if found != layers {
+            let allowed = format!("there are {layers} layers (hidden and output); give {layers}");
+            return misfit(key, format!("says it of {found} layers"), allowed);
+        }
+    }
+    let other = network.optimisers.iter().any(|&optimiser| optimiser != Optimiser::Plain);
+    let centred = network.centred.contains(&true);
+    if network.mode != UpdateMode::Accumulate && (other || centred) {
+        let key = if other { "learning.optimiser" } else { "learning.centred" };
+        let found = if other { "is not \"plain\"" } else { "is true of a layer" };
+        let allowed = "such requests are made of the sums of a whole batch; use learning.mode = \"accumulate\"";
+        return misfit(key, found, allowed);
+    }
+    if network.rule == Rule::Kaneko && centred {
+        let allowed = "Kaneko's rule only potentiates, and what is centred falls as often as it rises; leave it out";
+        return misfit("learning.centred", "is true of a layer beside rule = \"kaneko\"", allowed);
+    }
+    for (at, optimiser) in network.optimisers.iter().enumerate() {
+        if !optimiser.is_sign() {
+            continue;
+        }
+        let found = format!("is \"sign\" in layer {at}");
+        if hardware.write.residual_bits.get() > 0 {
+            let allowed = "it asks for whole pulses, of which no remainder is left; use hw.write.residual_bits = 0";
+            return misfit("learning.optimiser", found, allowed);
+        }
+        if network.mantissas.get(at).is_some_and(|mantissa| mantissa.get() != 1) {
+            let allowed = "its rate is the chance of a pulse, which no mantissa scales; leave learning.rate_mantissa at 1";
+            return misfit("learning.optimiser", found, allowed);
+        }
     }
     Ok(())
 }

@@ -12,14 +12,16 @@ mod command;
 mod config;
 mod events;
 mod network;
+mod optimise;
 mod read;
 mod registers;
 mod trains;
 mod write;
 
 pub use command::Command;
-pub use config::{More, TileAdc, TileConfig, TileSize};
+pub use config::{More, TileAdc, TileConfig, TileSize, TileUnits};
 pub use events::{BankEvents, TileEvents};
+use optimise::Kept;
 
 /// Which lines a read goes through.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -84,6 +86,10 @@ enum UpdPhase {
     Set,
     Reset,
     Turn,
+    /// All sums are squared.
+    Look,
+    /// Until those of the whole layer have been.
+    Wait,
 }
 
 /// Field of an update, as it is numbered in the register.
@@ -133,7 +139,7 @@ pub struct Launch {
 pub struct Tile {
     size: TileSize,
     config: TileConfig,
-    /// `[activity, derivative]` by index.
+    /// `[activity, derivative]` by index; empty where nothing is looked up.
     table: Vec<[u8; 2]>,
     /// `[row][column]`.
     level: [Vec<u16>; 2],
@@ -169,6 +175,8 @@ pub struct Tile {
     launched: Option<(Launch, Way)>,
     /// By bank: which rows and columns fire in the slot that ends in this cycle.
     firing: [(Vec<bool>, Vec<bool>); 2],
+    /// What requests of whole batches need.
+    kept: Kept,
     /// Cells that were pulsed by trains of this write.
     trained: [Vec<bool>; 2],
     /// Whether the lanes have seen the last group of a sample in this cycle.
@@ -185,7 +193,8 @@ impl Tile {
         assert!((1..=size.rows).contains(&config.rows), "rows in use are rows");
         assert!((1..=size.columns).contains(&config.columns), "columns in use are columns");
         assert!(config.tree <= size.tree_max, "the tree has its stages");
-        assert_eq!(table.len(), 1 << config.lut_bits, "a table entry an index");
+        let looked_up = config.more.units == TileUnits::Table;
+        assert!(!looked_up || table.len() == 1 << config.lut_bits, "a table entry an index");
         let positive = [config.settle, config.convert, config.pulse, config.more.beat];
         assert!(positive.iter().all(|&cycles| cycles > 0), "what takes time takes a cycle");
         assert!(config.share > 0 && config.lanes > 0 && config.words > 0, "counts are positive");
@@ -221,6 +230,7 @@ impl Tile {
             rails: vec![[0; 2]; config.slices as usize],
             launched: None,
             firing: Default::default(),
+            kept: Kept::new(size.rows, size.columns),
             trained: [vec![false; cells], vec![false; cells]],
             looked_up: false,
             size,
@@ -324,7 +334,12 @@ impl Tile {
             }
             // the field is taken, and not used
             Command::Add { slot } => self.upd = update(UpdKind::Add, slot, 0),
-            Command::Write { shift } => self.upd = update(UpdKind::Write, 0, shift),
+            Command::Write { shift } => {
+                self.upd = update(UpdKind::Write, 0, shift);
+                if self.config.more.looks {
+                    self.upd.phase = UpdPhase::Look;
+                }
+            }
         }
     }
 }

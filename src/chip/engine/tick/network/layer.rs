@@ -10,6 +10,7 @@
 use std::ops::Range;
 
 use super::super::tile::{BankEvents, Command, Launch, Tile, TileEvents, TileSize};
+use super::normalise::{Normal, Normaliser};
 use crate::chip::hardware::timing::tree_levels;
 use crate::chip::hardware::{DitherPattern, Hardware, Timing, WriteScheme};
 use crate::chip::layer::{Delivery, DrivenBy, Layer};
@@ -17,9 +18,11 @@ use crate::chip::ledger::{During, Part};
 use crate::chip::periphery;
 use crate::chip::population::{Stream, Wiring};
 use crate::num::fixed::DriveBits;
+use crate::num::tables::Activation;
 
 mod build;
 mod draws;
+mod optimise;
 
 use build::config;
 
@@ -40,6 +43,8 @@ pub(super) struct TickLayer {
     pub(super) memory: Memory,
     /// Accumulator and activity by target stream and sample, of what was read last.
     pub(super) outputs: [Vec<(i64, u8)>; 2],
+    /// The stage behind it, where its units are normalised.
+    pub(super) normaliser: Option<Normaliser>,
     pub(super) backward: Vec<i64>,
     /// Converter shifts, and codes on the rail and all codes since they were looked at, by target stream and slice.
     pub(super) adc_shifts: Vec<Vec<u32>>,
@@ -63,6 +68,8 @@ pub(super) struct TickLayer {
     tree: Vec<(u64, usize, bool, Launch)>,
     /// Cycles through the tree over rows and over columns.
     delay: [u64; 2],
+    /// Requests of whole batches.
+    batch: optimise::Batch,
 }
 
 impl TickLayer {
@@ -89,6 +96,10 @@ impl TickLayer {
                 residual_bits: hardware.write.residual_bits.get().into(),
             },
             outputs: [vec![(0, 0); slots * columns], vec![(0, 0); slots * columns]],
+            normaliser: (layer.spec.activation == Activation::Rms).then(|| {
+                let lanes = usize::try_from(timing.lanes).expect("few");
+                Normaliser::new(timing.beat, lanes, hardware.tile.columns)
+            }),
             backward: vec![],
             adc_shifts: layer.adc_shifts.clone(),
             rails: layer.rails.clone(),
@@ -101,7 +112,7 @@ impl TickLayer {
             grid,
             tile,
             drive_bits: hardware.drive.bits,
-            dither: (hardware.write.dither_bits.get(), hardware.write.dither_pattern),
+            dither: (draws::bits(hardware, layer), hardware.write.dither_pattern),
             slots_log2: match hardware.write.scheme {
                 WriteScheme::Rounded => 0,
                 WriteScheme::Trains { slots_log2 } => slots_log2,
@@ -110,6 +121,7 @@ impl TickLayer {
             writes: layer.writes.first().copied().unwrap_or(0),
             tree: vec![],
             delay: added.map(|tiles| timing.beat * tree_levels(tiles as u64)),
+            batch: optimise::Batch::new(timing, layer, grid),
         };
         let lut = layer.lut.activity.iter().zip(&layer.lut.derivative);
         let table: Vec<[u8; 2]> = lut.map(|(&a, &slope)| [a, slope]).collect();
@@ -332,6 +344,29 @@ impl TickLayer {
         (0..self.columns).map(value).collect()
     }
 
+    /// Accumulators that lanes have just seen.
+    fn sums(&self, target: Stream) -> Vec<i64> {
+        let sum = |column| {
+            let head = &self.tiles[self.at(self.heads(target), 0, column / self.tile[1])];
+            head.out(column % self.tile[1])
+        };
+        (0..self.columns).map(sum).collect()
+    }
+
+    /// Hands the accumulators that lanes have just seen to the stage behind, if there is one.
+    pub(super) fn normalise(&mut self) -> bool {
+        let sums = self.targets().into_iter().map(|target| (target, self.sums(target))).collect();
+        self.normaliser.as_mut().map(|stage| stage.take(sums)).is_some()
+    }
+
+    /// What the stage behind made of a stream of a sample.
+    pub(super) fn set_units(&mut self, target: Stream, slot: usize, normal: &Normal) {
+        for (column, &unit) in normal.units.iter().enumerate() {
+            let head = self.at(self.heads(target), 0, column / self.tile[1]);
+            self.tiles[head].set_unit(slot, column % self.tile[1], unit);
+        }
+    }
+
     pub(super) fn keep_outputs(&mut self, sample: usize) {
         for target in self.targets() {
             let values = self.values(target, sample);
@@ -367,7 +402,8 @@ impl TickLayer {
     }
 
     /// Every array has been written once more.
-    pub(super) const fn written(&mut self) {
+    pub(super) fn written(&mut self) {
+        self.move_means();
         self.writes += 1;
     }
 
@@ -394,6 +430,11 @@ impl TickLayer {
 
     /// One cycle of all tiles and of the tree between them.
     pub(super) fn cycle(&mut self, command: Option<&Command<'_>>, words: &[i16]) {
+        match command {
+            Some(Command::Add { .. }) => self.batch.added += 1,
+            Some(Command::Write { .. }) => self.begin_write(),
+            _ => {}
+        }
         for tile in 0..self.tiles.len() {
             let command = command.filter(|command| self.concerns(command, tile));
             if let Some(slot) = self.tiles[tile].slot_ends() {
@@ -411,6 +452,7 @@ impl TickLayer {
             }
         }
         self.tree();
+        self.join_squares();
     }
 
     fn tree(&mut self) {

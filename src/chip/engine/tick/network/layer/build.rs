@@ -3,10 +3,12 @@
 
 use std::ops::Range;
 
-use super::super::super::tile::{More, TileAdc, TileConfig};
+use super::super::super::tile::{More, TileAdc, TileConfig, TileUnits};
+use crate::chip::crossbar::kernel::MEAN_BITS;
 use crate::chip::hardware::{Adc, FloorKind, Hardware, Subtract, Timing, WriteScheme};
 use crate::chip::layer::Layer;
 use crate::chip::population::Stream;
+use crate::num::tables::Activation;
 
 /// Configuration of one tile of a layer.
 pub(super) fn config(
@@ -62,6 +64,11 @@ pub(super) fn config(
             adc_shifts: shifts,
             slice_times: timing.slices.iter().flat_map(|own| own.iter()).collect(),
             tree_outside: true,
+            units: match layer.spec.activation {
+                Activation::Rms => TileUnits::Normalised,
+                Activation::Accumulator => TileUnits::Kept,
+                _ => TileUnits::Table,
+            },
             taps: own.collect(),
             tap_shift: taps.shift,
             beat: timing.beat,
@@ -71,6 +78,9 @@ pub(super) fn config(
             verify: timing.verify,
             active_max: timing.active_max.map(small),
             pulse_code: timing.pulse_code,
+            sign: layer.requests.optimiser.is_sign(),
+            looks: layer.requests.optimiser.looks_at_layer(),
+            centred: layer.requests.window_log2.map(|_| MEAN_BITS),
             train_slots: match hardware.write.scheme {
                 WriteScheme::Rounded => None,
                 WriteScheme::Trains { slots_log2 } => Some(1 << slots_log2),
