@@ -18,6 +18,7 @@ use layout::{BLOCK_CELLS, BLOCK_ROWS, HALF_CELLS, HALF_COLUMNS, Layout, PANEL_CO
 mod initial;
 pub mod kernel;
 pub mod layout;
+mod optimise;
 mod pulses;
 mod state;
 mod trains;
@@ -25,6 +26,7 @@ mod words;
 mod write;
 
 pub use initial::{InitialLaw, initial_levels, initial_scale};
+pub use optimise::{Asks, Form};
 pub use pulses::{Collect, Collected, RowPeaks};
 pub use trains::ColumnTrain;
 pub use write::{WriteRequest, Written};

@@ -34,6 +34,7 @@ mod error;
 mod forward;
 mod mute;
 mod normalise;
+mod optimise;
 #[cfg(test)]
 mod pairs;
 mod passes;
@@ -175,7 +176,7 @@ struct Registers {
     /// Drives by source stream as an update takes them: `[block][64 rows][stride]`.
     turned: [Lines<u8>; 2],
     /// Sums by target stream, where units are normalised: they lie here until all of a stream are known.
-    sums: [Lines<i32>; 2],
+    unscaled: [Lines<i32>; 2],
     /// Accumulators by target stream, of the last layer.
     accumulators: [Vec<i64>; 2],
     /// Activities by target stream, of the last layer where it has some.
@@ -184,6 +185,8 @@ struct Registers {
     backward: Vec<i64>,
     /// Samples added and not yet programmed, and their shift.
     pending: usize,
+    /// Sums of the last write, where they were kept: `[array][panel][half block]`.
+    sums: Lines<i32>,
     /// Pulses of the last write, while they are collected.
     pulses: Option<Pulses>,
 }

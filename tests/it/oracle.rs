@@ -8,7 +8,7 @@ use dalean::chip::engine::Phase;
 use dalean::chip::hardware::{
     Adc, AdcRange, DitherBits, DitherPattern, FloorKind, Hardware, Subtract, Window,
 };
-use dalean::chip::layer::{DrivenBy, InitialLevels, LayerSpec};
+use dalean::chip::layer::{DrivenBy, InitialLevels, LayerSpec, Optimiser};
 use dalean::chip::ledger::{During, Event};
 use dalean::chip::population::Wiring;
 use dalean::learn::error::Centre;
@@ -156,6 +156,8 @@ fn experiment(s: &Value) -> Experiment {
         mantissas: vec![RateMantissa::new(int(&s["mantissa"])).unwrap(); widths.len() - 1],
         rates: s["rate"].as_array().unwrap().iter().map(positive).collect(),
         decay: Decay::Constant,
+        optimisers: vec![Optimiser::Plain; widths.len() - 1],
+        centred: vec![false; widths.len() - 1],
     };
     Experiment {
         seed: text(&s["seed_decimal"]).parse().unwrap(),

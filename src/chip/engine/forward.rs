@@ -113,7 +113,7 @@ impl Engine {
                 }
             }
             if matches!(self.units[layer], Units::Normalised(_)) {
-                own.sums[at].resize(size, 0);
+                own.unscaled[at].resize(size, 0);
             }
         }
     }

@@ -60,7 +60,7 @@ impl Engine {
             .collect();
         let blocks = this.layout.columns.div_ceil(BLOCK_ROWS);
         let mut parts: Vec<(usize, Near<'_>)> = Vec::new();
-        let streams = own.sums.iter_mut().zip(&mut next.drives).zip(&mut own.derivatives);
+        let streams = own.unscaled.iter_mut().zip(&mut next.drives).zip(&mut own.derivatives);
         for (&target, ((sums, values), derivatives)) in wiring.targets().iter().zip(streams) {
             let first = parts.len();
             for start in (0..samples).step_by(NEAR) {
@@ -126,7 +126,7 @@ fn put_out(
             place(sums, part.live, &mut out.sums[from..]);
         }
         let mut squares = [0; NEAR];
-        kernel.squares(out.sums, &mut squares[..count]);
+        kernel.stream_squares(out.sums, &mut squares[..count]);
         total.iter_mut().zip(squares).for_each(|(total, more)| *total += u128::from(more));
     }
     let mut rc = [0; NEAR];

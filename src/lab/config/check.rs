@@ -17,7 +17,7 @@ use crate::learn::error::Centre;
 use crate::learn::route::Route;
 use crate::learn::rule::{Rule, UpdateMode};
 use crate::num::fixed::{Batch, OutOfRange, RateMantissa};
-use crate::num::tables::{Activation, Decay, FullDrive, Positive, Rate, Unit};
+use crate::num::tables::{Activation, Decay, FullDrive, Positive, Rate, RateOf, Unit};
 
 mod learning;
 mod network;
@@ -204,6 +204,7 @@ pub(super) fn config(mut file: ExperimentFile, model: &UnderModel) -> Result<Con
     let asked = rates.iter().zip(activations.iter().zip(&weight_max_log2));
     let asked = asked.map(|(&rate, (&activation, &weight_max_log2))| Rate {
         rate,
+        of: RateOf::Sums,
         batch,
         mantissa: RateMantissa::new(1).expect("in range"),
         error_bits: hardware.digital.error_bits,

@@ -4,8 +4,7 @@ use std::iter;
 
 use super::check::wrong;
 use super::{Config, ConfigError};
-use crate::chip::layer::{DrivenBy, InitialLevels, LayerSpec};
-
+use crate::chip::layer::{DrivenBy, InitialLevels, LayerSpec, Optimiser};
 use crate::learn::network::NetworkSpec;
 use crate::learn::rule::{Readout, Rule};
 use crate::task::classify::{Augment, Experiment};
@@ -84,6 +83,8 @@ impl Config {
             mantissas: self.mantissas.clone(),
             rates: self.rates.clone(),
             decay: self.decay,
+            optimisers: vec![Optimiser::Plain; self.hidden.len() + 1],
+            centred: vec![false; self.hidden.len() + 1],
         }
     }
 

@@ -10,7 +10,7 @@ use crate::chip::hardware::{
     Adc, AdcRange, CellSpec, DigitalSpec, DitherBits, DitherPattern, DriveSpec, FloorKind,
     HardwareSpec, PulseCode, Subtract, TileSpec, Timing, WriteScheme, WriteSpec,
 };
-use crate::chip::layer::{DrivenBy, InitialLevels, LayerSpec};
+use crate::chip::layer::{DrivenBy, InitialLevels, LayerSpec, Optimiser};
 use crate::learn::error::Centre;
 use crate::learn::network::NetworkSpec;
 use crate::learn::route::Route;
@@ -70,6 +70,8 @@ const FROZEN: &[(&str, &str)] = &[
     ("timing.active_max", "any"),
     ("timing.slices", "alike"),
     ("layer.mantissa", "1"),
+    ("layer.optimiser", "plain"),
+    ("layer.centred", "false"),
 ];
 
 /// Key and word.
@@ -95,13 +97,34 @@ impl Config {
 fn classify(experiment: &Experiment, train_on: TrainOn, select: Select) -> Vec<Given> {
     // without `..`, here and below: what a run is given is listed or does not compile
     let Experiment { seed, hardware, network, epochs, augment } = experiment;
-    let NetworkSpec { layers, rule, mode, centre, route, batch, mantissas, rates, decay } = network;
+    let NetworkSpec {
+        layers,
+        rule,
+        mode,
+        centre,
+        route,
+        batch,
+        mantissas,
+        rates,
+        decay,
+        optimisers,
+        centred,
+    } = network;
     let mut list = List::default();
     list.put("task", "classify");
     list.put("seed", seed);
     for (number, (layer, rate)) in layers.iter().zip(rates).enumerate() {
         list.layer(number, layer);
         list.put(&format!("layer{number}.rate"), rate.get());
+    }
+    for (number, (optimiser, centred)) in optimisers.iter().zip(centred).enumerate() {
+        let optimiser = match optimiser {
+            Optimiser::Plain => "plain",
+            Optimiser::Sign { dead_zone: false } => "sign",
+            Optimiser::Sign { dead_zone: true } => "sign with a dead zone",
+        };
+        list.put(&format!("layer{number}.optimiser"), optimiser);
+        list.put(&format!("layer{number}.centred"), centred);
     }
     list.put(
         "learning.rule",
@@ -157,6 +180,7 @@ fn classify(experiment: &Experiment, train_on: TrainOn, select: Select) -> Vec<G
         match decay {
             Decay::Constant => "constant",
             Decay::Cosine => "cosine",
+            Decay::Linear => "linear",
         },
     );
     list.put("learning.epochs", epochs);

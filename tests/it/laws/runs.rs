@@ -2,7 +2,7 @@
 
 use dalean::chip::crossbar::kernel::Backend;
 use dalean::chip::hardware::{Adc, AdcRange, HardwareSpec};
-use dalean::chip::layer::{DrivenBy, InitialLevels, LayerSpec};
+use dalean::chip::layer::{DrivenBy, InitialLevels, LayerSpec, Optimiser};
 use dalean::chip::population::Wiring;
 use dalean::lab::store::checkpoint::{self, Identity};
 use dalean::lab::store::hash;
@@ -130,6 +130,8 @@ fn run() -> impl Strategy<Value = Run> {
                     .collect(),
                 rates,
                 decay,
+                optimisers: vec![Optimiser::Plain; count],
+                centred: vec![false; count],
             };
             let augment = image.then(|| moved(sides[0])).flatten();
             let experiment = Experiment { seed, hardware, network, epochs, augment };

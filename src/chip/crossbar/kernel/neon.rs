@@ -80,7 +80,7 @@ const fn table<M: Multiply>() -> Ops {
         may_move: pulses::may_move_twin,
         pulses: pulses::twin,
         levels: levels::twin,
-        squares: normalise::squares,
+        stream_squares: normalise::stream_squares,
         scale: normalise::scale,
         peaks,
         ..scalar::OPS

@@ -68,7 +68,7 @@ pub(super) fn law_scale(
 }
 
 #[inline(always)]
-pub(super) fn squares(sums: &[i32], squares: &mut [u64]) {
+pub(super) fn stream_squares(sums: &[i32], squares: &mut [u64]) {
     for (square, sums) in squares.iter_mut().zip(sums.as_chunks::<BLOCK_ROWS>().0) {
         let mut total = 0;
         for &sum in sums {
@@ -149,7 +149,7 @@ mod tests {
             let of = |backend| {
                 let kernel = Kernel::start(backend);
                 let mut squares = vec![7; samples];
-                kernel.squares(sums, &mut squares);
+                kernel.stream_squares(sums, &mut squares);
                 let (mut values, mut slopes) = (vec![1; sums.len()], vec![1; sums.len()]);
                 let beyond = kernel.scale(sums, &rc, hand_on, &mut values, &mut slopes);
                 (squares, values, slopes, beyond)

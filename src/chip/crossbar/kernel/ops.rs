@@ -14,9 +14,9 @@ use std::ops::Range;
 
 use super::{
     Banks, Cells, Conversion, Dither, Draws, Drives, Ends, Extremes, Half, HandOn, Image, LookUp,
-    OneSample, Peaks, Rails, Scratch, Sums, WriteCounts, WriteLaw,
+    OneSample, Peaks, Rails, Scratch, SignLaw, Squares, Sums, WriteCounts, WriteLaw,
 };
-use crate::chip::crossbar::layout::Layout;
+use crate::chip::crossbar::layout::{BLOCK_ROWS, HALF_COLUMNS, Layout};
 use crate::num::fixed::ErrorBits;
 
 /// The operations of a back end.
@@ -35,7 +35,7 @@ pub(super) struct Ops {
     pub(super) convert: unsafe fn([&[i32]; 2], Conversion, usize, &mut [i16]) -> Rails,
     pub(super) look_up: unsafe fn(&[i32], &LookUp, usize, &mut [u8], &mut [u8]) -> u64,
     pub(super) difference: unsafe fn([&[i32]; 2], &mut [i32]),
-    pub(super) squares: unsafe fn(&[i32], &mut [u64]),
+    pub(super) stream_squares: unsafe fn(&[i32], &mut [u64]),
     pub(super) scale: unsafe fn(&[i32], &[u64], HandOn, &mut [u8], &mut [u8]) -> u64,
     pub(super) latch: unsafe fn(&[i16], usize, &[u16], &mut [i16]),
     pub(super) gate: unsafe fn(&[i16], &[u8], bool, ErrorBits, usize, &mut [i8]) -> u64,
@@ -60,6 +60,16 @@ pub(super) struct Ops {
     pub(super) pulses:
         unsafe fn(Sums<'_>, &WriteLaw, Dither<'_>, &mut Cells<'_>, &mut Half<i8>) -> WriteCounts,
     pub(super) levels: unsafe fn(&mut Cells<'_>, &Half<i8>, Ends, u16) -> u64,
+    pub(super) centre: unsafe fn(&mut Half<i32>, &[i32; BLOCK_ROWS], &[i32; HALF_COLUMNS]),
+    pub(super) squares: unsafe fn(&Half<i32>) -> Squares,
+    pub(super) loud: unsafe fn(&Half<i32>, u32) -> u16,
+    pub(super) signs: unsafe fn(
+        &Half<i32>,
+        &SignLaw,
+        Option<&Half<u16>>,
+        &mut Cells<'_>,
+        &mut Half<i8>,
+    ) -> WriteCounts,
     /// Both at once, for writes as they usually are.
     pub(super) fused:
         unsafe fn(&mut Cells<'_>, &Half<i32>, &WriteLaw, Dither<'_>) -> Option<WriteCounts>,
@@ -95,8 +105,8 @@ macro_rules! twins {
         }
 
         #[target_feature(enable = $features)]
-        fn squares(sums: &[i32], squares: &mut [u64]) {
-            crate::chip::crossbar::kernel::normalise::squares(sums, squares);
+        fn stream_squares(sums: &[i32], squares: &mut [u64]) {
+            crate::chip::crossbar::kernel::normalise::stream_squares(sums, squares);
         }
 
         #[target_feature(enable = $features)]
@@ -109,6 +119,32 @@ macro_rules! twins {
         ) -> u64 {
             use crate::chip::crossbar::kernel::normalise;
             normalise::scale(sums, reciprocals, hand_on, values, derivatives)
+        }
+
+        #[target_feature(enable = $features)]
+        fn centre(sums: &mut Half<i32>, means: &[i32; BLOCK_ROWS], totals: &[i32; HALF_COLUMNS]) {
+            crate::chip::crossbar::kernel::optimise::centre(sums, means, totals)
+        }
+
+        #[target_feature(enable = $features)]
+        fn squares(sums: &Half<i32>) -> Squares {
+            crate::chip::crossbar::kernel::optimise::squares(sums)
+        }
+
+        #[target_feature(enable = $features)]
+        fn loud(sums: &Half<i32>, least: u32) -> u16 {
+            crate::chip::crossbar::kernel::optimise::loud(sums, least)
+        }
+
+        #[target_feature(enable = $features)]
+        fn signs(
+            sums: &Half<i32>,
+            law: &SignLaw,
+            words: Option<&Half<u16>>,
+            cells: &mut Cells<'_>,
+            out: &mut Half<i8>,
+        ) -> WriteCounts {
+            crate::chip::crossbar::kernel::optimise::signs(sums, law, words, cells, out)
         }
     };
 }

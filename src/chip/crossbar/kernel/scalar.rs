@@ -17,7 +17,7 @@ use std::ops::Range;
 use super::ops::Ops;
 use super::{
     Conversion, Draws, Drives, Extremes, Half, LookUp, Peaks, Rails, conv, levels, normalise,
-    pulses, sums,
+    optimise, pulses, sums,
 };
 use crate::chip::crossbar::layout::{
     BLOCK_CELLS, BLOCK_ROWS, HALF_CELLS, HALF_COLUMNS, Layout, PANEL_COLUMNS, in_half,
@@ -32,7 +32,7 @@ pub(super) const OPS: Ops = Ops {
     convert,
     look_up,
     difference,
-    squares: normalise::law_squares,
+    stream_squares: normalise::law_squares,
     scale: normalise::law_scale,
     latch,
     gate,
@@ -45,6 +45,10 @@ pub(super) const OPS: Ops = Ops {
     may_move: pulses::may_move,
     pulses: pulses::law,
     levels: levels::law,
+    centre: optimise::centre,
+    squares: optimise::squares,
+    loud: optimise::loud,
+    signs: optimise::signs,
     fused: |_, _, _, _| None,
     one_sample: |_| None,
     peaks,
