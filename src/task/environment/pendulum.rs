@@ -11,6 +11,7 @@
 //! 2^-25 in a step; see docs/MODEL.md, 5.
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
+use super::canvas::Canvas;
 use super::fine::{Fine, shown, sin, sin_cos, taken, uniform};
 use super::one::{Action, Came, Environment, StatePart};
 use super::{EnvSpec, Observations, Shown, Taken};
@@ -89,6 +90,13 @@ impl Environment for Pendulum {
     }
 
     fn picture(&self) -> String {
-        String::new()
+        let mut canvas = Canvas::new(25, 13);
+        let hinge = [12, 6].map(Fine::from_num);
+        let (sin, cos) = sin_cos(self.angle);
+        // what turns to the left as the angle grows
+        let tip = [hinge[0] - sin * 12, hinge[1] - cos * 6];
+        canvas.line(hinge, tip, 'o');
+        canvas.put(hinge, '+');
+        canvas.to_string()
     }
 }
