@@ -31,17 +31,18 @@
 
 use super::one::{Action, Came, Environment, StatePart};
 use super::{EnvSpec, Observations, Real, Shown, Taken};
+use crate::chip::ledger::coded;
 
 pub mod greedy;
 pub mod land;
 
-use land::{DIRECTIONS, Land, SIDE, TILES, Tile, away};
+use land::{DIRECTIONS, Land, SIDE, TILES, Terrain, away};
 
 /// Columns and rows of the view.
 pub const VIEW: [usize; 2] = [5, 5];
 const SEEN: usize = VIEW[0] * VIEW[1];
-/// The line of the first tile seen as `Tree`, of the first direction, of what is carried, of the flask.
-const LINE_TURNED: usize = (Tile::ALL.len() - 1) * SEEN;
+/// The line of the first tile that is seen as a tree, of the first direction, of what is carried, of the flask.
+const LINE_TURNED: usize = (Terrain::COUNT - 1) * SEEN;
 const LINE_CARRIED: usize = LINE_TURNED + DIRECTIONS.len();
 const CARRIED: usize = 7;
 const LINE_FLASK: usize = LINE_CARRIED + CARRIED;
@@ -51,38 +52,29 @@ pub const LINES: usize = LINE_FLASK + 4;
 const FLASK: u8 = 80;
 const MANY: u8 = 9;
 
-/// What can be reached in an episode, with its reward.
-const REWARDS: [(Feat, i32); 8] = [
-    (Feat::Wood, 1),
-    (Feat::Water, 1),
-    (Feat::Pickaxe, 2),
-    (Feat::Stone, 2),
-    (Feat::Hammer, 3),
-    (Feat::Ore, 3),
-    (Feat::Key, 5),
-    (Feat::Vault, 8),
-];
+/// What is earned by a [`Feat`], in their order.
+const REWARDS: [i32; Feat::COUNT] = [1, 1, 2, 2, 3, 3, 5, 8];
 
-/// What can be reached in an episode.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[repr(u8)]
-pub enum Feat {
-    /// Took wood.
-    Wood = 0,
-    /// Filled the flask.
-    Water = 1,
-    /// Made a pickaxe.
-    Pickaxe = 2,
-    /// Took stone.
-    Stone = 3,
-    /// Made a hammer.
-    Hammer = 4,
-    /// Took ore.
-    Ore = 5,
-    /// Made the key.
-    Key = 6,
-    /// Opened the vault.
-    Vault = 7,
+coded! {
+    /// What can be reached in an episode.
+    Feat {
+        /// Took wood.
+        Wood = 0, "wood";
+        /// Filled the flask.
+        Water = 1, "water";
+        /// Made the pickaxe.
+        Pickaxe = 2, "pickaxe";
+        /// Took stone.
+        Stone = 3, "stone";
+        /// Made the hammer.
+        Hammer = 4, "hammer";
+        /// Took ore.
+        Ore = 5, "ore";
+        /// Made the key.
+        Key = 6, "key";
+        /// Opened the vault.
+        Vault = 7, "vault";
+    }
 }
 
 /// A walker in a land.
@@ -113,7 +105,7 @@ impl Foray {
             return 0;
         }
         self.done |= 1 << feat as u8;
-        REWARDS[feat as usize].1
+        REWARDS[feat as usize]
     }
 
     /// Makes whatever is due.
@@ -143,32 +135,32 @@ impl Foray {
     fn meet(&mut self, at: Option<usize>) -> i32 {
         let Some(at) = at else { return 0 };
         match self.land.tiles[at] {
-            Tile::Ground => {
+            Terrain::Ground => {
                 self.at = at;
                 0
             }
-            Tile::Tree => {
-                self.land.tiles[at] = Tile::Ground;
+            Terrain::Tree => {
+                self.land.tiles[at] = Terrain::Ground;
                 self.wood = MANY.min(self.wood + 1);
                 self.reach(Feat::Wood)
             }
-            Tile::Lake => {
+            Terrain::Lake => {
                 self.flask = FLASK;
                 self.reach(Feat::Water)
             }
-            Tile::Stone if self.has(Feat::Pickaxe) => {
-                self.land.tiles[at] = Tile::Ground;
+            Terrain::Stone if self.has(Feat::Pickaxe) => {
+                self.land.tiles[at] = Terrain::Ground;
                 self.stone = MANY.min(self.stone + 1);
                 self.reach(Feat::Stone)
             }
-            Tile::Ore if self.has(Feat::Hammer) => {
-                self.land.tiles[at] = Tile::Ground;
+            Terrain::Ore if self.has(Feat::Hammer) => {
+                self.land.tiles[at] = Terrain::Ground;
                 self.ore = MANY.min(self.ore + 1);
                 self.reach(Feat::Ore)
             }
-            Tile::Bench => self.make(),
-            Tile::Vault if self.has(Feat::Key) => self.reach(Feat::Vault),
-            Tile::Stone | Tile::Ore | Tile::Vault | Tile::Edge => 0,
+            Terrain::Bench => self.make(),
+            Terrain::Vault if self.has(Feat::Key) => self.reach(Feat::Vault),
+            Terrain::Stone | Terrain::Ore | Terrain::Vault | Terrain::Edge => 0,
         }
     }
 
@@ -232,7 +224,7 @@ impl Environment for Foray {
     fn parts() -> Vec<StatePart> {
         let part = |name, numbers, most: i64| StatePart { name, numbers, within: 0..=most };
         vec![
-            part("tiles", TILES, Tile::Vault as i64),
+            part("tiles", TILES, i64::from(Terrain::Vault.code())),
             part("at", 1, (TILES - 1) as i64),
             part("turned", 1, 3),
             part("wood", 1, i64::from(MANY)),
@@ -257,11 +249,9 @@ impl Environment for Foray {
     }
 
     fn show(&self, shown: &mut Observations) {
-        let mut kinds = [0_u8; SEEN];
-        let mut there = [0_u64; Tile::ALL.len()];
-        for (seen, kind) in kinds.iter_mut().enumerate() {
-            *kind = self.land.tile(away(self.at, from_middle(seen))) as u8;
-            there[usize::from(*kind)] |= 1 << seen;
+        let mut there = [0_u32; Terrain::COUNT];
+        for seen in 0..SEEN {
+            there[self.land.tile(away(self.at, from_middle(seen))) as usize] |= 1 << seen;
         }
         for (kind, mut seen) in there.into_iter().enumerate().skip(1) {
             while seen != 0 {
@@ -277,7 +267,7 @@ impl Environment for Foray {
     }
 
     fn numbers(&self, numbers: &mut Vec<i64>) {
-        numbers.extend(self.land.tiles.map(|tile| tile as i64));
+        numbers.extend(self.land.tiles.map(|tile| i64::from(tile.code())));
         numbers.extend([self.at, self.turned].map(|number| number as i64));
         let Self { wood, stone, ore, flask, done, .. } = *self;
         numbers.extend([wood, stone, ore, flask, done].map(i64::from));
@@ -288,7 +278,7 @@ impl Environment for Foray {
         let index = |number: i64| usize::try_from(number).expect("it lies within its part");
         let byte = |number: i64| u8::try_from(number).expect("it lies within its part");
         Self {
-            land: Land { tiles: std::array::from_fn(|at| Tile::ALL[index(tiles[at])]) },
+            land: Land { tiles: std::array::from_fn(|at| Terrain::ALL[index(tiles[at])]) },
             at: index(rest[0]),
             turned: index(rest[1]),
             wood: byte(rest[2]),
@@ -314,9 +304,9 @@ impl Environment for Foray {
         }
         let Self { wood, stone, ore, flask, .. } = self;
         picture += &format!("wood {wood}  stone {stone}  ore {ore}  flask {flask}\n");
-        let tools = [("pickaxe", Feat::Pickaxe), ("hammer", Feat::Hammer), ("key", Feat::Key)];
-        let tools = tools.into_iter().filter(|(_, feat)| self.has(*feat));
-        picture + &tools.map(|(name, _)| name).collect::<Vec<_>>().join("  ") + "\n"
+        let tools = [Feat::Pickaxe, Feat::Hammer, Feat::Key];
+        let tools = tools.into_iter().filter(|tool| self.has(*tool));
+        picture + &tools.map(Feat::name).collect::<Vec<_>>().join("  ") + "\n"
     }
 }
 

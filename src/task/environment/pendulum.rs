@@ -8,7 +8,7 @@
 //! ```
 //!
 //! `a` is in radians, upwards 0, and counts turns: it is at most `pi + 200 x 0.05 x 8` in size. As Gymnasium 1.4 has it, to
-//! 2^-25 in a step; see docs/MODEL.md, 5.
+//! 2^-28 of a range in a step; see docs/MODEL.md, 5.
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
 use super::canvas::Canvas;

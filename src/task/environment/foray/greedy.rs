@@ -16,7 +16,7 @@
 //! is taken. Both see what a policy sees, and remember nothing.
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
-use super::land::{DIRECTIONS, Tile};
+use super::land::{DIRECTIONS, Terrain};
 use super::{LINE_CARRIED, LINE_FLASK, LINE_TURNED, SEEN, VIEW, from_middle};
 
 /// What the script does that goes for what pays at once, where these lines are on; `word` is drawn.
@@ -35,21 +35,21 @@ fn step(lines: &[u32], word: u32, foresight: bool) -> u16 {
     let on = |line: usize| lines.iter().any(|&active| active as usize == line);
     let [wood, wood_2, stone, ore, pickaxe, hammer, key] =
         std::array::from_fn(|number| on(LINE_CARRIED + number));
-    let useful = |tile: Tile| match tile {
-        Tile::Tree if foresight => !wood_2 && !hammer,
-        Tile::Tree => !wood && !pickaxe,
-        Tile::Lake => !on(LINE_FLASK + 3),
-        Tile::Stone => pickaxe && !hammer && !stone,
-        Tile::Ore => hammer && !key && !ore,
-        Tile::Bench if !pickaxe => wood,
-        Tile::Bench if !hammer => wood && stone,
-        Tile::Bench => ore && !key,
-        Tile::Vault => key,
-        Tile::Ground | Tile::Edge => false,
+    let useful = |tile: Terrain| match tile {
+        Terrain::Tree if foresight => !wood_2 && !hammer,
+        Terrain::Tree => !wood && !pickaxe,
+        Terrain::Lake => !on(LINE_FLASK + 3),
+        Terrain::Stone => pickaxe && !hammer && !stone,
+        Terrain::Ore => hammer && !key && !ore,
+        Terrain::Bench if !pickaxe => wood,
+        Terrain::Bench if !hammer => wood && stone,
+        Terrain::Bench => ore && !key,
+        Terrain::Vault => key,
+        Terrain::Ground | Terrain::Edge => false,
     };
-    let mut seen = [Tile::Ground; SEEN];
+    let mut seen = [Terrain::Ground; SEEN];
     for line in lines.iter().map(|&line| line as usize).filter(|&line| line < LINE_TURNED) {
-        seen[line % SEEN] = Tile::ALL[1 + line / SEEN];
+        seen[line % SEEN] = Terrain::ALL[1 + line / SEEN];
     }
     let way = |at: usize| {
         let (columns, rows) = from_middle(at);
@@ -60,9 +60,9 @@ fn step(lines: &[u32], word: u32, foresight: bool) -> u16 {
         seen[at.unsigned_abs()]
     });
     let open = |direction: usize| match next[direction] {
-        Tile::Ground => true,
-        Tile::Tree => foresight,
-        Tile::Stone => foresight && pickaxe,
+        Terrain::Ground => true,
+        Terrain::Tree => foresight,
+        Terrain::Stone => foresight && pickaxe,
         _ => false,
     };
     let restless = word >> 29 == 0;

@@ -12,6 +12,7 @@
 //! else gives way. Draws are 32-bit words, `floor(n word / 2^32)` a number below `n`. See docs/MODEL.md, 5.
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
+use crate::chip::ledger::coded;
 use crate::num::draw::below;
 
 /// Tiles along an edge.
@@ -23,41 +24,29 @@ const STONES: usize = 16;
 const ORES: usize = 2;
 const TREES: usize = 8;
 
-/// What a tile holds.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[repr(u8)]
-pub enum Tile {
-    /// Nothing: one can walk there.
-    Ground = 0,
-    /// Gives wood, once.
-    Tree = 1,
-    /// Gives water, always.
-    Lake = 2,
-    /// Gives stone, once, to a pickaxe.
-    Stone = 3,
-    /// Gives ore, once, to a hammer.
-    Ore = 4,
-    /// Where tools are made.
-    Bench = 5,
-    /// What a key opens.
-    Vault = 6,
-    /// What lies outside.
-    Edge = 7,
+coded! {
+    /// What a tile holds.
+    Terrain {
+        /// Nothing: one can walk there.
+        Ground = 0, "ground";
+        /// Gives wood, once.
+        Tree = 1, "tree";
+        /// Gives water, always.
+        Lake = 2, "lake";
+        /// Gives stone, once, to a pickaxe.
+        Stone = 3, "stone";
+        /// Gives ore, once, to a hammer.
+        Ore = 4, "ore";
+        /// Where tools are made.
+        Bench = 5, "bench";
+        /// What a key opens.
+        Vault = 6, "vault";
+        /// What lies outside.
+        Edge = 7, "edge";
+    }
 }
 
-impl Tile {
-    /// All of them, by number.
-    pub const ALL: [Self; 8] = [
-        Self::Ground,
-        Self::Tree,
-        Self::Lake,
-        Self::Stone,
-        Self::Ore,
-        Self::Bench,
-        Self::Vault,
-        Self::Edge,
-    ];
-
+impl Terrain {
     /// Its character in a picture.
     #[must_use]
     pub const fn glyph(self) -> char {
@@ -93,7 +82,7 @@ pub const fn away(from: usize, (columns, rows): (isize, isize)) -> Option<usize>
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Land {
     /// `[row][column]`, from the north-west.
-    pub tiles: [Tile; TILES],
+    pub tiles: [Terrain; TILES],
 }
 
 impl Land {
@@ -103,17 +92,17 @@ impl Land {
             let bound = u32::try_from(bound).expect("a land has fewer than 2^32 tiles");
             below(words.next().expect("the stream has no end"), bound) as usize
         };
-        let mut land = Self { tiles: [Tile::Ground; TILES] };
+        let mut land = Self { tiles: [Terrain::Ground; TILES] };
         let (width, height) = (2 + pick(2), 2 + pick(3));
         let (left, top) = (2 + pick(SIDE - 3 - width), 2 + pick(SIDE - 3 - height));
         for row in top..top + height {
-            land.tiles[row * SIDE + left..][..width].fill(Tile::Lake);
+            land.tiles[row * SIDE + left..][..width].fill(Terrain::Lake);
         }
         let mut at = pick(TILES);
         let mut stones = 0;
         while stones < STONES {
-            if land.tiles[at] == Tile::Ground {
-                land.tiles[at] = Tile::Stone;
+            if land.tiles[at] == Terrain::Ground {
+                land.tiles[at] = Terrain::Stone;
                 stones += 1;
             }
             at = away(at, DIRECTIONS[pick(4)]).unwrap_or(at);
@@ -123,25 +112,25 @@ impl Land {
             middle.contains(&(tile % SIDE)) && middle.contains(&(tile / SIDE))
         };
         for _ in 0..ORES {
-            let at = land.one_of(Tile::Stone, |_| true, &mut pick);
-            land.tiles[at] = Tile::Ore;
+            let at = land.one_of(Terrain::Stone, |_| true, &mut pick);
+            land.tiles[at] = Terrain::Ore;
         }
-        for building in [Tile::Bench, Tile::Vault] {
-            let at = land.one_of(Tile::Ground, inside, &mut pick);
+        for building in [Terrain::Bench, Terrain::Vault] {
+            let at = land.one_of(Terrain::Ground, inside, &mut pick);
             land.tiles[at] = building;
         }
         for _ in 0..TREES {
-            let at = land.one_of(Tile::Ground, |_| true, &mut pick);
-            land.tiles[at] = Tile::Tree;
+            let at = land.one_of(Terrain::Ground, |_| true, &mut pick);
+            land.tiles[at] = Terrain::Tree;
         }
-        let walker = land.one_of(Tile::Ground, |_| true, &mut pick);
+        let walker = land.one_of(Terrain::Ground, |_| true, &mut pick);
         (land, walker)
     }
 
     /// One of the tiles that hold `kind` at a place that will do.
     fn one_of(
         &self,
-        kind: Tile,
+        kind: Terrain,
         will_do: impl Fn(usize) -> bool,
         pick: &mut impl FnMut(usize) -> usize,
     ) -> usize {
@@ -153,7 +142,7 @@ impl Land {
     /// What lies there.
     #[inline]
     #[must_use]
-    pub fn tile(&self, at: Option<usize>) -> Tile {
-        at.map_or(Tile::Edge, |at| self.tiles[at])
+    pub fn tile(&self, at: Option<usize>) -> Terrain {
+        at.map_or(Terrain::Edge, |at| self.tiles[at])
     }
 }
