@@ -123,7 +123,8 @@ fn put_out(
                 reader.read_narrow(kernel, &part, &mut scratch, sums, &mut seen);
             }
             silence(sums, part.live);
-            let group = part.samples.start - near.samples.start..part.samples.end - near.samples.start;
+            let group =
+                part.samples.start - near.samples.start..part.samples.end - near.samples.start;
             kernel.stream_squares(sums, &mut squares[group]);
         }
         total.iter_mut().zip(squares).for_each(|(total, more)| *total += u128::from(more));
@@ -134,7 +135,8 @@ fn put_out(
     }
     for (block, Block { sums, values, derivatives }) in near.blocks.into_iter().enumerate() {
         for (sums, part) in panels(reader, block, &near.samples, sums) {
-            let group = part.samples.start - near.samples.start..part.samples.end - near.samples.start;
+            let group =
+                part.samples.start - near.samples.start..part.samples.end - near.samples.start;
             let at = group.start * BLOCK_ROWS + part.panel % 2 * PANEL_COLUMNS;
             let (values, derivatives) = (&mut values[at..], &mut derivatives[at..]);
             seen.look_ups += kernel.scale(sums, &rc[group], hand_on, values, derivatives);
@@ -198,7 +200,7 @@ fn panels<'a>(
     mut sums: &'a mut [i32],
 ) -> impl Iterator<Item = (&'a mut [i32], PanelPart)> {
     let groups = samples.clone().step_by(TOGETHER);
-    let halves = groups.flat_map(|start| [(start, 2 * block), (start, 2 * block + 1)]);
+    let halves = groups.flat_map(move |start| [(start, 2 * block), (start, 2 * block + 1)]);
     halves.map(move |(start, panel)| {
         let group = start..(start + TOGETHER).min(samples.end);
         let live = reader.columns.saturating_sub(panel * PANEL_COLUMNS).min(PANEL_COLUMNS);
