@@ -65,10 +65,10 @@ pub fn normal(tables: &PolicyTables, word: u32) -> Normal {
 #[inline]
 #[must_use]
 pub fn tanh(tables: &PolicyTables, u: Logit) -> Real {
-    let u = i64::from(u.to_bits());
-    let at = u.unsigned_abs().min((8 << 20) - 1);
+    let u = u.to_bits();
+    let at = u64::from(u.unsigned_abs()).min((8 << 20) - 1);
     let size = rsh(PolicyTables::between(&tables.tanh[..], at, 13), 14) as i32;
-    Real::from_bits(if u < 0 { -size } else { size })
+    Real::from_bits(u.signum() * size)
 }
 
 #[cfg(test)]
