@@ -17,7 +17,7 @@ use crate::learn::error::Centre;
 use crate::learn::route::Route;
 use crate::learn::rule::{Rule, UpdateMode};
 use crate::num::fixed::{Batch, OutOfRange, RateMantissa};
-use crate::num::tables::{Activation, Decay, Positive, Rate, RateOf, Unit};
+use crate::num::tables::{Activation, Decay, FullDrive, Positive, Rate, RateOf, Unit};
 
 mod learning;
 mod network;
@@ -213,6 +213,7 @@ pub(super) fn config(mut file: ExperimentFile, model: &UnderModel) -> Result<Con
             weight_max_log2,
             level_bits: hardware.cell.level_bits,
             drive_bits: hardware.drive.bits,
+            full_drive: FullDrive::One,
         },
     });
     let mantissas = learning::mantissas(learning, &asked.collect::<Vec<_>>())?;

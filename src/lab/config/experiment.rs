@@ -4,10 +4,9 @@ use std::iter;
 
 use super::check::wrong;
 use super::{Config, ConfigError};
-use crate::chip::layer::{DrivenBy, LayerSpec, Optimiser};
-use crate::chip::population::Wiring;
+use crate::chip::layer::{DrivenBy, InitialLevels, LayerSpec, Optimiser};
 use crate::learn::network::NetworkSpec;
-use crate::learn::rule::Rule;
+use crate::learn::rule::{Readout, Rule};
 use crate::task::classify::{Augment, Experiment};
 
 impl Config {
@@ -61,19 +60,16 @@ impl Config {
         let driven = iter::once(DrivenBy::Shared).chain(iter::repeat(DrivenBy::Streams));
         let layers = (0..self.hidden.len() + 1).zip(driven).map(|(layer, driven_by)| {
             let last = layer == self.hidden.len();
-            let wiring = match (self.rule.is_dalean(), last) {
-                (true, false) => Wiring::Dual,
-                (true, true) => Wiring::DualReadout,
-                (false, _) => Wiring::Single,
-            };
+            let activation = self.activations[layer];
+            let wiring = self.rule.wiring(last.then(|| Readout::of(activation)));
             LayerSpec {
                 inputs: sizes[layer],
                 units: sizes[layer + 1],
                 wiring,
                 driven_by,
-                activation: self.activations[layer],
+                activation,
                 weight_max_log2: self.weight_max_log2[layer],
-                gain_64ths: self.gain_64ths[usize::from(last)],
+                initial: InitialLevels::Uniform { gain_64ths: self.gain_64ths[usize::from(last)] },
                 constant_row: self.bias_rows,
             }
         });

@@ -55,6 +55,7 @@ pub(super) fn resolve(
     let rules = [
         ("ed", Rule::Ed),
         ("ed_seed", Rule::Ed),
+        ("ed_non_dalean", Rule::EdNonDalean),
         ("kaneko", Rule::Kaneko),
         ("dfa", Rule::Dfa),
         ("bp", Rule::Bp),
