@@ -18,13 +18,16 @@ mod hardware;
 pub mod keys;
 mod law;
 mod layers;
+mod policy;
 mod quantity;
 pub mod sweep;
 mod template;
 mod wrong;
 
 pub use absent::{Absent, EFFECTS, Effect, absent_words};
+pub(crate) use check::Bias;
 pub use check::{Config, DataConfig, Select, TrainOn};
+pub use defaults::policy::{POLICY_DEFAULTS, PolicyDefaults};
 pub use defaults::{SET_DEFAULTS, SetDefaults};
 pub use differs::{Difference, flat};
 pub use file::{ExperimentFile, HardwareFile};

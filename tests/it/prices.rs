@@ -90,7 +90,7 @@ fn every_split_is_its_total_and_an_image_its_part_on_every_chip() {
                 let sum: f64 = split.iter().map(|split| split.total.joules[bound]).sum();
                 assert!(same(sum, total.joules[bound]), "{model}: {sum} {total:?}");
             }
-            let each = bill.per_image(&act.images());
+            let each = bill.per_piece(&act.pieces());
             assert_eq!(each.len(), 1);
             let samples = act.samples as f64;
             assert!(same(each[0].total.joules[1] * samples, total.joules[1]), "{model}");

@@ -2,7 +2,7 @@
 
 use std::iter;
 
-use super::check::wrong;
+use super::check::{Bias, wrong};
 use super::{Config, ConfigError};
 use crate::chip::layer::{DrivenBy, LayerSpec};
 use crate::chip::population::Wiring;
@@ -21,6 +21,10 @@ impl Config {
         classes: usize,
         image: Option<[usize; 3]>,
     ) -> Result<Experiment, ConfigError> {
+        if self.policy.is_some() {
+            let allowed = "a policy learns from no examples; see `policy_experiment`";
+            return Err(wrong("task", "is \"policy\"", allowed));
+        }
         if classes == 1 {
             let allowed = "there is nothing to tell apart; give it at least 2";
             return Err(wrong("data.classes", "is 1", allowed));
@@ -45,7 +49,7 @@ impl Config {
         let experiment = Experiment {
             seed: self.seed,
             hardware: self.hardware.clone(),
-            network: self.network(features, outputs),
+            network: self.network_of(features, &self.hidden, outputs),
             epochs: self.epochs,
             augment,
         };
@@ -53,15 +57,15 @@ impl Config {
         Ok(experiment)
     }
 
-    /// The network between so many inputs and outputs.
-    fn network(&self, inputs: usize, outputs: usize) -> NetworkSpec {
+    /// The network between so many inputs and outputs, through hidden layers of so many units.
+    pub(super) fn network_of(&self, inputs: usize, hidden: &[usize], outputs: usize) -> NetworkSpec {
         let mut sizes = vec![inputs];
-        sizes.extend(&self.hidden);
+        sizes.extend(hidden);
         sizes.push(outputs);
         let driven = iter::once(DrivenBy::Shared).chain(iter::repeat(DrivenBy::Streams));
-        let layers = (0..self.hidden.len() + 1).zip(driven).map(|(layer, driven_by)| {
-            let last = layer == self.hidden.len();
-            let wiring = match (self.rule.is_dalean(), last) {
+        let layers = (0..hidden.len() + 1).zip(driven).map(|(layer, driven_by)| {
+            let last = layer == hidden.len();
+            let wiring = match (self.rule.is_dalean(), last && self.policy.is_none()) {
                 (true, false) => Wiring::Dual,
                 (true, true) => Wiring::DualReadout,
                 (false, _) => Wiring::Single,
@@ -74,7 +78,11 @@ impl Config {
                 activation: self.activations[layer],
                 weight_max_log2: self.weight_max_log2[layer],
                 gain_64ths: self.gain_64ths[usize::from(last)],
-                constant_row: self.bias_rows,
+                constant_row: match self.bias {
+                    Bias::None => false,
+                    Bias::InputRow => layer == 0,
+                    Bias::Rows => true,
+                },
             }
         });
         NetworkSpec {

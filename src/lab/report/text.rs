@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use super::RunView;
 use super::number::{quotient, short_with};
 use crate::lab::config::absent_words;
-use crate::lab::price::{Cost, PerImage, prefixed};
+use crate::lab::price::{Cost, PerPiece, prefixed};
 use crate::lab::store::record::{EpochRecord, Score};
 use crate::learn::statistics::PathwayRecord;
 
@@ -178,7 +178,7 @@ fn chip(out: &mut String, cost: &Cost) {
             100.0 * share
         ));
     }
-    let images: Vec<_> = cost.per_image.iter().map(image).filter(|one| !one.is_empty()).collect();
+    let images: Vec<_> = cost.per_piece.iter().map(image).filter(|one| !one.is_empty()).collect();
     lines.push(images.join("; "));
     let missing: Vec<_> = cost.missing.iter().map(|missing| &*missing.what).collect();
     if cost.energy.is_some() && !missing.is_empty() {
@@ -191,7 +191,7 @@ fn chip(out: &mut String, cost: &Cost) {
 }
 
 /// `to learn from an image 1.20 uJ, 24.1 us`.
-fn image(one: &PerImage) -> String {
+fn image(one: &PerPiece) -> String {
     let mut parts = Vec::new();
     if one.total.priced > 0 {
         let least = if one.total.whole().is_none() { "at least " } else { "" };

@@ -12,9 +12,9 @@ use super::RunError;
 use super::notes::notes;
 use super::session::chosen;
 use super::train::read_config;
-use crate::lab::config::Config;
+use crate::lab::config::{Bias, Config};
 use crate::lab::data::{self, DataRoot, ImageShape};
-use crate::lab::price::{Cost, Footprint, Images, price};
+use crate::lab::price::{Cost, Footprint, Pieces, price};
 use crate::lab::report::{self, Heat, Picture, RunView};
 use crate::lab::store::checkpoint::{self, CheckpointError, Identity};
 use crate::lab::store::folder::{self, FolderError, RunFolder, names};
@@ -96,7 +96,7 @@ pub fn report(path: &Path, data_root: Option<&DataRoot>) -> Result<ReportMade, R
 pub(super) fn cost(config: &Config, ledger: &LedgerRecord, records: &[EpochRecord]) -> Cost {
     let plan = Footprint::of_records(records.last().map_or(&[], |record| &record.pathways));
     let bill = price(ledger, &plan, &config.hardware, &config.constants, &[]);
-    Cost::of(&bill, ledger, &config.constants, &Images::of_records(records))
+    Cost::of(&bill, ledger, &config.constants, &Pieces::of_records(records))
 }
 
 /// The file of the state that reads the test set; `None` when it was not kept.
@@ -177,16 +177,22 @@ impl Parts<'_> {
         let shapes = self.records.first().map(|record| &record.pathways).into_iter().flatten();
         let mut sizes: Vec<(usize, [usize; 2])> = shapes.map(|p| (p.layer, p.shape)).collect();
         sizes.dedup();
-        let bias = usize::from(self.config.bias_rows);
-        let first = sizes.first().map_or(0, |(_, [rows, _])| rows.saturating_sub(bias));
-        let units = sizes.iter().map(|(_, [_, columns])| columns);
-        let sizes: Vec<_> = std::iter::once(&first).chain(units).map(usize::to_string).collect();
+        let bias = usize::from(self.config.bias != Bias::None);
+        let of_network = |sizes: &[(usize, [usize; 2])]| {
+            let first = sizes.first().map_or(0, |(_, [rows, _])| rows.saturating_sub(bias));
+            let units = sizes.iter().map(|(_, [_, columns])| columns);
+            let sizes = std::iter::once(&first).chain(units).map(usize::to_string);
+            sizes.collect::<Vec<_>>().join("-")
+        };
+        // of a policy, the layers of the critic follow those of the actor
+        let networks = sizes.chunks(self.config.hidden.len() + 1).map(of_network);
+        let networks: Vec<String> = networks.collect();
         let differs = self.config.differences_text();
         format!(
             "{} by {}: {} on {}{}{differs}",
             self.config.data_name(),
             self.config.rule_name(),
-            sizes.join("-"),
+            networks.join(" and "),
             self.config.hardware_name,
             if differs.is_empty() { "" } else { "; " }
         )

@@ -257,7 +257,7 @@ pub fn evaluate(
     let epoch = session.epoch();
     proof::checkpoint(path, name, &receipt, epoch, (&bytes, &state))?;
     let hint = "there is nothing to evaluate on";
-    let test = session.test().ok_or(RunError::Empty { part: "test", hint })?;
+    let test = session.test()?.ok_or(RunError::Empty { part: "test", hint })?;
     if receipt.test.as_ref().is_some_and(|kept| *kept != test) {
         let found = "has another test result than its own state gives".into();
         return Err(FolderError::Content { path: path.join(names::RECEIPT), found }.into());
@@ -431,13 +431,14 @@ impl<'a> Run<'a> {
             epochs,
         });
         if self.records.is_empty() {
-            let record = self.session.start();
+            let record = self.session.start()?;
             let _ = self.seen.look(&record);
             self.keep(record, 0.0)?;
         }
         while self.session.epoch() < epochs {
             let epoch = self.session.epoch();
-            let learnt = self.session.advance(&mut |progress| on_event(RunEvent::Batch(progress)));
+            let learnt =
+                self.session.advance(&mut |progress| on_event(RunEvent::Batch(progress)))?;
             let Some((record, seconds)) = learnt else {
                 return Err(RunError::Stopped { epoch, path: path.display().to_string() });
             };
@@ -557,7 +558,7 @@ impl<'a> Run<'a> {
             _ => {}
         }
         let read = self.session.checkpoint();
-        let test = self.session.test();
+        let test = self.session.test()?;
         let receipt = self.receipt("finished", Some(&ledger_text), [metrics, checkpoint], test);
         let page = super::report::Parts {
             config: self.config,

@@ -68,7 +68,7 @@ impl Facts<'_> {
 
     /// Typical joules of an image of a phase, if every part of them has a price.
     fn image(&self, phase: Phase, class: Option<CostClass>) -> Option<Number> {
-        let one = self.cost.of_image(phase)?;
+        let one = self.cost.of_piece(phase)?;
         let total = match class {
             None => one.total,
             Some(class) => one.split.iter().find(|split| split.class == class)?.total,
@@ -77,7 +77,7 @@ impl Facts<'_> {
     }
 
     fn image_seconds(&self, phase: Phase) -> Option<Number> {
-        self.cost.of_image(phase)?.seconds.and_then(Number::from_f64)
+        self.cost.of_piece(phase)?.seconds.and_then(Number::from_f64)
     }
 
     fn joules(&self, bound: usize) -> Option<Number> {

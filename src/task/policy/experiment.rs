@@ -48,6 +48,33 @@ pub struct PolicyExperiment {
     pub evaluation: Evaluating,
 }
 
+impl PolicyExperiment {
+    /// Steps of all environments in an epoch; of evolution, at most.
+    #[must_use]
+    pub fn epoch_steps(&self) -> u64 {
+        self.method.epoch_steps(self.environments, self.horizon, self.rollouts)
+    }
+
+    /// Epochs in all: `ceil(steps / epoch_steps)`.
+    #[must_use]
+    pub fn epochs(&self) -> u32 {
+        u32::try_from(self.steps.div_ceil(self.epoch_steps())).unwrap_or(u32::MAX)
+    }
+}
+
+impl Method {
+    /// Steps of an epoch of so many rollouts, at least 1: environments x horizon x rollouts, or 2 pairs x horizon x generations.
+    #[must_use]
+    pub fn epoch_steps(self, environments: u32, horizon: u32, rollouts: u32) -> u64 {
+        let side_by_side = match self {
+            Self::Ppo(_) => u64::from(environments),
+            Self::Evolution(Evolution { pairs, .. }) => 2 * u64::from(pairs),
+        };
+        let rollout = side_by_side.saturating_mul(u64::from(horizon));
+        rollout.saturating_mul(u64::from(rollouts)).max(1)
+    }
+}
+
 /// How a policy learns.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Method {

@@ -30,6 +30,39 @@ impl Kind {
     }
 }
 
+/// What a rule is called for.
+#[derive(Clone, Copy)]
+pub(super) enum Named {
+    /// A rule by itself.
+    Rule(Rule),
+    /// The paper's seed rule.
+    Seeded,
+    /// Evolution, of policies.
+    Evolution,
+}
+
+/// `learning.rule`.
+pub(super) const RULES: [(&str, Named); 6] = [
+    ("ed", Named::Rule(Rule::Ed)),
+    ("ed_seed", Named::Seeded),
+    ("kaneko", Named::Rule(Rule::Kaneko)),
+    ("dfa", Named::Rule(Rule::Dfa)),
+    ("bp", Named::Rule(Rule::Bp)),
+    ("es", Named::Evolution),
+];
+/// `learning.mode`.
+pub(super) const MODES: [(&str, UpdateMode); 3] = [
+    ("accumulate", UpdateMode::Accumulate),
+    ("replay", UpdateMode::Replay),
+    ("online", UpdateMode::Online),
+];
+/// `learning.centre`.
+pub(super) const CENTRES: [(&str, Centre); 3] =
+    [("none", Centre::None), ("batch", Centre::Batch), ("running", Centre::Running)];
+/// `learning.decay`.
+pub(super) const DECAYS: [(&str, Decay); 2] =
+    [("cosine", Decay::Cosine), ("constant", Decay::Constant)];
+
 /// Checked numbers of `[learning]`.
 pub(super) struct Learning {
     pub(super) kind: Kind,
@@ -45,29 +78,40 @@ pub(super) struct Learning {
     pub(super) select: Select,
 }
 
+impl Learning {
+    /// What a network says that learns from no error.
+    pub(super) fn neutral() -> Self {
+        Self {
+        kind: Kind { rule: Rule::Ed, seeded: false },
+        mode: UpdateMode::Accumulate,
+        centre: Centre::None,
+        route: Some(Route::Modulo { taps: 1, shift: None }),
+        batch: Batch::new(1).expect("in range"),
+        rates: vec![],
+        decay: Decay::Constant,
+        epochs: 0,
+        shift_pixels: 0,
+        train_on: TrainOn::Train,
+        select: Select::Last,
+    }
+    }
+}
+
 /// Checks how a network of such hidden layers learns and writes defaults back.
 pub(super) fn resolve(
     file: &mut LearningFile,
     hidden: &[usize],
     defaults: &SetDefaults,
 ) -> Result<Learning, ConfigError> {
-    let seeded = file.rule.as_deref() == Some("ed_seed");
-    let rules = [
-        ("ed", Rule::Ed),
-        ("ed_seed", Rule::Ed),
-        ("kaneko", Rule::Kaneko),
-        ("dfa", Rule::Dfa),
-        ("bp", Rule::Bp),
-    ];
-    let kind = Kind { rule: word("learning.rule", &mut file.rule, "ed", &rules)?, seeded };
-    let centres = [("none", Centre::None), ("batch", Centre::Batch), ("running", Centre::Running)];
-    let modes = [
-        ("accumulate", UpdateMode::Accumulate),
-        ("replay", UpdateMode::Replay),
-        ("online", UpdateMode::Online),
-    ];
-    let mode = word("learning.mode", &mut file.mode, "accumulate", &modes)?;
-    let decays = [("cosine", Decay::Cosine), ("constant", Decay::Constant)];
+    let kind = match word("learning.rule", &mut file.rule, "ed", &RULES)? {
+        Named::Rule(rule) => Kind { rule, seeded: false },
+        Named::Seeded => Kind { rule: Rule::Ed, seeded: true },
+        Named::Evolution => {
+            let allowed = "evolution belongs to task = \"policy\": say that, or use ed, ed_seed, kaneko, dfa or bp";
+            return Err(wrong("learning.rule", "is \"es\"", allowed));
+        }
+    };
+    let mode = word("learning.mode", &mut file.mode, "accumulate", &MODES)?;
     let (train_on, select) = selection(file, defaults)?;
     let batch = range("learning.batch", Batch::new(*file.batch.get_or_insert(defaults.batch)))?;
     file.rate.get_or_insert_with(|| defaults.rate_of(batch));
@@ -78,15 +122,15 @@ pub(super) fn resolve(
         (false, true) => "running",
         (false, false) => "batch",
     };
-    let centre = word("learning.centre", &mut file.centre, default, &centres)?;
+    let centre = word("learning.centre", &mut file.centre, default, &CENTRES)?;
     Ok(Learning {
         kind,
         mode,
         centre,
-        route: route::resolve(file, kind.rule, defaults)?,
+        route: route::resolve(file, kind.rule, defaults.taps)?,
         batch,
         rates: rates(file, hidden, defaults)?,
-        decay: word("learning.decay", &mut file.decay, "cosine", &decays)?,
+        decay: word("learning.decay", &mut file.decay, "cosine", &DECAYS)?,
         epochs: *file.epochs.get_or_insert(defaults.epochs),
         shift_pixels: *file.shift_pixels.get_or_insert(0),
         train_on,
@@ -104,6 +148,12 @@ fn rates(
     let rate = positive("learning.rate", *file.rate.get_or_insert(defaults.rate))?;
     file.rate_multipliers.get_or_insert_with(|| defaults.multipliers(hidden));
     let factors = per_layer(KEY, &mut file.rate_multipliers, 1.0, hidden.len() + 1)?;
+    products(rate, factors)
+}
+
+/// Rate times multiplier.
+pub(super) fn products(rate: Positive, factors: Vec<f64>) -> Result<Vec<Positive>, ConfigError> {
+    const KEY: &str = "learning.rate_multipliers";
     let rates = factors.into_iter().map(|factor| {
         let product = rate.times(positive(KEY, factor)?);
         product.ok_or_else(|| wrong(KEY, "times the rate is out of range", "keep it in 1e-6..=1e6"))
