@@ -7,7 +7,10 @@
 //!
 //! Numbers that are not counts are [`Real`]: 32 bits, 16 of them behind the point. What is drawn is drawn at its place:
 //! site [`Environment`](crate::num::draw::Site::Environment), sub = number of the environment, count = number of its
-//! episode. See docs/MODEL.md, 5.
+//! episode.
+//!
+//! Which environments there are stands in [`ENVIRONMENTS`]; each is one small file with its law at its head, and becomes
+//! many of it side by side in [`one`]. See docs/MODEL.md, 5.
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
 use std::fmt;
@@ -15,6 +18,15 @@ use std::fmt;
 use fixed::types::I16F16;
 
 use crate::chip::state::State;
+
+pub mod acrobot;
+pub mod cart_pole;
+pub mod fine;
+pub mod mountain_car;
+pub mod one;
+pub mod pendulum;
+
+use one::SideBySide;
 
 /// An observation, an action or a reward.
 pub type Real = I16F16;
@@ -60,12 +72,34 @@ pub struct EnvSpec {
 /// What some environments show, one after the other.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Observations {
-    /// `[environment][value]`, of dense ones.
+    /// `[environment][value]`; none of sparse ones.
     pub values: Vec<Real>,
     /// Lines that are on, environment after environment, rising in each; of sparse ones.
     pub active: Vec<u32>,
-    /// Where those of an environment end.
+    /// Where those of an environment end; none of dense ones.
     pub ends: Vec<usize>,
+}
+
+impl Observations {
+    /// Forgets everything and keeps the memory.
+    pub fn clear(&mut self) {
+        self.values.clear();
+        self.active.clear();
+        self.ends.clear();
+    }
+
+    /// The numbers of environment number `which`, of `values` each.
+    #[must_use]
+    pub fn values_of(&self, which: usize, values: usize) -> &[Real] {
+        &self.values[which * values..(which + 1) * values]
+    }
+
+    /// The lines that are on of environment number `which`.
+    #[must_use]
+    pub fn lines_of(&self, which: usize) -> &[u32] {
+        let from = which.checked_sub(1).map_or(0, |before| self.ends[before]);
+        &self.active[from..self.ends[which]]
+    }
 }
 
 /// What some environments are told to do.
@@ -117,6 +151,9 @@ pub trait VecEnv: State + fmt::Debug + Send {
     /// Begins a new episode in each, and shows it.
     fn reset(&mut self, shown: &mut Observations);
 
+    /// Shows each as it is: what the last step or reset left.
+    fn show(&self, shown: &mut Observations);
+
     /// One step in each. Ended episodes begin again.
     ///
     /// # Errors
@@ -128,4 +165,35 @@ pub trait VecEnv: State + fmt::Debug + Send {
         let _ = which;
         String::new()
     }
+}
+
+/// Makes so many environments from a seed.
+pub type MakeEnv = fn(seed: u64, count: usize) -> Box<dyn VecEnv>;
+
+/// Every environment, by what it is called.
+pub const ENVIRONMENTS: [(&str, MakeEnv); 4] = [
+    ("CartPole-v1", |seed, count| Box::new(SideBySide::<cart_pole::CartPole>::new(seed, count))),
+    ("Acrobot-v1", |seed, count| Box::new(SideBySide::<acrobot::Acrobot>::new(seed, count))),
+    ("Pendulum-v1", |seed, count| Box::new(SideBySide::<pendulum::Pendulum>::new(seed, count))),
+    ("MountainCarContinuous-v0", |seed, count| {
+        Box::new(SideBySide::<mountain_car::MountainCar>::new(seed, count))
+    }),
+];
+
+/// An environment that there is not.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("there is no environment `{id}`; there are {}", ENVIRONMENTS.map(|(id, _)| id).join(", "))]
+pub struct UnknownEnvironment {
+    /// What was asked for.
+    pub id: String,
+}
+
+/// `count` environments called `id`.
+///
+/// # Errors
+/// When there is none of that name.
+pub fn make(id: &str, seed: u64, count: usize) -> Result<Box<dyn VecEnv>, UnknownEnvironment> {
+    let known = ENVIRONMENTS.iter().find(|(known, _)| *known == id);
+    let (_, make) = known.ok_or_else(|| UnknownEnvironment { id: id.into() })?;
+    Ok(make(seed, count))
 }

@@ -1,0 +1,107 @@
+//! What is kept of a rollout: `[step][environment]` throughout.
+#![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
+
+use super::experiment::InputCoding;
+use super::number::{Advantage, Observed, Value};
+use super::observe::{self, Standard};
+use crate::num::fixed::DriveBits;
+use crate::task::environment::{EnvSpec, Observations, Real, Shown};
+
+/// How observations become drives.
+#[derive(Debug, Clone)]
+pub(super) struct Coding {
+    pub(super) input: InputCoding,
+    pub(super) bits: DriveBits,
+    /// Lines of a sparse observation, or 0.
+    lines: usize,
+    /// Numbers of a dense one, or 0.
+    values: usize,
+    observed: Vec<Observed>,
+}
+
+impl Coding {
+    pub(super) fn new(input: InputCoding, bits: DriveBits, spec: &EnvSpec) -> Self {
+        let (lines, values) = match spec.shown {
+            Shown::Dense(values) => (0, values),
+            Shown::Sparse { lines, .. } => (lines, 0),
+        };
+        Self { input, bits, lines, values, observed: vec![] }
+    }
+
+    /// Drives of a sample.
+    pub(super) const fn rows(&self) -> usize {
+        match self.input {
+            InputCoding::Split => 2 * self.values + self.lines,
+            InputCoding::Offset => self.values + self.lines,
+        }
+    }
+
+    /// Appends the drives of observation number `which`.
+    pub(super) fn code(
+        &mut self,
+        standard: &Standard,
+        shown: &Observations,
+        which: usize,
+        codes: &mut Vec<u8>,
+    ) {
+        if self.lines > 0 {
+            let from = codes.len();
+            codes.resize(from + self.lines, 0);
+            for &line in shown.lines_of(which) {
+                codes[from + line as usize] = self.bits.code_max();
+            }
+        } else {
+            self.observed.clear();
+            standard.apply(shown.values_of(which, self.values), &mut self.observed);
+            match self.input {
+                InputCoding::Split => observe::split(&self.observed, self.bits, codes),
+                InputCoding::Offset => observe::offset(&self.observed, self.bits, codes),
+            }
+        }
+    }
+}
+
+/// Steps that were made with one policy.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Rollout {
+    /// Drives, `[step][environment][row]`.
+    pub(super) codes: Vec<u8>,
+    /// Discrete actions.
+    pub(super) choices: Vec<u16>,
+    /// Continuous actions before they are squashed, `[step][environment][value]`.
+    pub(super) raw: Vec<Value>,
+    /// Logarithm of the probability, or density, of the action.
+    pub(super) log_probabilities: Vec<Value>,
+    /// What the observations are: their numbers, for the statistics.
+    pub(super) shown: Vec<Real>,
+    pub(super) rewards: Vec<Real>,
+    pub(super) terminated: Vec<bool>,
+    pub(super) truncated: Vec<bool>,
+    /// Drives of what was reached where an episode was truncated, in order.
+    pub(super) reached: Vec<u8>,
+    pub(super) advantages: Vec<Advantage>,
+    /// Value targets, standardised.
+    pub(super) targets: Vec<Value>,
+}
+
+impl Rollout {
+    /// Forgets everything and keeps the memory.
+    pub(super) fn clear(&mut self) {
+        self.codes.clear();
+        self.choices.clear();
+        self.raw.clear();
+        self.log_probabilities.clear();
+        self.shown.clear();
+        self.rewards.clear();
+        self.terminated.clear();
+        self.truncated.clear();
+        self.reached.clear();
+        self.advantages.clear();
+        self.targets.clear();
+    }
+
+    /// Steps of all environments.
+    pub(super) fn len(&self) -> usize {
+        self.rewards.len()
+    }
+}
