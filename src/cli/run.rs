@@ -15,9 +15,7 @@ use crate::lab::run::{self, Machine, RunError, RunEvent, Trained, Verdict};
 use crate::lab::runs;
 use crate::lab::store::folder::FolderError;
 use crate::lab::store::index::{INDEX, Store};
-use crate::lab::store::record::{
-    EpisodesRecord, EpochRecord, PolicyTest, TestOutcome, TestRecord,
-};
+use crate::lab::store::record::{EpisodesRecord, EpochRecord, PolicyTest, TestOutcome, TestRecord};
 use crate::lab::sweep::{self, Finding, Sampled};
 
 #[derive(Debug, Args)]
@@ -274,8 +272,7 @@ fn tested(test: Option<&TestOutcome>, last: Option<&EpochRecord>) -> serde_json:
         (_, Some(outcome)) => json!({"return_mean": null, "steps": outcome.steps}),
         (test, None) => {
             let test = test.and_then(TestOutcome::classify);
-            let mut object =
-                json!({"test_accuracy": test.map(|test| test.score.fraction())});
+            let mut object = json!({"test_accuracy": test.map(|test| test.score.fraction())});
             match last {
                 // read again: nothing was learnt
                 None => object["images_per_second"] = serde_json::Value::Null,

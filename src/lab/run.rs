@@ -125,10 +125,14 @@ pub enum RunError {
     #[error(transparent)]
     Network(#[from] NetworkError),
     /// An environment that cannot go on.
-    #[error("{0}; the epochs that are finished are kept, and the run goes on from there with --resume")]
+    #[error(
+        "{0}; the epochs that are finished are kept, and the run goes on from there with --resume"
+    )]
     Environment(EnvError),
     /// What is asked for is not there in this task.
-    #[error("{path} is a run of examples with labels, which has no episodes; name the run of a policy")]
+    #[error(
+        "{path} is a run of examples with labels, which has no episodes; name the run of a policy"
+    )]
     NoEpisodes {
         /// Folder of the run.
         path: String,

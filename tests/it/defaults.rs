@@ -247,7 +247,8 @@ fn there_is_no_epoch_after_the_last_one() {
     let config = config(None, &["data.set=xor", "learning.epochs=2"], 1);
     let mut session = session(&config);
     session.start().unwrap();
-    let advanced: Vec<bool> = (0..4).map(|_| session.advance(&mut |_| true).unwrap().is_some()).collect();
+    let advanced: Vec<bool> =
+        (0..4).map(|_| session.advance(&mut |_| true).unwrap().is_some()).collect();
     assert_eq!((advanced, session.epoch()), (vec![true, true, false, false], 2));
     let checkpoint = session.checkpoint();
     session.restore(&checkpoint).unwrap();

@@ -58,7 +58,12 @@ impl Config {
     }
 
     /// The network between so many inputs and outputs, through hidden layers of so many units.
-    pub(super) fn network_of(&self, inputs: usize, hidden: &[usize], outputs: usize) -> NetworkSpec {
+    pub(super) fn network_of(
+        &self,
+        inputs: usize,
+        hidden: &[usize],
+        outputs: usize,
+    ) -> NetworkSpec {
         let mut sizes = vec![inputs];
         sizes.extend(hidden);
         sizes.push(outputs);

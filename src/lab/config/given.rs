@@ -163,15 +163,8 @@ fn policy(experiment: &PolicyExperiment) -> Vec<Given> {
     list.network("actor", 0, actor);
     match method {
         Method::Ppo(ppo) => {
-            let Ppo {
-                passes,
-                discount,
-                lambda,
-                clip,
-                entropy,
-                log_sigma_start,
-                log_sigma_rate,
-            } = ppo;
+            let Ppo { passes, discount, lambda, clip, entropy, log_sigma_start, log_sigma_rate } =
+                ppo;
             list.network("critic", actor.layers.len(), critic);
             list.put("ppo.passes", passes);
             // as the core has them: units of 2^-31

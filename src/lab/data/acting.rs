@@ -32,7 +32,8 @@ fn of(spec: &EnvSpec) -> Data {
     };
     let description =
         format!("{id}: shows {shows}, takes {takes}, episodes of {steps_max} steps at most");
-    let content = format!("dalean environment 1\n{id}\n{shown:?}\n{taken:?}\n{steps_max}\n{inputs:?}");
+    let content =
+        format!("dalean environment 1\n{id}\n{shown:?}\n{taken:?}\n{steps_max}\n{inputs:?}");
     let none = Examples::new(vec![], vec![], features.max(1), 255, classes.clamp(1, 256));
     let none = none.expect("no examples break no rule");
     let split = Split { train: none.clone(), validation: none.clone(), test: none };

@@ -80,7 +80,10 @@ pub(super) const HEADS: &[(&str, &str)] = &[
         "Where in the chip: cells and drivers, converters, digital logic and memory, what is on all the time.",
     ),
     ("An image takes", "Of all images of a phase, the mean."),
-    ("It takes", "To update and to decide, the mean of all updates and of all decisions without learning."),
+    (
+        "It takes",
+        "To update and to decide, the mean of all updates and of all decisions without learning.",
+    ),
     ("how often", "Updates, and decisions without learning, over the whole run."),
     ("images", "Images read in that phase, over the whole run; updates and decisions of policies."),
     ("energy", "With the typical value of every constant."),

@@ -7,9 +7,7 @@ use crate::chip::hardware::Hardware;
 use crate::chip::ledger::{Event, Ledger};
 use crate::lab::config::{Config, Constants, Sources, load};
 use crate::lab::data::{self, Data, DataRoot};
-use crate::lab::price::{
-    Bill, Convention, Footprint, PieceKind, Pieces, StageUse, price, stages,
-};
+use crate::lab::price::{Bill, Convention, Footprint, PieceKind, Pieces, StageUse, price, stages};
 use crate::lab::store::ledger::{CyclesRecord, LedgerRecord};
 
 /// One update or one inference.

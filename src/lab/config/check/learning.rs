@@ -82,18 +82,18 @@ impl Learning {
     /// What a network says that learns from no error.
     pub(super) fn neutral() -> Self {
         Self {
-        kind: Kind { rule: Rule::Ed, seeded: false },
-        mode: UpdateMode::Accumulate,
-        centre: Centre::None,
-        route: Some(Route::Modulo { taps: 1, shift: None }),
-        batch: Batch::new(1).expect("in range"),
-        rates: vec![],
-        decay: Decay::Constant,
-        epochs: 0,
-        shift_pixels: 0,
-        train_on: TrainOn::Train,
-        select: Select::Last,
-    }
+            kind: Kind { rule: Rule::Ed, seeded: false },
+            mode: UpdateMode::Accumulate,
+            centre: Centre::None,
+            route: Some(Route::Modulo { taps: 1, shift: None }),
+            batch: Batch::new(1).expect("in range"),
+            rates: vec![],
+            decay: Decay::Constant,
+            epochs: 0,
+            shift_pixels: 0,
+            train_on: TrainOn::Train,
+            select: Select::Last,
+        }
     }
 }
 

@@ -13,10 +13,11 @@ use crate::lab::config::file::{
     EnvironmentFile, EvaluationFile, EvolutionFile, ExperimentFile, LearningFile, PpoFile,
 };
 use crate::lab::config::policy::PolicySettings;
+use crate::lab::near;
 use crate::learn::error::Centre;
 use crate::learn::rule::Rule;
 use crate::num::fixed::{Batch, RateMantissa};
-use crate::task::environment::{EnvSpec, Real, Taken};
+use crate::task::environment::{self, EnvSpec, Real, Taken};
 use crate::task::policy::{Evaluating, Evolution, InputCoding, Method, Ppo, Share};
 
 mod network;
@@ -53,7 +54,11 @@ pub(super) fn refused_in_classification(file: &ExperimentFile) -> Result<(), Con
 fn refused_here(file: &ExperimentFile) -> Result<(), ConfigError> {
     let (network, learning) = (file.network.as_ref(), file.learning.as_ref());
     refuse(&[
-        ("data", file.data.is_some(), "a policy learns from no examples: environment.id says what it acts on"),
+        (
+            "data",
+            file.data.is_some(),
+            "a policy learns from no examples: environment.id says what it acts on",
+        ),
         (
             "network.outputs",
             network.is_some_and(|n| n.outputs.is_some()),
@@ -104,7 +109,11 @@ pub(super) fn resolve(
     let method = match named {
         Named::Evolution => {
             let given = file.ppo.is_some();
-            refuse(&[("ppo", given, "it belongs to every rule but \"es\", whose keys are those of [es]")])?;
+            refuse(&[(
+                "ppo",
+                given,
+                "it belongs to every rule but \"es\", whose keys are those of [es]",
+            )])?;
             Method::Evolution(evolution(file.es.get_or_insert_default())?)
         }
         Named::Seeded | Named::Rule(Rule::Kaneko) => {
@@ -186,7 +195,8 @@ fn learns(file: &mut LearningFile, rule: Rule, layers: usize) -> Result<Learning
 
 /// Networks of so many layers that no error reaches: what such a layer has to say is neutral.
 fn evolves(file: &mut LearningFile, layers: usize) -> Result<Learning, ConfigError> {
-    const WHY: &str = "evolution has no errors, updates and rates: its keys are those of [es]; take the key out";
+    const WHY: &str =
+        "evolution has no errors, updates and rates: its keys are those of [es]; take the key out";
     refuse(&[
         ("learning.batch", file.batch.is_some(), WHY),
         ("learning.mode", file.mode.is_some(), WHY),
@@ -282,7 +292,8 @@ fn ppo(
         let rate = *file.log_sigma_rate.get_or_insert(defaults::LOG_SIGMA_RATE);
         log_sigma_rate = share("ppo.log_sigma_rate", rate, 0.0, 1.0)?;
     } else {
-        const WHY: &str = "the environment takes one of some actions, which have no spread: take the key out";
+        const WHY: &str =
+            "the environment takes one of some actions, which have no spread: take the key out";
         refuse(&[
             ("ppo.log_sigma", file.log_sigma.is_some(), WHY),
             ("ppo.log_sigma_rate", file.log_sigma_rate.is_some(), WHY),
@@ -322,11 +333,11 @@ fn evaluation(file: &mut EvaluationFile) -> Result<Evaluating, ConfigError> {
 
 /// What an environment is.
 fn spec_of(id: &str) -> Result<EnvSpec, ConfigError> {
-    use crate::task::environment::Shown;
-    let names: Vec<(&'static str, usize)> = vec![("x", 1)];
-    match id {
-        "CartPole-v1" => Ok(EnvSpec { id: "CartPole-v1", shown: Shown::Dense(4), taken: Taken::Discrete(2), steps_max: 500, inputs: names }),
-        "Pendulum-v1" => Ok(EnvSpec { id: "Pendulum-v1", shown: Shown::Dense(3), taken: Taken::Continuous(1), steps_max: 200, inputs: names }),
-        _ => Err(wrong("environment.id", format!("is \"{id}\""), "unknown")),
-    }
+    let found = environment::make(id, 0, 1);
+    let found = found.map_err(|error| {
+        let names = environment::ENVIRONMENTS.iter().map(|(name, _)| *name);
+        let hint = near::hint(id, names);
+        wrong("environment.id", format!("is \"{id}\""), format!("{error}{hint}"))
+    });
+    Ok(found?.spec().clone())
 }

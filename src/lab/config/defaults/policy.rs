@@ -16,8 +16,10 @@ pub struct PolicyDefaults {
 }
 
 /// One entry an environment that has defaults of its own, then the entry of all others.
-pub const POLICY_DEFAULTS: [PolicyDefaults; 2] =
-    [PolicyDefaults { id: Some("Pendulum-v1"), gamma: 0.95 }, PolicyDefaults { id: None, gamma: 0.99 }];
+pub const POLICY_DEFAULTS: [PolicyDefaults; 2] = [
+    PolicyDefaults { id: Some("Pendulum-v1"), gamma: 0.95 },
+    PolicyDefaults { id: None, gamma: 0.99 },
+];
 
 /// What is acted on.
 pub(in crate::lab::config) const ENVIRONMENT: &str = "CartPole-v1";

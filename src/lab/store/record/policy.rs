@@ -247,7 +247,10 @@ mod tests {
         let found = PolicyEvaluation { returns, lengths: vec![1, 2, 6], ..Default::default() };
         let record = EpisodesRecord::of(&found, true);
         assert_eq!(record.return_range, Some([1.0, -2.0, 4.0]));
-        assert_eq!((record.length_mean, record.episodes(), record.played()), (Some(3.0), 3, "deterministic"));
+        assert_eq!(
+            (record.length_mean, record.episodes(), record.played()),
+            (Some(3.0), 3, "deterministic")
+        );
         let none = EpisodesRecord::of(&PolicyEvaluation::default(), false);
         assert_eq!((none.return_range, none.length_mean), (None, None));
     }
@@ -261,7 +264,8 @@ mod tests {
             unexplained: [1, 4],
             ..PolicyEpoch::default()
         };
-        let record = PolicyOutcome::of(epoch, EpisodesRecord::of(&PolicyEvaluation::default(), true));
+        let record =
+            PolicyOutcome::of(epoch, EpisodesRecord::of(&PolicyEvaluation::default(), true));
         let text = serde_json::to_string(&record).unwrap();
         for word in [
             "\"charts/episodic_return\":12.5",

@@ -79,7 +79,8 @@ fn activations(file: &mut NetworkFile, hidden: usize) -> Result<Vec<Activation>,
     let found = word("network.activation", &mut file.activation, "rms", &network::ACTIVATIONS)?;
     let mut all = match found {
         Some(activation) => {
-            let why = "it is the width of a sigmoid: take the key out, or use activation = \"sigmoid\"";
+            let why =
+                "it is the width of a sigmoid: take the key out, or use activation = \"sigmoid\"";
             refuse(&[("network.alpha", file.alpha.is_some(), why)])?;
             vec![activation; hidden]
         }
