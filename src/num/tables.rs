@@ -15,6 +15,12 @@
 #![expect(clippy::float_arithmetic, reason = "floats become integers here and nowhere else")]
 #![deny(clippy::disallowed_types, clippy::disallowed_methods)]
 
+mod policy;
+#[cfg(test)]
+pub(crate) mod precise;
+
+pub use policy::PolicyTables;
+
 use super::fixed::{
     Batch, DriveBits, ErrorBits, LevelBits, LutBits, OutOfRange, RateMantissa, log2_ceil, narrow,
 };

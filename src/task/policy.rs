@@ -11,9 +11,19 @@
 //! See docs/MODEL.md, 5.
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
+pub mod advantage;
 mod experiment;
+pub mod function;
+pub mod head;
+pub mod moments;
+pub mod number;
+pub mod observe;
 mod outcome;
+pub mod rank;
+pub mod ratio;
+pub mod sample;
 mod trainer;
+pub mod value;
 
 pub use experiment::{Evaluating, Evolution, InputCoding, Method, PolicyExperiment, Ppo, Share};
 pub use outcome::{PolicyEpoch, PolicyEvaluation, PolicyProgress, SumOf};
