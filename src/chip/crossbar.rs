@@ -17,12 +17,14 @@ use layout::{BLOCK_CELLS, BLOCK_ROWS, HALF_CELLS, HALF_COLUMNS, Layout, PANEL_CO
 
 pub mod kernel;
 pub mod layout;
+mod optimise;
 mod pulses;
 mod state;
 mod trains;
 mod words;
 mod write;
 
+pub use optimise::{Asks, Form};
 pub use pulses::{Collect, Collected, RowPeaks};
 pub use trains::ColumnTrain;
 pub use write::{WriteRequest, Written};

@@ -32,6 +32,7 @@ mod each;
 mod error;
 mod forward;
 mod mute;
+mod optimise;
 #[cfg(test)]
 mod pairs;
 mod passes;
@@ -179,6 +180,8 @@ struct Registers {
     backward: Vec<i64>,
     /// Samples added and not yet programmed, and their shift.
     pending: usize,
+    /// Sums of the last write, where they were kept: `[array][panel][half block]`.
+    sums: Lines<i32>,
     /// Pulses of the last write, while they are collected.
     pulses: Option<Pulses>,
 }

@@ -17,9 +17,11 @@ use crate::num::fixed::DriveBits;
 use crate::num::tables::{Activation, Lut, Unit};
 
 mod delivery;
+pub mod requests;
 mod state;
 
 pub use delivery::{Delivery, Taps, WordSource};
+pub use requests::{Optimiser, Requests};
 
 /// Whose codes are on the rows of an array.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -154,6 +156,8 @@ pub struct Layer {
     /// Of converters that track, by target stream and slice: codes on the rail, and all codes, of training since ranges
     /// were last looked at. Empty where none track.
     pub rails: Vec<Vec<[u64; 2]>>,
+    /// How its sums become requests.
+    pub requests: Requests,
 }
 
 impl Layer {
@@ -187,7 +191,8 @@ impl Layer {
         let no_rail = |shifts: &Vec<u32>| vec![[0; 2]; shifts.len()];
         let rails = if tracks { adc_shifts.iter().map(no_rail).collect() } else { vec![] };
         let writes = vec![0; arrays.len()];
-        Self { index, spec, layout, lut, delivery, arrays, writes, adc_shifts, rails }
+        let requests = Requests::PLAIN;
+        Self { index, spec, layout, lut, delivery, arrays, writes, adc_shifts, rails, requests }
     }
 
     /// The table as kernels take it: what a unit hands on is its activity or, with `drive_bits`, the drive code of

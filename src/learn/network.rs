@@ -21,11 +21,15 @@ use crate::chip::crossbar::kernel::Backend;
 use crate::chip::crossbar::{initial_levels, initial_scale};
 use crate::chip::engine::{Engine, Operation};
 use crate::chip::hardware::Hardware;
-use crate::chip::layer::{self, Delivery, Layer, LayerSpec, PlanError};
+use crate::chip::layer::{self, Delivery, Layer, LayerSpec, Optimiser, PlanError};
 use crate::chip::population::Polarity;
 use crate::num::draw::{Place, Site};
-use crate::num::fixed::{Batch, RateMantissa};
-use crate::num::tables::{Decay, Positive, Rate};
+use crate::num::fixed::{Batch, RateMantissa, log2_ceil};
+use crate::num::tables::{Decay, Positive, Rate, RateOf};
+
+/// `log2` of the batches after which a mean drive has come all the way, were it not to turn: 0.1 a batch is the rate that
+/// was measured, and an eighth the nearest power of two.
+const CENTRED_BATCHES_LOG2: u32 = 3;
 
 /// A network and how it learns.
 ///
@@ -50,6 +54,11 @@ pub struct NetworkSpec {
     pub rates: Vec<Positive>,
     /// How the rate falls.
     pub decay: Decay,
+    /// What makes requests of the sums of each layer.
+    pub optimisers: Vec<Optimiser>,
+    /// Whether the updates of each layer are centred: the mean drive of each row is taken off. The mean runs, an eighth of
+    /// the way to that of each batch.
+    pub centred: Vec<bool>,
 }
 
 /// Where a network stands in a run.
@@ -79,6 +88,8 @@ pub struct NetworkPlace {
 ///     mantissas: vec![],
 ///     rates: vec![],
 ///     decay: Decay::Constant,
+///     optimisers: vec![],
+///     centred: vec![],
 /// };
 /// let error = nothing.check(&Hardware::reference()).unwrap_err();
 /// assert_eq!(error.key(), "network.hidden");
@@ -145,9 +156,10 @@ impl NetworkSpec {
 
     /// What the rate of each layer is made of.
     fn rates(&self, hardware: &Hardware) -> impl Iterator<Item = Rate> {
-        let rates = self.rates.iter().zip(&self.mantissas);
-        self.layers.iter().zip(rates).map(|(spec, (&rate, &mantissa))| Rate {
+        let rates = self.rates.iter().zip(&self.mantissas).zip(&self.optimisers);
+        self.layers.iter().zip(rates).map(|(spec, ((&rate, &mantissa), optimiser))| Rate {
             rate,
+            of: if optimiser.is_sign() { RateOf::Pulses } else { RateOf::Sums },
             batch: self.batch,
             mantissa,
             error_bits: hardware.digital.error_bits,
@@ -184,6 +196,10 @@ impl NetworkSpec {
         engine.set_potentiation_only(self.rule == Rule::Kaneko);
         let mantissas: Vec<u32> = self.mantissas.iter().map(|mantissa| mantissa.get()).collect();
         engine.set_mantissas(&mantissas);
+        engine.set_optimisers(&self.optimisers);
+        let window = log2_ceil(self.batch.get().into()) + CENTRED_BATCHES_LOG2;
+        let windows: Vec<_> = self.centred.iter().map(|on| on.then_some(window)).collect();
+        engine.set_centred(&windows);
         load_initial_levels(&mut engine, place.seed);
         let unit = ErrorUnit::new(self.centre, hardware.digital.error_bits, self.outputs());
         let learning = Learning { rule: self.rule, mode: self.mode, shifts };

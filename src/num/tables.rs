@@ -200,6 +200,18 @@ pub enum Decay {
     Constant,
     /// Half a cosine, from 1 to 0.
     Cosine,
+    /// A straight line, from 1 to 0.
+    Linear,
+}
+
+/// What a rate is a measure of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum RateOf {
+    /// The step of a weight for a sum: what all other parts of a [`Rate`] scale.
+    Sums,
+    /// The chance of a pulse itself: `k` is the integer nearest to `-log2(rate)`.
+    Pulses,
 }
 
 /// What a layer's rate is made of.
@@ -207,6 +219,8 @@ pub enum Decay {
 pub struct Rate {
     /// Rate of the layer, its multiplier included.
     pub rate: Positive,
+    /// What it is a measure of.
+    pub of: RateOf,
     /// Configured batch.
     pub batch: Batch,
     /// Small factor beside the shift.
@@ -227,6 +241,9 @@ pub const SHIFT_MAX: u32 = 30;
 
 impl Rate {
     fn shift_exact(self) -> f64 {
+        if self.of == RateOf::Pulses {
+            return -libm::log2(self.rate.0);
+        }
         let rail = f64::from((1u32 << (self.error_bits.get() - 1)) - 1);
         let codes = f64::from(self.unit.drive_bits.code_max());
         let scale = libm::exp2(f64::from(self.error_bits.get()))
@@ -272,6 +289,9 @@ impl Rate {
     /// As of [`Rate::shift`].
     pub fn effective(self) -> Result<Positive, OutOfRange> {
         let k = self.shift()?;
+        if self.of == RateOf::Pulses {
+            return Ok(Positive(libm::exp2(-f64::from(k))));
+        }
         let rail = f64::from((1u32 << (self.error_bits.get() - 1)) - 1);
         let codes = f64::from(self.unit.drive_bits.code_max());
         let samples = f64::from(self.batch.get()) * f64::from(self.mantissa.get());
@@ -316,13 +336,12 @@ impl Rate {
 
     /// `k` at one update of so many.
     fn shift_at(self, decay: Decay, update: u64, updates: u64) -> u32 {
+        #[expect(clippy::cast_precision_loss, reason = "a share of the way")]
+        let t = update as f64 / updates.max(1) as f64;
         let factor = match decay {
             Decay::Constant => 1.0,
-            Decay::Cosine => {
-                #[expect(clippy::cast_precision_loss, reason = "a share of the way")]
-                let t = update as f64 / updates.max(1) as f64;
-                0.5 * (1.0 + libm::cos(std::f64::consts::PI * t))
-            }
+            Decay::Cosine => 0.5 * (1.0 + libm::cos(std::f64::consts::PI * t)),
+            Decay::Linear => 1.0 - t,
         };
         let nearest = libm::floor(self.shift_exact() - libm::log2(factor) + 0.5);
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0..=30")]
@@ -351,6 +370,7 @@ mod tests {
     fn rate(rate: f64, alpha: f64) -> Rate {
         Rate {
             rate: Positive::new(rate).unwrap(),
+            of: RateOf::Sums,
             batch: Batch::new(32).unwrap(),
             mantissa: RateMantissa::new(1).unwrap(),
             error_bits: ErrorBits::new(8).unwrap(),

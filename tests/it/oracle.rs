@@ -154,6 +154,8 @@ fn experiment(s: &Value) -> Experiment {
         mantissas: vec![RateMantissa::new(int(&s["mantissa"])).unwrap(); widths.len() - 1],
         rates: s["rate"].as_array().unwrap().iter().map(positive).collect(),
         decay: Decay::Constant,
+        optimisers: vec![Optimiser::Plain; widths.len() - 1],
+        centred: vec![false; widths.len() - 1],
     };
     Experiment {
         seed: text(&s["seed_decimal"]).parse().unwrap(),

@@ -40,6 +40,7 @@ mod levels;
 #[cfg(target_arch = "aarch64")]
 mod neon;
 mod ops;
+mod optimise;
 #[cfg(target_arch = "x86_64")]
 mod peak;
 mod pulses;
@@ -65,6 +66,7 @@ pub use self::{
         Banks, Cells, Conversion, Dither, Drives, Ends, Extremes, Greatest, Half, LookUp,
         OneSample, Peaks, Pulsed, Rails, Scratch, TOGETHER, WriteCounts, WriteLaw, is_driven,
     },
+    optimise::{MEAN_BITS, SignLaw, Squares, joined},
     sums::Sums,
     team::Team,
 };
@@ -363,11 +365,13 @@ impl Kernel {
         dither: Dither<'_>,
     ) -> WriteCounts {
         assert!(write.floor <= write.ceiling, "the window is not empty");
-        assert!(write.shift <= 31 && (1..=15).contains(&write.mantissa), "products fit 32 bits");
+        let sums = sums.into();
+        let shift_max = if matches!(sums, Sums::Narrow(_)) { 31 } else { 39 };
+        let fits = write.shift <= shift_max && (1..=15).contains(&write.mantissa);
+        assert!(fits, "products fit 32 bits, and what is added before a shift too");
         assert!((1..=127).contains(&write.increment_max), "pulses fit a byte");
         assert!(write.residual_bits <= 15, "a remainder fits 16 bits");
         assert!(cells.residual.is_some() == (write.residual_bits > 0), "a remainder has bits");
-        let sums = sums.into();
         let fused = match sums {
             Sums::Narrow(sums) => call!(self, fused(&mut cells, sums, write, dither)),
             Sums::Wide(_) => None,
@@ -397,6 +401,49 @@ impl Kernel {
     pub fn levels(&self, mut cells: Cells<'_>, pulses: &Half<i8>, ends: Ends, groups: u16) -> u64 {
         assert!(ends.floor <= ends.ceiling, "the window is not empty");
         call!(self, levels(&mut cells, pulses, ends, groups))
+    }
+
+    /// Takes the means of the rows off the sums of a half block: see `optimise`. `totals` are the sums of the gates of
+    /// its columns.
+    pub fn centre(
+        &self,
+        sums: &mut Half<i32>,
+        means: &[i32; BLOCK_ROWS],
+        totals: &[i32; HALF_COLUMNS],
+    ) {
+        call!(self, centre(sums, means, totals));
+    }
+
+    /// Sums of the squares of the sums of a half block.
+    #[must_use]
+    pub fn squares(&self, sums: &Half<i32>) -> Squares {
+        call!(self, squares(sums))
+    }
+
+    /// Groups of four rows, a bit each, with a sum of at least that size.
+    #[must_use]
+    pub fn loud(&self, sums: &Half<i32>, least: u32) -> u16 {
+        call!(self, loud(sums, least))
+    }
+
+    /// Programs a half block with at most a pulse a cell, towards its sum. `words` are only read where they decide.
+    ///
+    /// # Panics
+    /// When the window is empty, a sum of 0 would be loud, or words that decide are not there.
+    pub fn program_signs(
+        &self,
+        mut cells: Cells<'_>,
+        sums: &Half<i32>,
+        law: &SignLaw,
+        words: Option<&Half<u16>>,
+        ends: Ends,
+    ) -> WriteCounts {
+        assert!(law.least > 0, "a sum of 0 has no sign");
+        assert!(law.is_certain() || words.is_some(), "words decide");
+        let mut pulses = Pulses([0; HALF_CELLS]);
+        let counts = call!(self, signs(sums, law, words, &mut cells, &mut pulses.0));
+        let effective = self.levels(cells, &pulses.0, ends, law.groups);
+        WriteCounts { effective, ..counts }
     }
 
     /// Writes a strip for one sample, all at once; `None` where a back end does not, and nothing was done.

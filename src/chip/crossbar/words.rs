@@ -81,6 +81,19 @@ impl Words {
             _ => Dither::Byte(&self.bytes),
         }
     }
+
+    /// The same, of words of 16 bits; nothing of others.
+    pub(super) fn draw_halves(
+        &mut self,
+        kernel: &Kernel,
+        column: usize,
+        block: usize,
+    ) -> Option<&Half<u16>> {
+        match self.draw(kernel, column, block) {
+            Dither::Word(words) => Some(words),
+            Dither::Nearest | Dither::Byte(_) => None,
+        }
+    }
 }
 
 impl Separable<u16> {

@@ -36,6 +36,8 @@ struct Shape {
     columns: u64,
     /// Levels of the trees over row tiles and over column tiles.
     levels: [u64; 2],
+    /// Tiles.
+    tiles: u64,
     /// Words on the bus.
     words: u64,
     /// Cycles in which the error unit forms the words of a sample.
@@ -159,10 +161,12 @@ impl Schedule {
             let [down, across] = layer.tiles(hardware).map(|n| n as u64);
             // the pairs of a target are added by the same tree
             let pairs = layer.spec.wiring.pairs(Stream::P).len() as u64;
+            let planes = layer.spec.wiring.planes().count() as u64;
             Shape {
                 rows: layer.layout.rows.min(hardware.tile.rows) as u64,
                 columns: layer.layout.columns.min(hardware.tile.columns) as u64,
                 levels: [tree_levels(down * pairs), tree_levels(across)],
+                tiles: planes * down * across,
                 words: layer.delivery.taps.width as u64,
                 form: timing.form(layer.delivery.terms() as u64),
             }
@@ -316,16 +320,23 @@ impl Schedule {
         cycles.engage(layer, Part::Accumulators, count * busy);
     }
 
-    /// `UPD(now)` of a sample or `UPD(write)`, whose slowest tile takes `busy` cycles.
+    /// `UPD(now)` of a sample or `UPD(write)`, whose slowest tile takes `busy` cycles; `looks`: after all sums of the layer
+    /// were looked at.
     pub(super) fn program(
         &mut self,
         cycles: &mut Cycles,
         layer: usize,
         write: Write,
         samples: &Range<usize>,
-        busy: u64,
+        (looks, busy): (bool, u64),
     ) {
-        let one = self.timing.accept() + busy;
+        let (t, shape) = (self.timing, self.shapes[layer]);
+        let mut one = t.accept() + busy;
+        if looks {
+            one += t.look(shape.rows, shape.columns, shape.tiles);
+            let squared = t.accumulate(shape.rows, shape.columns);
+            cycles.engage(layer, Part::Accumulators, squared);
+        }
         cycles.occupy(layer, During::Update, one);
         cycles.engage(layer, Part::Writers, busy);
         if write == Write::Program {

@@ -107,7 +107,8 @@ impl Engine {
             }
             let busy = timing.trains(slots.into());
             self.time(|schedule, cycles| {
-                schedule.program(cycles, layer, super::Write::Now, &(sample..sample + 1), busy);
+                let (now, samples) = (super::Write::Now, sample..sample + 1);
+                schedule.program(cycles, layer, now, &samples, (false, busy));
             });
         }
     }

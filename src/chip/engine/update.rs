@@ -17,11 +17,11 @@ use super::each::{MOVE, each};
 use super::error::{gates_of, stride_of};
 use super::passes::Passes;
 use super::pulses::Pulses;
-use super::{Engine, Write};
+use super::{Engine, Lines, Write};
 use crate::chip::crossbar::kernel::{self, WriteCounts};
 use crate::chip::crossbar::layout::{BLOCK_ROWS, PANEL_COLUMNS};
-use crate::chip::crossbar::{Crossbar, StripMut, WriteRequest};
-use crate::chip::hardware::{PulseCode, Timing, WriteScheme};
+use crate::chip::crossbar::{Collect, Crossbar, StripMut, WriteRequest, Written};
+use crate::chip::hardware::{DitherBits, DitherPattern, PulseCode, Timing, WriteScheme};
 use crate::chip::ledger::{During, Event};
 use crate::chip::population::{Polarity, Stream};
 use crate::num::draw::{Place, Site};
@@ -48,6 +48,8 @@ impl Engine {
                 self.charge_time(layer, write, &samples);
             }
             Write::Now => {
+                let plain = self.layers[layer].requests.are_plain();
+                assert!(plain, "optimisers and centred updates write a batch at once");
                 assert!(*pending == 0 && samples.len() == 1, "now takes one sample");
                 if let WriteScheme::Trains { slots_log2 } = self.hardware.write.scheme {
                     self.row_sums[layer] = None;
@@ -71,11 +73,13 @@ impl Engine {
             let count = passes.by_target[target.index()];
             self.charge(layer, code, During::Update, Event::RowPulses, count);
         }
-        self.time(|schedule, cycles| schedule.program(cycles, layer, write, samples, passes.busy));
+        let looks = self.layers[layer].requests.optimiser.looks_at_layer();
+        let busy = (looks, passes.busy);
+        self.time(|schedule, cycles| schedule.program(cycles, layer, write, samples, busy));
     }
 
     /// Charges something of every cell of every array.
-    fn charge_cells(&mut self, layer: usize, event: Event, each: u64) {
+    pub(super) fn charge_cells(&mut self, layer: usize, event: Event, each: u64) {
         let cells = self.layers[layer].layout.cells() as u64;
         for pathway in self.layers[layer].spec.wiring.pathways() {
             self.charge(layer, pathway.code, During::Update, event, cells * each);
@@ -110,6 +114,7 @@ impl Engine {
         self.charge_cells(layer, Event::DeltaComputations, 1);
         let remainder = 2 * u64::from(self.hardware.write.residual_bits.get());
         self.charge_cells(layer, Event::SramBits, remainder);
+        self.charge_requests(layer);
     }
 
     fn program_some(
@@ -118,7 +123,6 @@ impl Engine {
         samples: &Range<usize>,
         shift: u32,
     ) -> Vec<(usize, WriteCounts)> {
-        let wiring = self.layers[layer].spec.wiring;
         let stride = stride_of(samples.len());
         let sets = self.layers[layer].spec.drive_sets();
         // taken, so that cells can be written while they are read
@@ -128,7 +132,8 @@ impl Engine {
             .zip(&mut kept)
             .map(|(&set, turned)| self.turn(layer, set, samples, turned))
             .collect();
-        let turned: Vec<Vec<_>> = kept
+        let registers = std::mem::take(&mut self.registers[layer].gates);
+        let turned = kept
             .iter()
             .zip(&live)
             .map(|(turned, live)| {
@@ -136,15 +141,42 @@ impl Engine {
                 blocks.zip(live).map(|(block, live)| live.then_some(block)).collect()
             })
             .collect();
-        let registers = std::mem::take(&mut self.registers[layer].gates);
+        let ready = self.ready(layer, samples, turned, &registers, shift);
+        let written = if self.layers[layer].requests.are_plain() {
+            self.write_at_once(layer, &ready)
+        } else {
+            self.write_kept(layer, &ready, shift)
+        };
+        drop(ready);
+        if let Some(pulses) = &mut self.registers[layer].pulses {
+            for (array, first, part) in &written {
+                pulses.merge(&self.layers[layer], *array, *first, &part.collected);
+            }
+        }
+        self.registers[layer].turned = kept;
+        self.registers[layer].gates = registers;
+        written.into_iter().map(|(array, _, written)| (array, written.counts)).collect()
+    }
+
+    /// Makes the parts of a write ready, from turned drives and packed gates.
+    fn ready<'a>(
+        &self,
+        layer: usize,
+        samples: &Range<usize>,
+        turned: Vec<Vec<Option<&'a [u8]>>>,
+        registers: &'a [Lines<i8>; 2],
+        shift: u32,
+    ) -> Ready<'a> {
+        let this = &self.layers[layer];
+        let wiring = this.spec.wiring;
         let of = |target: Stream, polarity| {
             let gates = gates_of(&registers[target.index()], self.samples, samples);
             if self.potentiation_only { rectified(&gates, polarity) } else { gates }
         };
-        let gates: Vec<_> =
+        let gates =
             wiring.pathways().iter().map(|pathway| of(pathway.target, pathway.polarity)).collect();
-        let (write, window) = (self.hardware.write.clone(), self.hardware.cell.window);
-        let base = kernel::WriteLaw {
+        let (write, window) = (&self.hardware.write, self.hardware.cell.window);
+        let law = kernel::WriteLaw {
             shift: shift + wiring.shift_extra(),
             mantissa: i32::try_from(self.mantissas[layer]).expect("1..=15"),
             negate: false,
@@ -154,52 +186,41 @@ impl Engine {
             ceiling: window.ceiling(),
             residual_bits: write.residual_bits.get(),
         };
-        let (seed, collect) = (self.seed, self.collect);
-        let this = &mut self.layers[layer];
-        let (index, spec) = (this.index, this.spec.clone());
-        let request = |array: usize, count: u64| {
-            let pathway = wiring.pathways()[array];
-            WriteRequest {
-                turned: &turned[spec.drives_of(pathway.source).index()],
-                stride,
-                write: kernel::WriteLaw { negate: pathway.polarity == Polarity::Inhibits, ..base },
-                dither_bits: write.dither_bits,
-                dither_pattern: write.dither_pattern,
-                place: Place {
-                    seed,
-                    site: Site::WriteDither,
-                    layer: index,
-                    pathway: pathway.code,
-                    sub: 0,
-                    count,
-                },
-                collect,
-            }
-        };
-        let work = this.layout.cells() * this.arrays.len() * samples.len();
-        let mut strips: Vec<(usize, StripMut<'_>)> = Vec::new();
-        for (at, array) in this.arrays.iter_mut().enumerate() {
-            strips.extend(array.strips_mut(Crossbar::STRIP_PANELS).map(|strip| (at, strip)));
-        }
-        let writes = &this.writes;
-        let panel_gates = PANEL_COLUMNS * stride;
-        let panels = this.layout.panels();
-        let parts = strips.into_iter().map(|strip| (strip.1.panels().start, strip)).collect();
-        let written = each(&mut self.team, work, panels, parts, |kernel, (array, mut strip)| {
-            let panels = strip.panels();
-            let gates = &gates[array][panels.start * panel_gates..panels.end * panel_gates];
-            let written = strip.write(kernel, &request(array, writes[array]), gates);
-            (array, panels.start * PANEL_COLUMNS, written)
+        let arrays = wiring.pathways().iter().zip(&this.writes);
+        let arrays = arrays.map(|(pathway, &count)| Array {
+            set: this.spec.drives_of(pathway.source).index(),
+            negate: pathway.polarity == Polarity::Inhibits,
+            place: Place {
+                seed: self.seed,
+                site: Site::WriteDither,
+                layer: this.index,
+                pathway: pathway.code,
+                sub: 0,
+                count,
+            },
         });
-        drop((gates, turned));
-        if let Some(pulses) = &mut self.registers[layer].pulses {
-            for (array, first, part) in &written {
-                pulses.merge(&self.layers[layer], *array, *first, &part.collected);
-            }
+        Ready {
+            samples: samples.len(),
+            stride: stride_of(samples.len()),
+            turned,
+            gates,
+            law,
+            dither: (write.dither_bits, write.dither_pattern),
+            collect: self.collect,
+            arrays: arrays.collect(),
         }
-        self.registers[layer].turned = kept;
-        self.registers[layer].gates = registers;
-        written.into_iter().map(|(array, _, written)| (array, written.counts)).collect()
+    }
+
+    /// Writes strip by strip, all steps at once. Gives what came of each: its array, its first column, counts.
+    fn write_at_once(&mut self, layer: usize, ready: &Ready<'_>) -> Vec<(usize, usize, Written)> {
+        let this = &mut self.layers[layer];
+        let work = this.layout.cells() * this.arrays.len() * ready.samples;
+        let panels = this.layout.panels();
+        let parts = strips(&mut this.arrays);
+        each(&mut self.team, work, panels, parts, |kernel, (array, mut strip)| {
+            let written = strip.write(kernel, &ready.request(array), ready.gates(array, &strip));
+            (array, strip.panels().start * PANEL_COLUMNS, written)
+        })
     }
 
     /// Turns a set of drives of some samples as an update takes it. Returns which blocks are driven at all.
@@ -227,8 +248,63 @@ impl Engine {
     }
 }
 
+/// Everything that a write of a layer is made of, but its cells.
+pub(super) struct Ready<'a> {
+    pub(super) samples: usize,
+    pub(super) stride: usize,
+    /// Turned drives by set and block; `None` where all are 0.
+    pub(super) turned: Vec<Vec<Option<&'a [u8]>>>,
+    /// By array.
+    gates: Vec<Cow<'a, [i8]>>,
+    law: kernel::WriteLaw,
+    dither: (DitherBits, DitherPattern),
+    collect: Collect,
+    pub(super) arrays: Vec<Array>,
+}
+
+/// What a write of a layer has of one array.
+pub(super) struct Array {
+    /// Whose drives are on its rows.
+    pub(super) set: usize,
+    /// Whether it inhibits.
+    pub(super) negate: bool,
+    place: Place,
+}
+
+impl Ready<'_> {
+    /// How an array is written.
+    pub(super) fn request(&self, array: usize) -> WriteRequest<'_> {
+        let Array { set, negate, place } = self.arrays[array];
+        WriteRequest {
+            turned: &self.turned[set],
+            stride: self.stride,
+            write: kernel::WriteLaw { negate, ..self.law },
+            dither_bits: self.dither.0,
+            dither_pattern: self.dither.1,
+            place,
+            collect: self.collect,
+        }
+    }
+
+    /// Gates of the columns of a strip of an array.
+    pub(super) fn gates(&self, array: usize, strip: &StripMut<'_>) -> &[i8] {
+        let (panels, size) = (strip.panels(), PANEL_COLUMNS * self.stride);
+        &self.gates[array][panels.start * size..panels.end * size]
+    }
+}
+
+/// All arrays of a layer in strips, each with its array and beside the first of its panels.
+pub(super) fn strips(arrays: &mut [Crossbar]) -> Vec<(usize, (usize, StripMut<'_>))> {
+    let mut all = Vec::new();
+    for (at, array) in arrays.iter_mut().enumerate() {
+        let strips = array.strips_mut(Crossbar::STRIP_PANELS);
+        all.extend(strips.map(|strip| (strip.panels().start, (at, strip))));
+    }
+    all
+}
+
 /// Bits of the sum of a cell in digital memory.
-const SUM_BITS: u64 = 32;
+pub(super) const SUM_BITS: u64 = 32;
 
 /// Cells read after pulses to see what those did: one a pulse that was given.
 fn verified(timing: Option<Timing>, counts: WriteCounts) -> u64 {

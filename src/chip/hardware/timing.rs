@@ -8,6 +8,7 @@
 //! words formed in the error unit       ceil(CE N / U)              of N words, each a sum of CE
 //! ERR                                 CE + H + NG
 //! UPD add                             rows NG
+//! a look at all sums before a write   rows NG + ceil(log2(tiles))
 //! a pulse of a row                    T_W passes, and T_A + conv more when it is verified
 //! ```
 //!
@@ -141,6 +142,12 @@ impl Timing {
     #[must_use]
     pub(crate) const fn accumulate(&self, rows: u64, columns: u64) -> u64 {
         self.beat * rows * self.groups(columns)
+    }
+
+    /// Busy cycles of a pass over the sums of a layer on so many tiles before it is written: all are squared and added.
+    #[must_use]
+    pub(crate) const fn look(&self, rows: u64, columns: u64, tiles: u64) -> u64 {
+        self.accumulate(rows, columns) + self.beat * tree_levels(tiles)
     }
 
     /// Cycles of the error unit that takes the mean over a batch off every word: `B CE + CE`.

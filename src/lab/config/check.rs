@@ -13,12 +13,13 @@ use super::policy::PolicySettings;
 use super::quantity::{Constants, constants_of};
 use super::{ConfigError, Sources, chip, data};
 use crate::chip::hardware::{ConverterKind, Hardware};
+use crate::chip::layer::Optimiser;
 use crate::lab::near;
 use crate::learn::error::Centre;
 use crate::learn::route::Route;
 use crate::learn::rule::{Rule, UpdateMode};
 use crate::num::fixed::{Batch, OutOfRange, RateMantissa};
-use crate::num::tables::{Activation, Decay, Positive, Rate, Unit};
+use crate::num::tables::{Activation, Decay, Positive, Rate, RateOf, Unit};
 
 mod learning;
 mod network;
@@ -106,6 +107,8 @@ pub struct Config {
     pub(crate) rates: Vec<Positive>,
     /// How the rate falls.
     pub(crate) decay: Decay,
+    /// What makes requests of sums.
+    pub(crate) optimiser: Optimiser,
     /// Passes over the training set; epochs of a policy.
     pub(crate) epochs: u32,
     /// Random shift of training images.
@@ -209,7 +212,7 @@ pub(super) fn config(mut file: ExperimentFile, model: &UnderModel) -> Result<Con
         TaskKind::Policy => policy::resolve(&mut file, &hardware)?,
     };
     let Network { activations, weight_max_log2, bias, gain_64ths } = network;
-    let Learning { kind, mode, centre, route, batch, rates, decay, .. } = learning;
+    let Learning { kind, mode, centre, route, batch, rates, decay, optimiser, .. } = learning;
     let Learning { epochs, shift_pixels, train_on, select, .. } = learning;
     #[cfg(feature = "grown")]
     file.learning.get_or_insert_default().grown.get_or_insert(0);
@@ -230,6 +233,7 @@ pub(super) fn config(mut file: ExperimentFile, model: &UnderModel) -> Result<Con
         mantissas,
         rates,
         decay,
+        optimiser,
         epochs,
         shift_pixels,
         train_on,
@@ -281,6 +285,7 @@ fn mantissas(
     let asked = learning.rates.iter().zip(layers);
     let asked = asked.map(|(&rate, (&activation, &weight_max_log2))| Rate {
         rate,
+        of: if learning.optimiser.is_sign() { RateOf::Pulses } else { RateOf::Sums },
         batch: learning.batch,
         mantissa: RateMantissa::new(1).expect("in range"),
         error_bits: hardware.digital.error_bits,

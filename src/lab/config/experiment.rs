@@ -100,6 +100,8 @@ impl Config {
             mantissas: self.mantissas.clone(),
             rates: self.rates.clone(),
             decay: self.decay,
+            optimisers: vec![self.optimiser; hidden.len() + 1],
+            centred: vec![false; hidden.len() + 1],
         }
     }
 

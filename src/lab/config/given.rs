@@ -10,7 +10,7 @@ use crate::chip::hardware::{
     Adc, AdcRange, CellSpec, DigitalSpec, DitherBits, DitherPattern, DriveSpec, FloorKind,
     HardwareSpec, PulseCode, Subtract, TileSpec, Timing, WriteScheme, WriteSpec,
 };
-use crate::chip::layer::{DrivenBy, LayerSpec};
+use crate::chip::layer::{DrivenBy, LayerSpec, Optimiser};
 use crate::learn::error::Centre;
 use crate::learn::network::NetworkSpec;
 use crate::learn::route::Route;
@@ -71,6 +71,8 @@ const FROZEN: &[(&str, &str)] = &[
     ("timing.active_max", "any"),
     ("timing.slices", "alike"),
     ("layer.mantissa", "1"),
+    ("layer.optimiser", "plain"),
+    ("layer.centred", "false"),
 ];
 
 /// Key and word.
@@ -213,11 +215,31 @@ impl List {
     /// A network and how it learns, whose layers are numbered from `first`; what is no matter of one layer stands under
     /// `head`.
     fn network(&mut self, head: &str, first: usize, network: &NetworkSpec) {
-        let NetworkSpec { layers, rule, mode, centre, route, batch, mantissas, rates, decay } =
-            network;
+        let NetworkSpec {
+            layers,
+            rule,
+            mode,
+            centre,
+            route,
+            batch,
+            mantissas,
+            rates,
+            decay,
+            optimisers,
+            centred,
+        } = network;
         for (number, (layer, rate)) in (first..).zip(layers.iter().zip(rates)) {
             self.layer(number, layer);
             self.put(&format!("layer{number}.rate"), rate.get());
+        }
+        for (number, (optimiser, centred)) in (first..).zip(optimisers.iter().zip(centred)) {
+            let optimiser = match optimiser {
+                Optimiser::Plain => "plain",
+                Optimiser::Sign { dead_zone: false } => "sign",
+                Optimiser::Sign { dead_zone: true } => "sign with a dead zone",
+            };
+            self.put(&format!("layer{number}.optimiser"), optimiser);
+            self.put(&format!("layer{number}.centred"), centred);
         }
         let rule = match rule {
             Rule::Ed => "ed",
@@ -263,6 +285,7 @@ impl List {
         let decay = match decay {
             Decay::Constant => "constant",
             Decay::Cosine => "cosine",
+            Decay::Linear => "linear",
         };
         self.put(&format!("{head}.decay"), decay);
     }

@@ -127,6 +127,10 @@ impl Config {
             Part::Critic => (&policy.critic_hidden, 1),
         };
         let mut network = self.network_of(policy.rows(), hidden, outputs);
+        if part == Part::Actor && policy.centred {
+            // output layers alone can learn the mean of what they put out
+            network.centred[..hidden.len()].fill(true);
+        }
         if part == Part::Critic {
             // one word, which all units hear
             network.route = match self.route {

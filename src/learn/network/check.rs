@@ -3,7 +3,7 @@
 
 use super::{NetworkError, NetworkSpec};
 use crate::chip::hardware::{Adc, Hardware, WriteScheme};
-use crate::chip::layer::{self, DrivenBy, LayerSpec};
+use crate::chip::layer::{self, DrivenBy, LayerSpec, Optimiser};
 use crate::chip::population::Wiring;
 use crate::learn::error::Centre;
 use crate::learn::route::Route;
@@ -15,6 +15,8 @@ use crate::num::tables::{Lut, SHIFT_MAX, STEP_SHIFT_MAX};
 pub const WEIGHT_MAX_LOG2: std::ops::RangeInclusive<i32> = -8..=8;
 /// Initial gains, in 64ths: up to 16.
 pub const GAIN_64THS: std::ops::RangeInclusive<u32> = 1..=1024;
+/// Greatest shift of the chance of a pulse: words have as many bits.
+const CHANCE_SHIFT_MAX: u32 = 16;
 /// Words a unit adds, at most.
 const TAPS_MAX: usize = 4;
 /// Shift of a sum of words, at most: nothing is left of it beyond.
@@ -35,6 +37,7 @@ pub(super) fn check(network: &NetworkSpec, hardware: &Hardware) -> Checked {
     wiring(network)?;
     batches(network, hardware)?;
     routes(network)?;
+    optimisers(network, hardware)?;
     rates(network, hardware)
 }
 
@@ -244,7 +247,55 @@ fn rates(network: &NetworkSpec, hardware: &Hardware) -> Checked {
         return misfit("learning.rate_mantissa", format!("has {found} numbers"), allowed);
     }
     for (at, rate) in network.rates(hardware).enumerate() {
-        rate.shift().map_err(|error| no_shift(at, &error))?;
+        let k = rate.shift().map_err(|error| no_shift(at, &error))?;
+        let most = CHANCE_SHIFT_MAX - network.layers[at].wiring.shift_extra();
+        if network.optimisers[at].is_sign() && k > most {
+            let found = format!("gives layer {at} a chance of 2^-{k} that a cell is pulsed");
+            let allowed =
+                format!("words of 16 bits give 2^-{most} at least: raise it or its multiplier");
+            return misfit("learning.rate", found, allowed);
+        }
+    }
+    Ok(())
+}
+
+/// An optimiser a layer, on a chip and with a way to write that it makes sense with.
+fn optimisers(network: &NetworkSpec, hardware: &Hardware) -> Checked {
+    let layers = network.layers.len();
+    for (key, found) in [
+        ("learning.optimiser", network.optimisers.len()),
+        ("learning.centred", network.centred.len()),
+    ] {
+        if found != layers {
+            let allowed = format!("there are {layers} layers (hidden and output); give {layers}");
+            return misfit(key, format!("says it of {found} layers"), allowed);
+        }
+    }
+    let other = network.optimisers.iter().any(|&optimiser| optimiser != Optimiser::Plain);
+    let centred = network.centred.contains(&true);
+    if network.mode != UpdateMode::Accumulate && (other || centred) {
+        let key = if other { "learning.optimiser" } else { "learning.centred" };
+        let found = if other { "is not \"plain\"" } else { "is true of a layer" };
+        let allowed = "such requests are made of the sums of a whole batch; use learning.mode = \"accumulate\"";
+        return misfit(key, found, allowed);
+    }
+    if network.rule == Rule::Kaneko && centred {
+        let allowed = "Kaneko's rule only potentiates, and what is centred falls as often as it rises; leave it out";
+        return misfit("learning.centred", "is true of a layer beside rule = \"kaneko\"", allowed);
+    }
+    for (at, optimiser) in network.optimisers.iter().enumerate() {
+        if !optimiser.is_sign() {
+            continue;
+        }
+        let found = format!("is \"sign\" in layer {at}");
+        if hardware.write.residual_bits.get() > 0 {
+            let allowed = "it asks for whole pulses, of which no remainder is left; use hw.write.residual_bits = 0";
+            return misfit("learning.optimiser", found, allowed);
+        }
+        if network.mantissas.get(at).is_some_and(|mantissa| mantissa.get() != 1) {
+            let allowed = "its rate is the chance of a pulse, which no mantissa scales; leave learning.rate_mantissa at 1";
+            return misfit("learning.optimiser", found, allowed);
+        }
     }
     Ok(())
 }

@@ -29,6 +29,8 @@ fn plain() -> NetworkSpec {
         mantissas: vec![RateMantissa::new(1).unwrap(); 2],
         rates: vec![Positive::new(20.0).unwrap(); 2],
         decay: Decay::Constant,
+        optimisers: vec![Optimiser::Plain; 2],
+        centred: vec![false; 2],
     }
 }
 

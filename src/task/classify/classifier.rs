@@ -43,6 +43,8 @@ use crate::learn::network::NetworkError;
 ///     mantissas: vec![RateMantissa::new(1)?; 2],
 ///     rates: vec![Positive::new(20.0).ok_or("a rate")?; 2],
 ///     decay: Decay::Constant,
+///     optimisers: vec![Optimiser::Plain; 2],
+///     centred: vec![false; 2],
 /// };
 /// let hardware = Hardware::reference();
 /// let experiment = Experiment { seed: 1, hardware, network, epochs: 3, augment: None };

@@ -53,6 +53,12 @@ impl Experiment {
     /// When something does not, with the key that says it.
     pub fn check(&self) -> Result<(), NetworkError> {
         self.network.check(&self.hardware)?;
+        if self.network.centred.contains(&true) {
+            let found = "is true of a layer";
+            let allowed = "an error of one class against all others takes its mean off in the output alone, and such a \
+                           network does not learn without thresholds, which are not built; leave it out";
+            return Err(NetworkError::misfit("learning.centred", found, allowed));
+        }
         match self.augment {
             Some(augment) => augment.check(self.network.layers.first().map_or(0, |l| l.inputs)),
             None => Ok(()),

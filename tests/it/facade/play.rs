@@ -227,6 +227,12 @@ fn network(c: &mut Choices<'_>, inputs: usize, outputs: usize) -> NetworkSpec {
     let batch = if c.one_in(8) { c.near(1, 4096) } else { i64::from(c.byte() % 16) + 1 };
     let rates = if c.one_in(32) { c.size(0, 3).min(9) } else { layers.len() };
     let mantissas = if c.one_in(32) { c.size(0, 3).min(9) } else { layers.len() };
+    let count = if c.one_in(32) { c.size(0, 3).min(9) } else { layers.len() };
+    let optimisers = [
+        Optimiser::Plain,
+        Optimiser::Sign { dead_zone: false },
+        Optimiser::Sign { dead_zone: true },
+    ];
     NetworkSpec {
         layers,
         rule,
@@ -238,7 +244,9 @@ fn network(c: &mut Choices<'_>, inputs: usize, outputs: usize) -> NetworkSpec {
             .map(|_| or(RateMantissa::new(c.near(1, 15)), RateMantissa::new(1).expect("inside")))
             .collect(),
         rates: (0..rates).map(|_| positive(c)).collect(),
-        decay: c.of(&[Decay::Constant, Decay::Cosine]),
+        decay: c.of(&[Decay::Constant, Decay::Cosine, Decay::Linear]),
+        optimisers: (0..count).map(|_| c.of(&optimisers)).collect(),
+        centred: (0..count).map(|_| c.one_in(16)).collect(),
     }
 }
 

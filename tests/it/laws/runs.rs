@@ -130,6 +130,8 @@ fn run() -> impl Strategy<Value = Run> {
                     .collect(),
                 rates,
                 decay,
+                optimisers: vec![Optimiser::Plain; count],
+                centred: vec![false; count],
             };
             let augment = image.then(|| moved(sides[0])).flatten();
             let experiment = Experiment { seed, hardware, network, epochs, augment };

@@ -15,8 +15,8 @@ use std::ops::Range;
 
 use super::ops::{Ops, twins};
 use super::{
-    Cells, Conversion, Dither, Drives, Ends, Half, Rails, Sums, WriteCounts, WriteLaw, lanes, peak,
-    scalar,
+    Cells, Conversion, Dither, Drives, Ends, Half, Rails, SignLaw, Squares, Sums, WriteCounts,
+    WriteLaw, lanes, peak, scalar,
 };
 use crate::chip::crossbar::layout::{BLOCK_CELLS, BLOCK_ROWS, HALF_CELLS, HALF_COLUMNS, Layout};
 use crate::num::fixed::ErrorBits;
@@ -55,6 +55,10 @@ pub(super) const OPS: Ops = Ops {
     may_move: fused::may_move,
     pulses,
     levels,
+    centre,
+    squares,
+    loud,
+    signs,
     fused: fused::fused,
     one_sample: one_sample::one_sample,
     peaks: units::peaks,

@@ -16,7 +16,9 @@ use std::arch::x86_64::*;
 use std::ops::Range;
 
 use super::ops::{Ops, twins};
-use super::{Cells, Dither, Drives, Ends, Half, Sums, WriteCounts, WriteLaw, peak, scalar};
+use super::{
+    Cells, Dither, Drives, Ends, Half, SignLaw, Squares, Sums, WriteCounts, WriteLaw, peak, scalar,
+};
 use crate::chip::crossbar::layout::{BLOCK_CELLS, BLOCK_ROWS, HALF_CELLS, HALF_COLUMNS};
 
 mod columns;
@@ -67,6 +69,10 @@ pub(super) const OPS: Ops = Ops {
     may_move: fused::may_move,
     pulses,
     levels,
+    centre,
+    squares,
+    loud,
+    signs,
     fused: fused::fused,
     one_sample: one_sample::one_sample,
     peaks: peaks::peaks,

@@ -14,9 +14,9 @@ use std::ops::Range;
 
 use super::{
     Banks, Cells, Conversion, Dither, Draws, Drives, Ends, Extremes, Half, Image, LookUp,
-    OneSample, Peaks, Rails, Scratch, Sums, WriteCounts, WriteLaw,
+    OneSample, Peaks, Rails, Scratch, SignLaw, Squares, Sums, WriteCounts, WriteLaw,
 };
-use crate::chip::crossbar::layout::Layout;
+use crate::chip::crossbar::layout::{BLOCK_ROWS, HALF_COLUMNS, Layout};
 use crate::num::fixed::ErrorBits;
 
 /// The operations of a back end.
@@ -58,6 +58,16 @@ pub(super) struct Ops {
     pub(super) pulses:
         unsafe fn(Sums<'_>, &WriteLaw, Dither<'_>, &mut Cells<'_>, &mut Half<i8>) -> WriteCounts,
     pub(super) levels: unsafe fn(&mut Cells<'_>, &Half<i8>, Ends, u16) -> u64,
+    pub(super) centre: unsafe fn(&mut Half<i32>, &[i32; BLOCK_ROWS], &[i32; HALF_COLUMNS]),
+    pub(super) squares: unsafe fn(&Half<i32>) -> Squares,
+    pub(super) loud: unsafe fn(&Half<i32>, u32) -> u16,
+    pub(super) signs: unsafe fn(
+        &Half<i32>,
+        &SignLaw,
+        Option<&Half<u16>>,
+        &mut Cells<'_>,
+        &mut Half<i8>,
+    ) -> WriteCounts,
     /// Both at once, for writes as they usually are.
     pub(super) fused:
         unsafe fn(&mut Cells<'_>, &Half<i32>, &WriteLaw, Dither<'_>) -> Option<WriteCounts>,
@@ -90,6 +100,32 @@ macro_rules! twins {
         #[target_feature(enable = $features)]
         fn levels(cells: &mut Cells<'_>, pulses: &Half<i8>, ends: Ends, groups: u16) -> u64 {
             crate::chip::crossbar::kernel::levels::twin(cells, pulses, ends, groups)
+        }
+
+        #[target_feature(enable = $features)]
+        fn centre(sums: &mut Half<i32>, means: &[i32; BLOCK_ROWS], totals: &[i32; HALF_COLUMNS]) {
+            crate::chip::crossbar::kernel::optimise::centre(sums, means, totals)
+        }
+
+        #[target_feature(enable = $features)]
+        fn squares(sums: &Half<i32>) -> Squares {
+            crate::chip::crossbar::kernel::optimise::squares(sums)
+        }
+
+        #[target_feature(enable = $features)]
+        fn loud(sums: &Half<i32>, least: u32) -> u16 {
+            crate::chip::crossbar::kernel::optimise::loud(sums, least)
+        }
+
+        #[target_feature(enable = $features)]
+        fn signs(
+            sums: &Half<i32>,
+            law: &SignLaw,
+            words: Option<&Half<u16>>,
+            cells: &mut Cells<'_>,
+            out: &mut Half<i8>,
+        ) -> WriteCounts {
+            crate::chip::crossbar::kernel::optimise::signs(sums, law, words, cells, out)
         }
     };
 }

@@ -16,7 +16,8 @@ use std::ops::Range;
 
 use super::ops::Ops;
 use super::{
-    Conversion, Draws, Drives, Extremes, Half, LookUp, Peaks, Rails, conv, levels, pulses, sums,
+    Conversion, Draws, Drives, Extremes, Half, LookUp, Peaks, Rails, conv, levels, optimise,
+    pulses, sums,
 };
 use crate::chip::crossbar::layout::{
     BLOCK_CELLS, BLOCK_ROWS, HALF_CELLS, HALF_COLUMNS, Layout, PANEL_COLUMNS, in_half,
@@ -42,6 +43,10 @@ pub(super) const OPS: Ops = Ops {
     may_move: pulses::may_move,
     pulses: pulses::law,
     levels: levels::law,
+    centre: optimise::centre,
+    squares: optimise::squares,
+    loud: optimise::loud,
+    signs: optimise::signs,
     fused: |_, _, _, _| None,
     one_sample: |_| None,
     peaks,

@@ -141,6 +141,12 @@ impl Network {
         self.layers[layer].residuals(array)
     }
 
+    /// Mean drives of the rows of a set of drives, with 4 fractional bits; none where updates are not centred.
+    #[must_use]
+    pub fn row_means(&self, layer: usize, set: Stream) -> &[i64] {
+        self.layers[layer].row_means(set)
+    }
+
     /// Accumulator and activity of a unit of the last layer, of one of its target streams.
     #[must_use]
     pub fn output(&self, target: Stream, sample: usize, unit: usize) -> (i64, u8) {
@@ -244,7 +250,16 @@ impl Network {
                     };
                     let orders: Vec<_> = writes.iter().map(order).collect();
                     self.play(&orders, Interval::Program);
-                    orders.iter().for_each(|order| self.layers[order.layer].written());
+                    for order in orders {
+                        let counts = self.layers[order.layer].mean_counts();
+                        for (code, count) in counts {
+                            let charged = [(Event::RowMeans, count), (Event::SramBits, 12 * count)];
+                            for (event, count) in charged {
+                                self.charge(order.layer, code, During::Update, event, count);
+                            }
+                        }
+                        self.layers[order.layer].written();
+                    }
                 }
             }
         }
@@ -493,7 +508,9 @@ impl Network {
             (Event::PulsesEffective, e.pulses_effective),
             (Event::SaturatedConversions, e.saturated_conversions),
             (Event::VerifyReads, e.verify_reads),
-            (Event::SramBits, drives + sums + rests),
+            (Event::SumSquares, e.sum_squares),
+            (Event::OptimiserSteps, e.optimiser_steps),
+            (Event::SramBits, drives + sums + rests + 32 * e.sum_squares),
         ]
     }
 

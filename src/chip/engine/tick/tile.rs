@@ -12,6 +12,7 @@ mod command;
 mod config;
 mod events;
 mod network;
+mod optimise;
 mod read;
 mod registers;
 mod trains;
@@ -20,6 +21,7 @@ mod write;
 pub use command::Command;
 pub use config::{More, TileAdc, TileConfig, TileSize};
 pub use events::{BankEvents, TileEvents};
+use optimise::Kept;
 
 /// Which lines a read goes through.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -84,6 +86,10 @@ enum UpdPhase {
     Set,
     Reset,
     Turn,
+    /// All sums are squared.
+    Look,
+    /// Until those of the whole layer have been.
+    Wait,
 }
 
 /// Field of an update, as it is numbered in the register.
@@ -169,6 +175,8 @@ pub struct Tile {
     launched: Option<(Launch, Way)>,
     /// By bank: which rows and columns fire in the slot that ends in this cycle.
     firing: [(Vec<bool>, Vec<bool>); 2],
+    /// What requests of whole batches need.
+    kept: Kept,
     /// Cells that were pulsed by trains of this write.
     trained: [Vec<bool>; 2],
     /// Whether the lanes have seen the last group of a sample in this cycle.
@@ -221,6 +229,7 @@ impl Tile {
             rails: vec![[0; 2]; config.slices as usize],
             launched: None,
             firing: Default::default(),
+            kept: Kept::new(size.rows, size.columns),
             trained: [vec![false; cells], vec![false; cells]],
             looked_up: false,
             size,
@@ -324,7 +333,12 @@ impl Tile {
             }
             // the field is taken, and not used
             Command::Add { slot } => self.upd = update(UpdKind::Add, slot, 0),
-            Command::Write { shift } => self.upd = update(UpdKind::Write, 0, shift),
+            Command::Write { shift } => {
+                self.upd = update(UpdKind::Write, 0, shift);
+                if self.config.more.looks {
+                    self.upd.phase = UpdPhase::Look;
+                }
+            }
         }
     }
 }

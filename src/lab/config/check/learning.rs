@@ -1,6 +1,7 @@
 //! `[learning]`: rule, batches, rates, and which state is kept.
 
 use super::{Select, TrainOn, one_a_layer, per_layer, positive, range, route, word, wrong};
+use crate::chip::layer::Optimiser;
 use crate::lab::config::ConfigError;
 use crate::lab::config::defaults::SetDefaults;
 use crate::lab::config::file::{LearningFile, MantissaFile};
@@ -60,8 +61,11 @@ pub(super) const MODES: [(&str, UpdateMode); 3] = [
 pub(super) const CENTRES: [(&str, Centre); 3] =
     [("none", Centre::None), ("batch", Centre::Batch), ("running", Centre::Running)];
 /// `learning.decay`.
-pub(super) const DECAYS: [(&str, Decay); 2] =
-    [("cosine", Decay::Cosine), ("constant", Decay::Constant)];
+pub(super) const DECAYS: [(&str, Decay); 3] =
+    [("cosine", Decay::Cosine), ("linear", Decay::Linear), ("constant", Decay::Constant)];
+/// `learning.optimiser`, but for what further keys say of it.
+const OPTIMISERS: [(&str, Optimiser); 2] =
+    [("plain", Optimiser::Plain), ("sign", Optimiser::Sign { dead_zone: false })];
 
 /// Checked numbers of `[learning]`.
 pub(super) struct Learning {
@@ -72,6 +76,7 @@ pub(super) struct Learning {
     pub(super) batch: Batch,
     pub(super) rates: Vec<Positive>,
     pub(super) decay: Decay,
+    pub(super) optimiser: Optimiser,
     pub(super) epochs: u32,
     pub(super) shift_pixels: u32,
     pub(super) train_on: TrainOn,
@@ -89,6 +94,7 @@ impl Learning {
             batch: Batch::new(1).expect("in range"),
             rates: vec![],
             decay: Decay::Constant,
+            optimiser: Optimiser::Plain,
             epochs: 0,
             shift_pixels: 0,
             train_on: TrainOn::Train,
@@ -131,11 +137,34 @@ pub(super) fn resolve(
         batch,
         rates: rates(file, hidden, defaults)?,
         decay: word("learning.decay", &mut file.decay, "cosine", &DECAYS)?,
+        optimiser: optimiser(file, "plain", false)?,
         epochs: *file.epochs.get_or_insert(defaults.epochs),
         shift_pixels: *file.shift_pixels.get_or_insert(0),
         train_on,
         select,
     })
+}
+
+/// What makes requests of sums, with keys that belong to one of them.
+pub(super) fn optimiser(
+    file: &mut LearningFile,
+    default: &str,
+    dead_zone: bool,
+) -> Result<Optimiser, ConfigError> {
+    match word("learning.optimiser", &mut file.optimiser, default, &OPTIMISERS)? {
+        Optimiser::Sign { .. } => {
+            let dead_zone = *file.dead_zone.get_or_insert(dead_zone);
+            Ok(Optimiser::Sign { dead_zone })
+        }
+        other => match file.dead_zone {
+            None => Ok(other),
+            Some(found) => {
+                let allowed = "it belongs to optimiser = \"sign\": take the key out (--set learning.dead_zone=default), or \
+                               choose that optimiser";
+                Err(wrong("learning.dead_zone", format!("is {found}"), allowed))
+            }
+        },
+    }
 }
 
 /// Rate times multiplier, of each layer.

@@ -188,6 +188,7 @@ fn learns(file: &mut LearningFile, rule: Rule, layers: usize) -> Result<Learning
         batch: range("learning.batch", Batch::new(batch))?,
         rates: learning::products(rate, factors)?,
         decay: word("learning.decay", &mut file.decay, "linear", &learning::DECAYS)?,
+        optimiser: learning::optimiser(file, "sign", true)?,
         select: last(file)?,
         ..Learning::neutral()
     })

@@ -20,6 +20,7 @@ use crate::num::fixed::DriveBits;
 
 mod build;
 mod draws;
+mod optimise;
 
 use build::config;
 
@@ -63,6 +64,8 @@ pub(super) struct TickLayer {
     tree: Vec<(u64, usize, bool, Launch)>,
     /// Cycles through the tree over rows and over columns.
     delay: [u64; 2],
+    /// Requests of whole batches.
+    batch: optimise::Batch,
 }
 
 impl TickLayer {
@@ -101,7 +104,7 @@ impl TickLayer {
             grid,
             tile,
             drive_bits: hardware.drive.bits,
-            dither: (hardware.write.dither_bits.get(), hardware.write.dither_pattern),
+            dither: (draws::bits(hardware, layer), hardware.write.dither_pattern),
             slots_log2: match hardware.write.scheme {
                 WriteScheme::Rounded => 0,
                 WriteScheme::Trains { slots_log2 } => slots_log2,
@@ -110,6 +113,7 @@ impl TickLayer {
             writes: layer.writes.first().copied().unwrap_or(0),
             tree: vec![],
             delay: added.map(|tiles| timing.beat * tree_levels(tiles as u64)),
+            batch: optimise::Batch::new(timing, layer, grid),
         };
         let lut = layer.lut.activity.iter().zip(&layer.lut.derivative);
         let table: Vec<[u8; 2]> = lut.map(|(&a, &slope)| [a, slope]).collect();
@@ -367,7 +371,8 @@ impl TickLayer {
     }
 
     /// Every array has been written once more.
-    pub(super) const fn written(&mut self) {
+    pub(super) fn written(&mut self) {
+        self.move_means();
         self.writes += 1;
     }
 
@@ -394,6 +399,11 @@ impl TickLayer {
 
     /// One cycle of all tiles and of the tree between them.
     pub(super) fn cycle(&mut self, command: Option<&Command<'_>>, words: &[i16]) {
+        match command {
+            Some(Command::Add { .. }) => self.batch.added += 1,
+            Some(Command::Write { .. }) => self.begin_write(),
+            _ => {}
+        }
         for tile in 0..self.tiles.len() {
             let command = command.filter(|command| self.concerns(command, tile));
             if let Some(slot) = self.tiles[tile].slot_ends() {
@@ -411,6 +421,7 @@ impl TickLayer {
             }
         }
         self.tree();
+        self.join_squares();
     }
 
     fn tree(&mut self) {

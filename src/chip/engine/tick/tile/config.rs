@@ -121,6 +121,12 @@ pub struct More {
     pub active_max: Option<usize>,
     /// How pulses are given.
     pub pulse_code: PulseCode,
+    /// Whether sums are asked for one pulse each, with a chance of `2^-k`.
+    pub sign: bool,
+    /// Whether all sums are squared and added before the first row is written.
+    pub looks: bool,
+    /// Fractional bits of the means that are taken off the rows, if they are.
+    pub centred: Option<u32>,
     /// Slots of a train, where writes are coincidences of trains.
     pub train_slots: Option<u64>,
 }
@@ -140,6 +146,9 @@ impl Default for More {
             verify: false,
             active_max: None,
             pulse_code: PulseCode::Unary,
+            sign: false,
+            looks: false,
+            centred: None,
             train_slots: None,
         }
     }

@@ -32,6 +32,10 @@ pub struct BankEvents {
     pub saturated_conversions: u64,
     /// Only in networks.
     pub verify_reads: u64,
+    /// Only in networks: sums squared.
+    pub sum_squares: u64,
+    /// Only in networks: sums that an optimiser asked for something by.
+    pub optimiser_steps: u64,
 }
 
 /// Counters of a tile, in the order of docs/TILE.md, 6.
@@ -69,6 +73,8 @@ impl BankEvents {
         self.pulses_effective += more.pulses_effective;
         self.saturated_conversions += more.saturated_conversions;
         self.verify_reads += more.verify_reads;
+        self.sum_squares += more.sum_squares;
+        self.optimiser_steps += more.optimiser_steps;
     }
 }
 

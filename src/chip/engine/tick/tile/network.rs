@@ -1,7 +1,7 @@
 //! What a network of tiles asks of one: state from outside, state to compare, parts at work, counts.
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
-use super::{BankEvents, Tile, TileEvents, UpdKind, Way};
+use super::{BankEvents, Tile, TileEvents, UpdKind, UpdPhase, Way};
 
 impl Tile {
     const fn place(&self, row: usize, column: usize) -> usize {
@@ -99,7 +99,14 @@ impl Tile {
     }
 
     pub(in super::super) fn is_writing(&self) -> bool {
-        self.upd.busy && self.upd.kind != UpdKind::Add
+        let looks = matches!(self.upd.phase, UpdPhase::Look | UpdPhase::Wait);
+        self.upd.busy && self.upd.kind != UpdKind::Add && !looks
+    }
+
+    /// Whether the sums of its cells are added to, or looked at.
+    fn is_adding(&self) -> bool {
+        let looks = self.upd.phase == UpdPhase::Look;
+        self.upd.busy && (self.upd.kind == UpdKind::Add || looks)
     }
 
     /// Array, converters, lanes, bus, multipliers, accumulators in the cycle that begins.
@@ -113,7 +120,7 @@ impl Tile {
             self.lane.busy,
             self.bus_wanted(),
             self.err.busy && self.err.count >= words,
-            self.upd.busy && self.upd.kind == UpdKind::Add,
+            self.is_adding(),
         ]
     }
 
@@ -124,13 +131,14 @@ impl Tile {
         let sliced = |slot, slice: u32| [Some(slot), usize::try_from(slice).ok()];
         let (front, conv) = (&self.front, &self.conv);
         let written = (self.upd.kind == UpdKind::Now).then_some(self.upd.slot);
+        let added = (self.upd.kind == UpdKind::Add).then_some(self.upd.slot);
         [
             arrays.then(|| sliced(front.slot, front.slice)),
             converters.then(|| sliced(conv.slot, conv.slice)),
             lanes.then_some([Some(self.lane.slot), None]),
             bus.then_some([Some(self.err.slot), None]),
             multipliers.then_some([Some(self.err.slot), None]),
-            accumulators.then_some([Some(self.upd.slot), None]),
+            accumulators.then_some([added, None]),
             self.is_writing().then_some([written, None]),
         ]
     }

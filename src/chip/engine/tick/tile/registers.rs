@@ -37,6 +37,9 @@ impl Tile {
             UpdPhase::Set => 1,
             UpdPhase::Reset => 2,
             UpdPhase::Turn => 3,
+            // only in networks
+            UpdPhase::Look => 4,
+            UpdPhase::Wait => 5,
         };
         vec![
             ("level_e", wide(&self.level[0])),

@@ -77,6 +77,12 @@ impl Tile {
                     self.add();
                 }
             }
+            (_, UpdPhase::Look) => {
+                if self.beat_is_over() {
+                    self.look();
+                }
+            }
+            (_, UpdPhase::Wait) => {}
             (_, UpdPhase::Compute) => {
                 if self.beat_is_over() {
                     self.compute(dither);
@@ -101,19 +107,25 @@ impl Tile {
     }
 
     /// The product of a row's drive and a column's gate as a bank takes it.
-    fn outer(&self, bank: usize, column: usize) -> i64 {
+    pub(super) fn outer(&self, bank: usize, column: usize) -> i64 {
         let drive = i64::from(self.drive[bank][self.upd.slot * self.size.rows + self.upd.row]);
+        drive * self.signed_gate(bank, column)
+    }
+
+    /// A column's gate as a bank takes it.
+    pub(super) fn signed_gate(&self, bank: usize, column: usize) -> i64 {
         let gate = self.gate[self.upd.slot * self.size.columns + column];
         let only = self.config.more.potentiation_only;
         match bank {
-            0 if only => drive * gate.max(0),
-            0 => drive * gate,
-            _ if only => -drive * gate.min(0),
-            _ => -drive * gate,
+            0 if only => gate.max(0),
+            0 => gate,
+            _ if only => -gate.min(0),
+            _ => -gate,
         }
     }
 
     fn add(&mut self) {
+        self.add_lines();
         for column in self.group(self.upd.group, self.config.columns) {
             for bank in 0..2 {
                 let product = self.outer(bank, column);
@@ -148,10 +160,18 @@ impl Tile {
                         self.bank_events[bank].accumulates += 1;
                         self.outer(bank, column)
                     }
-                    UpdKind::Write | UpdKind::Add => std::mem::take(&mut self.sum[bank][at]),
+                    UpdKind::Write | UpdKind::Add => {
+                        let sum = self.asking(bank, self.upd.row, column);
+                        self.sum[bank][at] = 0;
+                        sum
+                    }
                 };
                 let word = draws.get(column).copied().unwrap_or(0);
-                let pulses = self.bounded(bank, at, sum * self.config.mantissa, word);
+                let pulses = if self.config.more.sign {
+                    self.towards(bank, sum, word)
+                } else {
+                    self.bounded(bank, at, sum * self.config.mantissa, word)
+                };
                 self.pulse[bank][column] = pulses;
                 self.peak_set = self.peak_set.max(pulses);
                 self.peak_reset = self.peak_reset.max(-pulses);
@@ -202,7 +222,8 @@ impl Tile {
     /// `SR(total, k)`, `F` bits finer.
     fn rounded(&self, total: i64, word: u16, fraction: u32) -> i64 {
         let dither = self.config.dither_bits;
-        let shift = i64::from(self.upd.shift + self.config.more.shift_extra);
+        let finer = self.config.more.centred.unwrap_or(0);
+        let shift = i64::from(self.upd.shift + self.config.more.shift_extra + finer);
         let shift = shift - i64::from(fraction) - i64::from(dither);
         let q = match u32::try_from(shift) {
             Ok(right) => rsh(total, right),

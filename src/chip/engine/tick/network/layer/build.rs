@@ -4,6 +4,7 @@
 use std::ops::Range;
 
 use super::super::super::tile::{More, TileAdc, TileConfig};
+use crate::chip::crossbar::kernel::MEAN_BITS;
 use crate::chip::hardware::{Adc, FloorKind, Hardware, Subtract, Timing, WriteScheme};
 use crate::chip::layer::Layer;
 use crate::chip::population::Stream;
@@ -71,6 +72,9 @@ pub(super) fn config(
             verify: timing.verify,
             active_max: timing.active_max.map(small),
             pulse_code: timing.pulse_code,
+            sign: layer.requests.optimiser.is_sign(),
+            looks: layer.requests.optimiser.looks_at_layer(),
+            centred: layer.requests.window_log2.map(|_| MEAN_BITS),
             train_slots: match hardware.write.scheme {
                 WriteScheme::Rounded => None,
                 WriteScheme::Trains { slots_log2 } => Some(1 << slots_log2),

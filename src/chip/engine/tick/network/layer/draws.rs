@@ -2,9 +2,15 @@
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
 use super::TickLayer;
-use crate::chip::hardware::DitherPattern;
+use crate::chip::hardware::{DitherPattern, Hardware};
+use crate::chip::layer::Layer;
 use crate::num::draw::{Place, Site};
 use crate::num::fixed::rsh;
+
+/// Bits of a word of a layer's writes.
+pub(super) fn bits(hardware: &Hardware, layer: &Layer) -> u32 {
+    if layer.requests.optimiser.is_sign() { 16 } else { hardware.write.dither_bits.get() }
+}
 
 impl TickLayer {
     /// The draws of the row that a tile is about to write.
