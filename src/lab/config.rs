@@ -34,6 +34,7 @@ pub use file::{ExperimentFile, HardwareFile};
 pub use hardware::{Model, builtin_models, load_model, model_names};
 pub use law::{Law, Setting, SettingValue};
 pub use layers::{Overlay, Sources, anchor, load, overlay, setting, setting_table};
+pub(crate) use policy::PolicySettings;
 pub use quantity::{
     Constant, Constants, CostClass, CostTable, Kind, Per, QUANTITIES, Quantity, Standing,
 };

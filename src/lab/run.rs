@@ -14,6 +14,7 @@ mod session;
 mod task;
 mod train;
 mod verify;
+mod watch;
 mod weigh;
 
 pub use notes::notes;
@@ -27,6 +28,7 @@ pub use train::{
     Keeping, RunEvent, Trained, address_of, carry_on, configuration, evaluate, resume, train,
 };
 pub use verify::{Verdict, verify};
+pub use watch::{Watched, watch};
 pub use weigh::Memory;
 pub(crate) use weigh::weigh;
 

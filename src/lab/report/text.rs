@@ -6,7 +6,7 @@ use super::RunView;
 use super::number::{quotient, short_with};
 use crate::lab::config::absent_words;
 use crate::lab::price::{Cost, PerPiece, prefixed};
-use crate::lab::store::record::{EpochRecord, Score};
+use crate::lab::store::record::{EpisodesRecord, EpochRecord, PolicyOutcome, Score};
 use crate::learn::statistics::PathwayRecord;
 
 /// Heads of the columns and how wide the columns are.
@@ -205,6 +205,34 @@ fn image(one: &PerPiece) -> String {
     }
 }
 
+/// Returns of a policy: while learning, without, and of the final test.
+fn returns(out: &mut String, view: &RunView<'_>, last: &PolicyOutcome) {
+    let mut line = |name: &str, mean: Option<f64>, note: &str| {
+        if let Some(mean) = mean {
+            let _ = writeln!(out, "{name:<11} {mean:>9.2}  {note}");
+        }
+    };
+    let episodes = |all: &EpisodesRecord| {
+        let range = all
+            .return_range
+            .map_or_else(String::new, |[_, least, most]| format!(", {least:.2} to {most:.2}"));
+        format!("mean of {} {} episodes{range}", all.episodes(), all.played())
+    };
+    let note = format!("mean of {} episodes while learning in the last epoch", last.returns.count);
+    line("learning", last.episodic_return, &note);
+    line("evaluated", last.evaluation.mean(), &episodes(&last.evaluation));
+    if let Some(test) = view.receipt.played() {
+        let note = format!(
+            "{}; {} state, after epoch {} and {} steps",
+            episodes(&test.episodes),
+            test.select,
+            test.epoch,
+            test.steps
+        );
+        line("test", test.episodes.mean(), &note);
+    }
+}
+
 fn percent(part: u64, whole: u64) -> String {
     quotient(part, whole).map_or("-".into(), |share| format!("{:.1}", 100.0 * share))
 }
@@ -221,6 +249,10 @@ fn accuracies(out: &mut String, view: &RunView<'_>, last: &EpochRecord) {
             );
         }
     };
+    if let Some(outcome) = last.policy() {
+        returns(out, view, outcome);
+        return;
+    }
     score("train", last.train(), &format!("while learning in epoch {}", last.epoch));
     score("validation", last.validation(), &format!("after epoch {}", last.epoch));
     if let Some(test) = view.receipt.classified() {

@@ -18,7 +18,7 @@ use crate::learn::error::Centre;
 use crate::learn::rule::Rule;
 use crate::num::fixed::{Batch, RateMantissa};
 use crate::task::environment::{self, EnvSpec, Real, Taken};
-use crate::task::policy::{Evaluating, Evolution, InputCoding, Method, Ppo, Share};
+use crate::task::policy::{Evaluating, Evolution, Method, Ppo, Share};
 
 mod network;
 
