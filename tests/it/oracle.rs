@@ -8,7 +8,7 @@ use dalean::chip::engine::Phase;
 use dalean::chip::hardware::{
     Adc, AdcRange, DitherBits, DitherPattern, FloorKind, Hardware, Subtract, Window,
 };
-use dalean::chip::layer::{DrivenBy, LayerSpec};
+use dalean::chip::layer::{DrivenBy, LayerSpec, Optimiser};
 use dalean::chip::ledger::{During, Event};
 use dalean::chip::population::Wiring;
 use dalean::learn::error::Centre;

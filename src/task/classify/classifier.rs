@@ -13,7 +13,7 @@ use crate::learn::network::NetworkError;
 ///
 /// ```
 /// use dalean::network::{Activation, Centre, Decay, DrivenBy, LayerSpec, Route, Rule, UpdateMode, Wiring};
-/// use dalean::network::{Batch, Positive, RateMantissa};
+/// use dalean::network::{Batch, Optimiser, Positive, RateMantissa};
 /// use dalean::{Backend, Classifier, Examples, Experiment, Hardware, NetworkSpec};
 ///
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {

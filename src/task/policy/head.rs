@@ -3,7 +3,8 @@
 //! Discrete actions, logits `x`:
 //!
 //! ```text
-//! pi_j     = exp(x_j - max) / sum exp(x_i - max)            floored to 2^-31; what is missing goes to the first greatest: the sum is 1
+//! pi_j     = exp(x_j - max) / sum exp(x_i - max)            down to 2^-31; what is missing goes to the first greatest: the sum is 1.
+//!                                                           error < 2^-30 + pi_j 2^-21; of the greatest, 2^-30 an action
 //! ln pi_j  = (x_j - max) - ln sum                           error < 2^-20
 //! H        = - sum pi_j ln pi_j                             error < 2^-20 (1 + H)
 //! e_j      = weight (1[j = a] - pi_j) - beta pi_j (ln pi_j + H)        clamped to +-4
@@ -178,5 +179,211 @@ impl Scatter {
         let widen = i128::from(weight) * i128::from(z * z - (1 << 54));
         let widen = widen + (i128::from(beta.to_bits()) << 43);
         [rsh(pull, 53), rsh(widen, 54)].map(|error| bounded(error as i64))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::LazyLock;
+
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::num::tables::precise::{self, BITS, ONE, div, mul};
+
+    static TABLES: LazyLock<PolicyTables> = LazyLock::new(PolicyTables::build);
+
+    /// A number with `bits` bits behind the point, as the reference has it.
+    fn wide(x: i64, bits: u32) -> i128 {
+        i128::from(x) << (BITS - bits)
+    }
+
+    fn logits(bits: &[i32]) -> Vec<Logit> {
+        bits.iter().map(|&bits| Logit::from_bits(bits)).collect()
+    }
+
+    /// Probabilities, their logarithms, entropy.
+    fn softmax_of(logits: &[Logit]) -> (Vec<Probability>, Vec<LogProbability>, Entropy) {
+        let mut probabilities = vec![Probability::ZERO; logits.len()];
+        let mut logs = vec![LogProbability::ZERO; logits.len()];
+        let entropy = softmax(&TABLES, logits, &mut probabilities, &mut logs);
+        (probabilities, logs, entropy)
+    }
+
+    #[test]
+    fn the_first_greatest_takes_what_rounding_leaves() {
+        let (p, log, entropy) = softmax_of(&logits(&[-9, 5, 5, -9 << 20, 5]));
+        let bits: Vec<u32> = p.iter().map(|p| p.to_bits()).collect();
+        assert_eq!(bits.iter().map(|&p| u64::from(p)).sum::<u64>(), 1 << 31);
+        assert!(
+            bits[1] >= bits[2] && bits[1] - bits[2] < 5 && bits[2] == bits[4] && bits[0] < bits[4]
+        );
+        assert!(log[1] == log[2] && log[0] < log[1] && log[3] < -10 && entropy > 1);
+        let (p, log, entropy) = softmax_of(&logits(&[i32::MIN]));
+        assert_eq!(
+            (p[0], log[0], entropy),
+            (Probability::ONE, LogProbability::ZERO, Entropy::ZERO)
+        );
+        let (p, log, entropy) = softmax_of(&logits(&[i32::MIN, i32::MAX]));
+        assert_eq!(
+            (p[0], p[1], log[1], entropy),
+            (Probability::ZERO, Probability::ONE, LogProbability::ZERO, Entropy::ZERO)
+        );
+        assert_eq!(log[0].to_bits(), (1 - (1 << 32)) << 6);
+    }
+
+    #[test]
+    #[should_panic(expected = "one an action")]
+    fn a_softmax_has_one_probability_an_action() {
+        softmax(
+            &TABLES,
+            &[Logit::ZERO; 2],
+            &mut [Probability::ZERO; 1],
+            &mut [LogProbability::ZERO; 2],
+        );
+    }
+
+    #[test]
+    #[should_panic(expected = "one an action")]
+    fn a_softmax_has_one_logarithm_an_action() {
+        softmax(
+            &TABLES,
+            &[Logit::ZERO; 2],
+            &mut [Probability::ZERO; 2],
+            &mut [LogProbability::ZERO; 1],
+        );
+    }
+
+    #[test]
+    fn errors_are_held_within_four() {
+        let (p, log, entropy) = softmax_of(&logits(&[0, 0]));
+        let softmax = Softmax { probabilities: &p, logs: &log, entropy };
+        let mut errors = [OutputError::ZERO; 2];
+        discrete_errors(&softmax, 1, Advantage::from_num(7), Probability::ZERO, &mut errors);
+        assert_eq!(errors, [-7, 7].map(|halves| OutputError::from_bits(halves << 19)));
+        discrete_errors(&softmax, 0, Advantage::from_num(9), Probability::ONE, &mut errors);
+        assert_eq!(errors, [4, -4].map(OutputError::from_num));
+        let scatter = Scatter::new(&TABLES, LogDeviation::ZERO);
+        let [mean, log] =
+            scatter.errors(Logit::from_num(9), Logit::ZERO, Advantage::ONE, Probability::ZERO);
+        assert_eq!((mean, log), (OutputError::from_num(4), OutputError::from_num(4)));
+        let held = scatter.errors(
+            Logit::from_num(-9),
+            Logit::ZERO,
+            Advantage::from_bits(-1 << 18),
+            Probability::ZERO,
+        );
+        assert_eq!(held, [4, -15].map(|quarters| OutputError::from_bits(quarters << 18)));
+    }
+
+    #[test]
+    fn a_deviation_ends_where_it_says() {
+        let ends =
+            [(i32::MIN, -4 << 20), (-4 << 20, -4 << 20), (1 << 20, 1 << 20), (i32::MAX, 1 << 20)];
+        for (asked, kept) in ends {
+            let scatter = Scatter::new(&TABLES, LogDeviation::from_bits(asked));
+            assert_eq!(scatter.log().to_bits(), kept);
+            assert_eq!(scatter, Scatter::new(&TABLES, LogDeviation::from_bits(kept)));
+        }
+        let one = Scatter::new(&TABLES, LogDeviation::ZERO);
+        assert_eq!((one.deviation(), one.precision), (Deviation::ONE, Precision::ONE));
+        // ln(2 pi e) / 2 = 1.41893853320467
+        let exact = (1_418_938_533_205i64 << 20) / 10i64.pow(12);
+        assert_eq!(i64::from(one.entropy().to_bits()), exact + 1);
+        let wide = Scatter::new(&TABLES, LogDeviation::ONE);
+        assert_eq!(wide.entropy(), one.entropy() + Entropy::ONE);
+    }
+
+    #[test]
+    fn distances_saturate() {
+        for log in [-4 << 20, 0, 1 << 20] {
+            let scatter = Scatter::new(&TABLES, LogDeviation::from_bits(log));
+            assert_eq!(scatter.distance(Logit::MAX, Logit::MIN), Normal::MAX);
+            assert_eq!(scatter.distance(Logit::MIN, Logit::MAX), -Normal::MAX);
+            assert_eq!(scatter.distance(Logit::from_bits(5), Logit::from_bits(5)), Normal::ZERO);
+        }
+        let wide = Scatter::new(&TABLES, LogDeviation::ONE);
+        assert_eq!(wide.distance(Logit::from_num(44), Logit::ZERO), Normal::MAX);
+        assert!(wide.distance(Logit::from_num(43), Logit::ZERO) < Normal::MAX);
+    }
+
+    proptest! {
+        #[test]
+        fn softmax_and_its_errors_are_within_their_bounds(
+            bits in prop::collection::vec(any::<i32>(), 1..12), scale in 6u32..20,
+            action: prop::sample::Index, weight in -128i32 << 20..=128 << 20, small in 0u32..12, beta in 0u32..1 << 31,
+        ) {
+            let logits = logits(&bits.iter().map(|x| x >> scale).collect::<Vec<_>>());
+            let (action, weight) = (action.index(logits.len()), weight >> small);
+            let (p, log, entropy) = softmax_of(&logits);
+            let max = logits.iter().max().unwrap();
+            let below: Vec<i128> =
+                logits.iter().map(|x| wide(i64::from(x.to_bits()) - i64::from(max.to_bits()), 20)).collect();
+            let powers: Vec<i128> = below.iter().map(|&x| precise::exp(x.max(-60 * ONE))).collect();
+            let sum: i128 = powers.iter().sum();
+            let exact: Vec<i128> = powers.iter().map(|&e| div(e, sum)).collect();
+            let logs: Vec<i128> = below.iter().map(|x| x - precise::ln(sum)).collect();
+            let exact_entropy: i128 = exact.iter().zip(&logs).map(|(&p, &log)| -mul(p, log.max(-70 * ONE))).sum();
+
+            prop_assert_eq!(p.iter().map(|p| u64::from(p.to_bits())).sum::<u64>(), 1 << 31);
+            for (j, (p, exact)) in p.iter().zip(&exact).enumerate() {
+                let off = (wide(p.to_bits().into(), 31) - exact).abs();
+                let steps = if logits[j] == *max { 2 * bits.len() as i128 } else { 2 };
+                prop_assert!(off <= (steps << (BITS - 31)) + (exact >> 21), "{off}");
+            }
+            for (log, exact) in log.iter().zip(&logs) {
+                let off = (wide(log.to_bits(), 26) - exact).abs();
+                prop_assert!(off < ONE >> 20, "{off}");
+            }
+            let off = (wide(entropy.to_bits().into(), 20) - exact_entropy).abs();
+            prop_assert!(off < (ONE + exact_entropy) >> 20, "{off}");
+
+            let mut errors = vec![OutputError::ZERO; logits.len()];
+            let softmax = Softmax { probabilities: &p, logs: &log, entropy };
+            discrete_errors(&softmax, action, Advantage::from_bits(weight), Probability::from_bits(beta), &mut errors);
+            let weight = wide(weight.into(), 20);
+            for (j, error) in errors.iter().enumerate() {
+                let taken = if j == action { ONE } else { 0 };
+                let spread = mul(exact[j], logs[j].max(-70 * ONE) + exact_entropy);
+                let e = mul(weight, taken - exact[j]) - mul(wide(beta.into(), 31), spread);
+                let off = (wide(error.to_bits().into(), 20) - e.clamp(-4 * ONE, 4 * ONE)).abs();
+                prop_assert!(off <= (ONE >> 19) + (weight.abs() >> 21), "{off}");
+            }
+        }
+
+        #[test]
+        fn a_gaussian_is_within_its_bounds(
+            log in -4i32 << 20..=1 << 20, mean in -8i32 << 20..8 << 20, apart in -45i32 << 20..45 << 20, near in 0u32..12,
+            weight in -128i32 << 20..=128 << 20, small in 0u32..12, beta in 0u32..1 << 31,
+        ) {
+            let (apart, weight) = (apart >> near, weight >> small);
+            let scatter = Scatter::new(&TABLES, LogDeviation::from_bits(log));
+            let (tried, mean) = (Logit::from_bits(mean + apart), Logit::from_bits(mean));
+            let (ln_s, s) = (wide(log.into(), 20), precise::exp(wide(log.into(), 20)));
+            let off = (wide(scatter.deviation().to_bits().into(), 30) - s).abs();
+            prop_assert!(off <= s >> 21, "{off}");
+
+            let z = div(wide(apart.into(), 20), s).clamp(-16 * ONE, 16 * ONE);
+            let z_bound = (ONE >> 27) + (z.abs() >> 21);
+            let off = (wide(scatter.distance(tried, mean).to_bits().into(), 27) - z).abs();
+            prop_assert!(off <= z_bound, "{off}");
+            let density = -mul(z, z) / 2 - ln_s;
+            let off = (wide(scatter.log_density(tried, mean).to_bits(), 26) - density).abs();
+            prop_assert!(off <= mul(z.abs(), z_bound) + (ONE >> 26), "{off}");
+
+            let errors = scatter.errors(tried, mean, Advantage::from_bits(weight), Probability::from_bits(beta));
+            let z = z.clamp(-4 * ONE, 4 * ONE);
+            let weight = wide(weight.into(), 20);
+            let pull = div(mul(weight, z), s);
+            let widen = mul(weight, mul(z, z) - ONE) + wide(beta.into(), 31);
+            let bounds = [
+                (ONE >> 20) + div(mul(weight.abs(), (z.abs() >> 20) + (ONE >> 27)), s),
+                (ONE >> 20) + (weight.abs() >> 15),
+            ];
+            for ((error, exact), bound) in errors.iter().zip([pull, widen]).zip(bounds) {
+                let off = (wide(error.to_bits().into(), 20) - exact.clamp(-4 * ONE, 4 * ONE)).abs();
+                prop_assert!(off <= bound, "{off} {bound}");
+            }
+        }
     }
 }

@@ -107,3 +107,119 @@ impl Moved {
         self.divergence += above - 2 * i64::from(d.to_bits());
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::sync::LazyLock;
+
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::num::tables::precise::{self, BITS};
+
+    static TABLES: LazyLock<PolicyTables> = LazyLock::new(PolicyTables::build);
+
+    const FIFTH: Clip = Clip { epsilon: Ratio::from_bits(26_843_546) };
+
+    #[test]
+    fn a_ratio_lies_between_a_sixteenth_and_sixteen() {
+        let log = |now, before| {
+            log_ratio(LogProbability::from_bits(now), LogProbability::from_bits(before))
+        };
+        let bound = LogRatio::from_bits(185_891_553);
+        assert_eq!(
+            [log(i64::MAX, i64::MIN), log(185_891_554, 0), log(0, -185_891_553)],
+            [bound; 3]
+        );
+        assert_eq!(
+            [log(i64::MIN, i64::MAX), log(-185_891_554, 0), log(-185_891_552, 1)],
+            [-bound; 3]
+        );
+        assert_eq!((log(7, 5).to_bits(), log(-3, 5).to_bits()), (2, -8));
+        assert_eq!(ratio(&TABLES, LogRatio::ZERO), Ratio::ONE);
+        assert!(ratio(&TABLES, bound) < 16 && ratio(&TABLES, -bound) * 16 > 1);
+        assert_eq!(ratio(&TABLES, LogRatio::MAX), ratio(&TABLES, bound));
+        assert_eq!(ratio(&TABLES, LogRatio::MIN), ratio(&TABLES, -bound));
+    }
+
+    #[test]
+    fn what_went_far_enough_its_way_is_clipped_and_nothing_else() {
+        let (most, least) = ((1 << 27) + 26_843_546, (1 << 27) - 26_843_546);
+        let at = |ratio, advantage| {
+            let (ratio, advantage) = (Ratio::from_bits(ratio), Advantage::from_num(advantage));
+            let (clips, weight) = (FIFTH.clips(ratio, advantage), FIFTH.weight(ratio, advantage));
+            assert_eq!(clips, weight == 0 && advantage != 0);
+            clips
+        };
+        assert_eq!(
+            [(most, 1), (most + 1, 1), (least - 1, 1)].map(|(r, a)| at(r, a)),
+            [false, true, false]
+        );
+        assert_eq!(
+            [(least, -1), (least - 1, -1), (most + 1, -1)].map(|(r, a)| at(r, a)),
+            [false, true, false]
+        );
+        assert_eq!(
+            [(most + 1, 0), (least - 1, 0), (1 << 27, 0)].map(|(r, a)| at(r, a)),
+            [false; 3]
+        );
+        let outside = |r| FIFTH.outside(Ratio::from_bits(r));
+        assert_eq!([most, most + 1, least, least - 1].map(outside), [false, true, false, true]);
+        let all = Clip { epsilon: Ratio::MAX };
+        assert!(!all.outside(Ratio::MAX) && !all.outside(Ratio::ZERO));
+    }
+
+    #[test]
+    fn a_clip_takes_the_lower_of_two_gains() {
+        let gain = |r: i32, a| FIFTH.gain(Ratio::from_num(r), Advantage::from_num(a));
+        let near = |x: Advantage, tenths: i32| {
+            (x * 10 - Advantage::from_num(tenths)).abs() < Advantage::from_bits(64)
+        };
+        assert!(near(gain(2, 5), 60) && near(gain(0, -5), -40));
+        assert_eq!(
+            (gain(2, -5), gain(0, 5), gain(1, 5)),
+            (Advantage::from_num(-10), Advantage::ZERO, Advantage::from_num(5))
+        );
+        assert_eq!(FIFTH.weight(Ratio::from_num(16), Advantage::MIN), Advantage::MIN);
+    }
+
+    #[test]
+    fn what_moved_is_summed_up() {
+        let mut moved = Moved::default();
+        let d = LogRatio::from_bits(1 << 25);
+        let r = ratio(&TABLES, d);
+        moved.add(FIFTH, LogRatio::ZERO, Ratio::ONE);
+        moved.add(FIFTH, d, r);
+        // sqrt(e) - 1 - 1/2 = 0.1487212707
+        let divergence = 19_961_031;
+        assert_eq!((moved.actions, moved.outside), (2, 1));
+        assert!((moved.divergence - divergence).abs() < 64, "{}", moved.divergence);
+        moved.add(FIFTH, -d, ratio(&TABLES, -d));
+        // exp(-1/2) - 1 + 1/2 = 0.1065306597
+        assert!((moved.divergence - divergence - 14_298_303).abs() < 128, "{}", moved.divergence);
+        assert_eq!((moved.actions, moved.outside), (3, 2));
+    }
+
+    proptest! {
+        #[test]
+        fn a_ratio_is_within_its_bound(d in -LOG_BOUND..=LOG_BOUND) {
+            let got = ratio(&TABLES, LogRatio::from_bits(d as i32));
+            let exact = precise::exp(i128::from(d) << (BITS - 26));
+            let off = (i128::from(got.to_bits()) << (BITS - 27)) - exact;
+            prop_assert!(off.abs() < exact >> 21, "{off}");
+        }
+
+        #[test]
+        fn a_weight_is_the_product_or_nothing(ratio: u32, advantage in -8i32 << 20..=8 << 20) {
+            let (r, a) = (Ratio::from_bits(ratio), Advantage::from_bits(advantage));
+            let twice = 2 * i64::from(ratio) * i64::from(advantage);
+            let weight = i64::from(FIFTH.weight(r, a).to_bits()) << 28;
+            prop_assert!(FIFTH.clips(r, a) || (weight - twice).abs() <= 1 << 27);
+            // the gain follows the ratio where the weight is not 0
+            let product = (twice + (1 << 27)) >> 28;
+            let gain = i64::from(FIFTH.gain(r, a).to_bits());
+            let follows = if FIFTH.clips(r, a) { gain <= product } else { gain == product };
+            prop_assert!(follows);
+        }
+    }
+}

@@ -109,3 +109,128 @@ impl State for ValueScale {
 pub fn value_error(target: Value, said: Value) -> OutputError {
     bounded(i64::from(target.to_bits()) - i64::from(said.to_bits()))
 }
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    fn values(bits: &[i32]) -> Vec<Value> {
+        bits.iter().map(|&bits| Value::from_bits(bits)).collect()
+    }
+
+    #[test]
+    fn before_the_first_update_a_value_is_what_the_critic_says() {
+        let scale = ValueScale::new(16);
+        for bits in [-(4 << 20), -1, 0, 1, 4 << 20] {
+            let value = Value::from_bits(bits);
+            assert_eq!((scale.to_standard(value), scale.to_value(value)), (value, value));
+        }
+        let mut same = scale;
+        same.update(&[]);
+        assert_eq!(same, scale);
+    }
+
+    #[test]
+    fn the_scale_is_that_of_the_targets() {
+        let mut scale = ValueScale::new(16);
+        // mean 10, deviation 2
+        scale.update(&values(&[8 << 20, 12 << 20]));
+        let at = |x: i32| scale.to_standard(Value::from_num(x)).to_bits();
+        assert_eq!(
+            [1, 2, 9, 10, 18, 19].map(at),
+            [-4 << 20, -4 << 20, -1 << 19, 0, 4 << 20, 4 << 20]
+        );
+        let back = |x: i32| scale.to_value(Value::from_bits(x)).to_bits();
+        assert_eq!([-1 << 20, 0, 3 << 19].map(back), [8 << 20, 10 << 20, 13 << 20]);
+        assert_eq!(
+            (scale.to_value(Value::MAX), scale.to_value(Value::MIN)),
+            (Value::MAX, Value::MIN)
+        );
+    }
+
+    #[test]
+    fn targets_that_are_alike_ask_for_nothing() {
+        let mut scale = ValueScale::new(2);
+        for _ in 0..5 {
+            scale.update(&values(&[-77; 3]));
+        }
+        assert_eq!(scale.to_standard(Value::MAX), Value::ZERO);
+        assert_eq!(scale.to_value(Value::MAX), Value::from_bits(-77));
+    }
+
+    #[test]
+    fn older_targets_fade_once_the_window_is_full() {
+        let mut scale = ValueScale::new(2);
+        let means = [8, 16, 4, 0].map(|x: i32| {
+            scale.update(&values(&[x << 20]));
+            scale.mean >> 36
+        });
+        // 8;  (8 + 16) / 2;  (12 + 4) / 2;  (8 + 0) / 2
+        assert_eq!(means, [8, 12, 8, 4]);
+        // squares: 64, (64 + 256) / 2, (160 + 16) / 2, 88 / 2
+        assert_eq!(scale.squares, 44 << 72);
+        assert_eq!(scale.spread, Spread::new(4 << 36, 28 << 72, 1 << 16));
+    }
+
+    #[test]
+    fn what_no_values_have_is_refused() {
+        let mut scale = ValueScale::new(3);
+        scale.update(&values(&[1, i32::MIN, 5 << 20]));
+        let [high, low] = pieces(scale.squares);
+        let own = [1, scale.mean, high, low];
+        assert_eq!(ValueScale::from_numbers(3, &own), Some(scale));
+        assert_eq!(ValueScale::from_numbers(3, &[0; 4]), Some(ValueScale::new(3)));
+        let most = [1, i64::from(i32::MIN) << 16, 1 << 31, 0];
+        assert!(ValueScale::from_numbers(3, &most).is_some());
+        for wrong in [
+            [-1, 0, 0, 0],
+            [0, 1, 0, 0],
+            [0, 0, 0, 1],
+            [1 << 32, 0, 0, 0],
+            [1, most[1] - 1, 0, 0],
+            [1, -most[1] + 1, 0, 0],
+            [1, 0, 1 << 31, 1],
+            [1, 0, -1, 0],
+            [1, 0, 0, -1],
+        ] {
+            assert_eq!(ValueScale::from_numbers(3, &wrong), None, "{wrong:?}");
+        }
+        assert_eq!(ValueScale::from_numbers(3, &own[..3]), None);
+    }
+
+    #[test]
+    fn the_error_of_a_critic_is_bounded() {
+        let error =
+            |target, said| value_error(Value::from_bits(target), Value::from_bits(said)).to_bits();
+        assert_eq!(
+            [error(5, 3), error(3, 5), error(i32::MAX, i32::MIN), error(i32::MIN, i32::MAX)],
+            [2, -2, 4 << 20, -4 << 20]
+        );
+    }
+
+    proptest! {
+        #[test]
+        fn mean_and_squares_follow_their_equations(
+            rollouts in prop::collection::vec(prop::collection::vec(any::<i32>(), 1..5), 1..12), window in 1u32..6,
+        ) {
+            let mut scale = ValueScale::new(window);
+            let (mut mean, mut squares) = (0i128, 0i128); // 2^-40 and 2^-32 steps
+            for (update, rollout) in (1..).zip(&rollouts) {
+                scale.update(&values(rollout));
+                let (n, part) = (rollout.len() as i128, i128::from(window).min(update));
+                let sum: i128 = rollout.iter().map(|&x| i128::from(x)).sum();
+                let sum_squares: i128 = rollout.iter().map(|&x| i128::from(x).pow(2)).sum();
+                mean += ((sum << 40) / n - mean) / part;
+                squares += ((sum_squares << 32) / n - squares) / part;
+            }
+            // every update rounds by half a step, a rollout's mean by half, its squares by one, and all of them fade
+            let rounds = 2 * rollouts.len() as i128;
+            prop_assert!(((i128::from(scale.mean) << 24) - mean).abs() <= rounds << 24);
+            prop_assert!((scale.squares - squares).abs() <= 2 * rounds);
+            let apart = (scale.squares - i128::from(scale.mean).pow(2)).max(0).unsigned_abs();
+            prop_assert_eq!(scale.spread, Spread::new(scale.mean, apart, 1 << 16));
+        }
+    }
+}

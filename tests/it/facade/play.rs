@@ -11,8 +11,8 @@ use dalean::hardware::{
     SliceTimes, Subtract, TileSpec, Timing, Window, WriteScheme, WriteSpec,
 };
 use dalean::network::{
-    Activation, Augment, Batch, Centre, Decay, DrivenBy, LayerSpec, Positive, RateMantissa, Route,
-    Rule, UpdateMode, Wiring,
+    Activation, Augment, Batch, Centre, Decay, DrivenBy, LayerSpec, Optimiser, Positive,
+    RateMantissa, Route, Rule, UpdateMode, Wiring,
 };
 use dalean::{
     Backend, Classifier, Config, Data, DataRoot, Examples, Experiment, Hardware, HardwareSpec,

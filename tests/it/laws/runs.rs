@@ -2,7 +2,7 @@
 
 use dalean::chip::crossbar::kernel::Backend;
 use dalean::chip::hardware::{Adc, AdcRange, HardwareSpec};
-use dalean::chip::layer::{DrivenBy, LayerSpec};
+use dalean::chip::layer::{DrivenBy, LayerSpec, Optimiser};
 use dalean::chip::population::Wiring;
 use dalean::lab::store::checkpoint::{self, Identity};
 use dalean::lab::store::hash;
