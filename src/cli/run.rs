@@ -107,10 +107,10 @@ pub(super) fn stop_flag() -> Arc<AtomicBool> {
 /// Asks whether the user wants to stop. Signals are caught from the first question on: before, while files are read and
 /// networks built, there is nothing to keep, and a signal ends the program as it ends any other.
 #[derive(Debug, Default)]
-struct Stop(OnceLock<Arc<AtomicBool>>);
+pub(super) struct Stop(OnceLock<Arc<AtomicBool>>);
 
 impl Stop {
-    fn asked(&self) -> bool {
+    pub(super) fn asked(&self) -> bool {
         self.0.get_or_init(stop_flag).load(Ordering::SeqCst)
     }
 }

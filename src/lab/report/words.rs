@@ -119,8 +119,28 @@ pub(super) const COLUMNS: &[(&str, &str)] = &[
         "train_accuracy",
         "Right answers given while learning in the last epoch, each before its example was learnt from.",
     ),
+    (
+        "return_mean",
+        "Mean return of the episodes of the final test, by the last state; they are played once, at the end.",
+    ),
+    ("return_least", "Of these episodes, the least."),
+    ("return_most", "Of these episodes, the greatest."),
+    (
+        "return_evaluated",
+        "Mean return of the episodes after the last epoch, without learning. Whatever is chosen is chosen by it.",
+    ),
+    (
+        "return_learning",
+        "Mean return of the episodes that ended in the last epoch, with actions drawn.",
+    ),
+    ("steps", "Steps of all environments that were learnt from."),
+    ("entropy", "Entropy of what the actor puts out, mean of the last epoch, in nats."),
+    (
+        "explained_variance",
+        "1 less the share of the variance of value targets that the critic leaves, of the last rollout.",
+    ),
     ("test_epoch", "After which epoch the state stood that read the test set."),
-    ("epochs", "Passes over the training examples."),
+    ("epochs", "Passes over the training examples; of policies, so many rollouts each."),
     ("updates", "Learning steps."),
     ("cells", "Devices, each with an unsigned level."),
     (
@@ -170,6 +190,23 @@ pub(super) const COLUMNS: &[(&str, &str)] = &[
     ("read_joules_digital", "Of that, what adders, tables, multipliers, buses and memories take."),
     ("read_joules_static", "Of that, what is on whether anything happens or not."),
     ("read_seconds", "Time to read an image: that of the evaluation over its images."),
+    (
+        "update_joules",
+        "Energy of an update of both networks: that of the training, its rollouts included, over the updates. Empty where parts have no price.",
+    ),
+    ("update_seconds", "Time of an update: that of the training over the updates."),
+    (
+        "decision_joules",
+        "Energy of a decision: that of the evaluation over its steps. Empty where parts have no price.",
+    ),
+    ("decision_joules_device", "Of that, what cells, their lines, light and heat take."),
+    ("decision_joules_converter", "Of that, what row drivers, converters and receivers take."),
+    (
+        "decision_joules_digital",
+        "Of that, what adders, tables, multipliers, buses and memories take.",
+    ),
+    ("decision_joules_static", "Of that, what is on whether anything happens or not."),
+    ("decision_seconds", "Time of a decision: that of the evaluation over its steps."),
     ("converters_mm2", "Area of all converters of the tiles that the network takes, typical."),
     ("status", "Finished, planned, or refused: the configuration fits neither chip nor data."),
     ("hardware", "Name of the chip, and of what was changed of it."),

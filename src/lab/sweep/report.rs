@@ -82,7 +82,8 @@ struct Known {
 /// What the runs of some rows knew after each epoch. A run whose records cannot be read is one without: its row says by
 /// itself what came out of it.
 fn learning(store: &Store, found: &Results, rows: &[usize]) -> Learning {
-    let mut learning = Learning { label: String::new(), rows: vec![Vec::new(); found.table.len()] };
+    let rows_of = vec![Vec::new(); found.table.len()];
+    let mut learning = Learning { label: String::new(), shares: true, rows: rows_of };
     let (Some(keys), Some(status)) = (found.table.column("key"), found.table.column("status"))
     else {
         return learning;
@@ -115,7 +116,7 @@ fn learning(store: &Store, found: &Results, rows: &[usize]) -> Learning {
         (false, true) => "validation accuracy",
         (false, false) => "accuracy while learning",
     };
-    learning.label = label.into();
+    (learning.label, learning.shares) = (label.into(), !acted);
     learning
 }
 

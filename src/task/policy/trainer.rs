@@ -132,6 +132,8 @@ pub struct WatchedStep {
     pub shown: Vec<i64>,
     /// The action: its number, or its values with 16 fractional bits.
     pub action: Vec<i64>,
+    /// Whether it is one of some actions.
+    pub discrete: bool,
     /// What the actor put out: probabilities with 31 fractional bits, or means with 20.
     pub actor: Vec<i64>,
     /// What the state is worth, in units of reward, 20 fractional bits.
