@@ -18,12 +18,13 @@ use std::ops::Range;
 use aligned_vec::{AVec, CACHELINE_ALIGN};
 
 use super::crossbar::Collect;
-use super::crossbar::kernel::{Backend, LookUp, Team};
+use super::crossbar::kernel::{Backend, Team};
 use super::crossbar::layout::BLOCK_ROWS;
 use super::hardware::Hardware;
 use super::layer::{DrivenBy, Layer};
 use super::ledger::{Cycles, During, Event, Ledger, coded};
 use super::population::{Stream, Wiring};
+use crate::num::tables::Unit;
 
 mod calibrate;
 mod columns;
@@ -32,6 +33,7 @@ mod each;
 mod error;
 mod forward;
 mod mute;
+mod normalise;
 mod optimise;
 #[cfg(test)]
 mod pairs;
@@ -49,6 +51,7 @@ mod update;
 mod words;
 
 use each::{MOVE, each};
+use forward::Units;
 use schedule::Schedule;
 
 pub use calibrate::Calibration;
@@ -172,9 +175,11 @@ struct Registers {
     gates: [Lines<i8>; 2],
     /// Drives by source stream as an update takes them: `[block][64 rows][stride]`.
     turned: [Lines<u8>; 2],
+    /// Sums by target stream, where units are normalised: they lie here until all of a stream are known.
+    unscaled: [Lines<i32>; 2],
     /// Accumulators by target stream, of the last layer.
     accumulators: [Vec<i64>; 2],
-    /// Activities by target stream, of the last layer.
+    /// Activities by target stream, of the last layer where it has some.
     activities: [Vec<u8>; 2],
     /// Row sums of the last transposed read, `[sample][rows]`.
     backward: Vec<i64>,
@@ -229,8 +234,8 @@ pub struct Engine {
     mantissas: Vec<u32>,
     unit: ErrorUnit,
     layers: Vec<Layer>,
-    /// What units hand on and how steep they are there, by layer.
-    tables: Vec<LookUp>,
+    /// What units do with their accumulators, by layer.
+    units: Vec<Units>,
     registers: Vec<Registers>,
     currents: Vec<Currents>,
     /// What layers said while they were evaluated.
@@ -266,7 +271,7 @@ impl Engine {
             if schedule.is_some() { Ledger::with_cycles(count) } else { Ledger::new(count) };
         let last = layers.len() - 1;
         let codes = |layer: usize| (layer < last).then_some(hardware.drive.bits);
-        let tables = layers.iter().zip(0..).map(|(l, at)| l.look_up(codes(at))).collect();
+        let units = layers.iter().zip(0..).map(|(l, at)| Units::new(l, codes(at))).collect();
         let collect = passes::collect(&hardware);
         Self {
             backend,
@@ -284,7 +289,7 @@ impl Engine {
             currents: vec![[[0; 2]; 2]; layers.len()],
             said: vec![mute::Said::default(); layers.len()],
             row_sums: vec![None; layers.len()],
-            tables,
+            units,
             layers,
             samples: 0,
             loaded: [0; 3],
@@ -426,7 +431,8 @@ impl Engine {
         std::mem::replace(&mut self.currents, zero)
     }
 
-    /// Accumulator and activity of a unit of the last layer, of one of its target streams.
+    /// Accumulator and activity of a unit of the last layer, of one of its target streams; a layer that is read out
+    /// (`Activation::Accumulator`) has no activities, and they are 0.
     ///
     /// # Panics
     /// When the last layer has no such stream, or has not been read.
@@ -434,7 +440,42 @@ impl Engine {
     pub fn output(&self, target: Stream, sample: usize, unit: usize) -> (i64, u8) {
         let registers = self.registers.last().expect("a network has layers");
         let (at, stream) = (self.register_at(sample, unit), target.index());
-        (registers.accumulators[stream][at], registers.activities[stream][at])
+        let activity = match self.units.last() {
+            Some(Units::Kept) => 0,
+            _ => registers.activities[stream][at],
+        };
+        (registers.accumulators[stream][at], activity)
+    }
+
+    /// What a unit of the last layer reads out: `acc_p - acc_n`, or `acc_p` where there is no stream n. Units of the
+    /// accumulator: see [`Engine::readout_unit`].
+    ///
+    /// # Panics
+    /// When the last layer has not been read.
+    #[must_use]
+    pub fn readout(&self, sample: usize, unit: usize) -> i64 {
+        let [p, n] = &self.registers.last().expect("a network has layers").accumulators;
+        let at = self.register_at(sample, unit);
+        p[at] - n.get(at).copied().unwrap_or(0)
+    }
+
+    /// Readouts of all units of the last layer for all loaded samples, `[sample][unit]`; what `out` held is lost.
+    ///
+    /// # Panics
+    /// When the last layer has not been read.
+    pub fn readouts(&self, out: &mut Vec<i64>) {
+        let units = self.layers.last().expect("a network has layers").spec.units;
+        out.clear();
+        out.reserve(self.samples * units);
+        for sample in 0..self.samples {
+            out.extend((0..units).map(|unit| self.readout(sample, unit)));
+        }
+    }
+
+    /// What one unit of a readout is worth.
+    #[must_use]
+    pub fn readout_unit(&self) -> Unit {
+        super::layer::unit(&self.layers[self.layers.len() - 1].spec, &self.hardware)
     }
 
     /// Accumulator of a unit of the last layer's p stream, which predicts.

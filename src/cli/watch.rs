@@ -13,6 +13,7 @@ use super::run::Stop;
 use super::{Done, Failure, Shared, out, say};
 use crate::lab::report::Film;
 use crate::lab::run;
+use crate::task::environment::{EnvSpec, Shown, Taken};
 use crate::task::policy::WatchedStep;
 
 #[derive(Debug, Args)]
@@ -41,6 +42,11 @@ fn real(number: i64) -> f64 {
     number as f64 / 65_536.0
 }
 
+/// A number with 20 bits behind the point.
+fn fine(number: i64) -> f64 {
+    number as f64 / 1_048_576.0
+}
+
 /// What is shown of the steps so far.
 #[derive(Debug, Default)]
 struct Screen {
@@ -51,30 +57,26 @@ struct Screen {
 
 impl Screen {
     /// A line of numbers beside a picture.
-    fn line(&self, step: &WatchedStep) -> String {
-        let actor = step.actor.iter().map(|number| {
-            // probabilities of some actions, or means of numbers
-            let discrete = step.discrete;
-            let bits = if discrete { 2f64.powi(31) } else { 2f64.powi(20) };
-            format!("{:.2}", *number as f64 / bits)
+    fn line(&self, spec: &EnvSpec, step: &WatchedStep) -> String {
+        let actor = step.actor.iter().map(|&number| format!("{:.2}", fine(number)));
+        let action = step.action.iter().map(|&number| match spec.taken {
+            Taken::Discrete(_) => number.to_string(),
+            Taken::Continuous(_) => format!("{:.2}", real(number)),
         });
-        let action: Vec<String> = match step.discrete {
-            true => step.action.iter().map(ToString::to_string).collect(),
-            false => step.action.iter().map(|&number| format!("{:.2}", real(number))).collect(),
-        };
+        let action: Vec<String> = action.collect();
         format!(
             "step {:>4}  return {:>9.2}  action {}  of {}  worth {:.2}",
             step.step,
             real(self.total),
             action.join(" "),
             actor.collect::<Vec<_>>().join(" "),
-            step.value as f64 / 2f64.powi(20)
+            fine(step.value)
         )
     }
 
     /// Draws a picture over the one before.
-    fn draw(&mut self, step: &WatchedStep) {
-        let text = format!("{}\n{}", step.picture.trim_end_matches('\n'), self.line(step));
+    fn draw(&mut self, spec: &EnvSpec, step: &WatchedStep) {
+        let text = format!("{}\n{}", step.picture.trim_end_matches('\n'), self.line(spec, step));
         let mut whole = String::new();
         if self.lines > 0 {
             whole += &format!("\u{1b}[{}A", self.lines);
@@ -87,16 +89,20 @@ impl Screen {
     }
 }
 
-fn step_json(step: &WatchedStep, total: i64) -> serde_json::Value {
+fn step_json(spec: &EnvSpec, step: &WatchedStep, total: i64) -> serde_json::Value {
     let reals = |numbers: &[i64]| numbers.iter().map(|&number| real(number)).collect::<Vec<_>>();
-    let (action, bits) = match step.discrete {
-        true => (json!(step.action.first()), 2f64.powi(31)),
-        false => (json!(reals(&step.action)), 2f64.powi(20)),
+    let action = match spec.taken {
+        Taken::Discrete(_) => json!(step.action.first()),
+        Taken::Continuous(_) => json!(reals(&step.action)),
     };
-    let actor: Vec<f64> = step.actor.iter().map(|&number| number as f64 / bits).collect();
-    json!({"event": "step", "step": step.step, "shown": reals(&step.shown), "action": action,
-        "actor": actor, "value": step.value as f64 / 2f64.powi(20), "reward": real(step.reward),
-        "return": real(total), "picture": step.picture})
+    let shown = match spec.shown {
+        Shown::Dense(_) => json!(reals(&step.shown)),
+        Shown::Sparse { .. } => json!(step.shown),
+    };
+    let actor: Vec<f64> = step.actor.iter().map(|&number| fine(number)).collect();
+    json!({"event": "step", "step": step.step, "shown": shown, "action": action, "actor": actor,
+        "value": fine(step.value), "reward": real(step.reward), "return": real(total),
+        "picture": step.picture})
 }
 
 pub(super) fn execute(args: &WatchArgs) -> Done {
@@ -107,14 +113,19 @@ pub(super) fn execute(args: &WatchArgs) -> Done {
     let mut screen = Screen::default();
     let mut steps: Vec<WatchedStep> = Vec::new();
     let mut next = Instant::now();
-    let mut look = |step: &WatchedStep| {
+    let mut last = String::new();
+    let mut look = |spec: &EnvSpec, step: &WatchedStep| {
         screen.total = screen.total.saturating_add(step.reward);
         if shared.json {
-            say(&step_json(step, screen.total).to_string());
+            say(&step_json(spec, step, screen.total).to_string());
         } else if animated {
-            screen.draw(step);
+            screen.draw(spec, step);
             next += pause;
             thread::sleep(next.saturating_duration_since(Instant::now()));
+        }
+        if !animated {
+            // what an animation would end with
+            last = format!("{}\n{}", step.picture.trim_end_matches('\n'), screen.line(spec, step));
         }
         steps.push(step.clone());
         !stop.asked() && args.steps.is_none_or(|most| (steps.len() as u64) < u64::from(most))
@@ -135,10 +146,7 @@ pub(super) fn execute(args: &WatchArgs) -> Done {
         return Ok(());
     }
     if !animated && !shared.quiet {
-        // what an animation would have ended with
-        if let Some(last) = steps.last() {
-            say(&format!("{}\n{}", last.picture.trim_end_matches('\n'), screen.line(last)));
-        }
+        say(&last);
     }
     say(&format!(
         "episode {}: {} steps, return {total:.2}, state after epoch {}",

@@ -238,6 +238,7 @@ impl From<PolicyError> for RunError {
         match error {
             PolicyError::Network(error) => error.into(),
             PolicyError::Environment(error) => Self::Environment(error),
+            PolicyError::Unknown(error) => Self::Data(DataError::Keys(error.to_string())),
             PolicyError::Stopped => unreachable!("who stops a training knows of it"),
         }
     }

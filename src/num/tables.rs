@@ -15,14 +15,16 @@
 #![expect(clippy::float_arithmetic, reason = "floats become integers here and nowhere else")]
 #![deny(clippy::disallowed_types, clippy::disallowed_methods)]
 
+mod gaussian;
 mod policy;
 #[cfg(test)]
 pub(crate) mod precise;
 
+pub use gaussian::half_gaussian;
 pub use policy::PolicyTables;
 
 use super::fixed::{
-    Batch, DriveBits, ErrorBits, LevelBits, LutBits, OutOfRange, RateMantissa, log2_ceil, narrow,
+    Batch, DriveBits, ErrorBits, LevelBits, LutBits, OutOfRange, RateMantissa, narrow,
 };
 
 /// A finite number above 0, given by the user: a width, a rate, a factor.
@@ -70,6 +72,12 @@ pub enum Activation {
     Relu,
     /// `z` in 0..=1.
     Identity,
+    /// `max(z, 0)` over its root mean square in the stream: code 32 where they are equal, derivative 1 where `z > 0`. No
+    /// table: `chip::periphery::normalise`. For layers whose units drive others.
+    Rms,
+    /// The accumulator itself, derivative 1 everywhere. No table: what is read out is `acc_p - acc_n`, or `acc_p` alone. For a
+    /// last layer.
+    Accumulator,
 }
 
 impl Activation {
@@ -77,9 +85,25 @@ impl Activation {
     fn steepness(self) -> f64 {
         match self {
             Self::Sigmoid(alpha) => 2.0 * alpha.0,
-            Self::Relu | Self::Identity => 1.0,
+            Self::Relu | Self::Identity | Self::Rms | Self::Accumulator => 1.0,
         }
     }
+
+    /// Whether accumulators are looked up in a table.
+    #[must_use]
+    pub const fn has_table(self) -> bool {
+        !matches!(self, Self::Rms | Self::Accumulator)
+    }
+}
+
+/// What code 255 on the rows of a layer stands for, whatever the bits of a drive.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum FullDrive {
+    /// 1: data, and activities of a table.
+    One,
+    /// 255/32, as 32 stands for 1: normalised activities.
+    Normalised,
 }
 
 /// What one accumulator unit stands for.
@@ -91,17 +115,61 @@ pub struct Unit {
     pub level_bits: LevelBits,
     /// Bits of a drive code.
     pub drive_bits: DriveBits,
+    /// What the greatest drive code stands for.
+    pub full_drive: FullDrive,
 }
 
 impl Unit {
     fn of_z(self) -> f64 {
         let levels = libm::exp2(f64::from(self.level_bits.get()));
-        libm::exp2(f64::from(self.weight_max_log2))
-            / (levels * f64::from(self.drive_bits.code_max()))
+        libm::exp2(f64::from(self.weight_max_log2)) / (levels * self.codes_of_one())
+    }
+
+    /// Drive codes that stand for 1.
+    fn codes_of_one(self) -> f64 {
+        let codes = f64::from(self.drive_bits.code_max());
+        match self.full_drive {
+            FullDrive::One => codes,
+            FullDrive::Normalised => codes * 32.0 / 255.0,
+        }
+    }
+
+    /// What it is worth, as numerator and denominator in lowest terms: `weight_max / (2^level_bits (2^drive_bits - 1))`, 255/32
+    /// of it behind a normalised layer.
+    #[must_use]
+    pub fn ratio(self) -> [u64; 2] {
+        let codes = u64::from(self.drive_bits.code_max());
+        let (mut above, mut below, point) = match self.full_drive {
+            FullDrive::One => (1, codes, 0),
+            FullDrive::Normalised => (255, codes, 5),
+        };
+        // 255 is 3 x 5 x 17
+        for factor in [3, 5, 17] {
+            if above % factor == 0 && below % factor == 0 {
+                (above, below) = (above / factor, below / factor);
+            }
+        }
+        let log2 = i64::from(self.weight_max_log2) - i64::from(self.level_bits.get()) - point;
+        let by = log2.unsigned_abs();
+        if log2 >= 0 { [above << by, below] } else { [above, below << by] }
+    }
+
+    /// The point of an accumulator: one unit is worth exactly `2^-point`. `None` where no power of two is: behind a
+    /// normalised layer it is one with 8 drive bits, `weight_max / (32 2^level_bits)`.
+    #[must_use]
+    pub fn point(self) -> Option<i32> {
+        let [above, below] = self.ratio();
+        match (above.is_power_of_two(), below.is_power_of_two()) {
+            (true, true) => {
+                let log2 = |n: u64| i32::try_from(n.trailing_zeros()).expect("below 64");
+                Some(log2(below) - log2(above))
+            }
+            _ => None,
+        }
     }
 }
 
-/// Activation and derivative of a layer, by table index.
+/// Activation and derivative of a layer, by table index; empty where an activation has no table.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Lut {
     /// `lut_a`: activity code at index `i + 2^(bits-1)`.
@@ -120,6 +188,9 @@ impl Lut {
             Activation::Sigmoid(alpha) => Self::sigmoid(alpha, bits, unit),
             Activation::Relu => Self::linear(bits, unit, |i| i > 0),
             Activation::Identity => Self::linear(bits, unit, |_| true),
+            Activation::Rms | Activation::Accumulator => {
+                Self { activity: vec![], derivative: vec![], shift: 0 }
+            }
         }
     }
 
@@ -129,6 +200,7 @@ impl Lut {
         match activation {
             Activation::Sigmoid(alpha) => Self::sigmoid_shift(alpha, bits, unit),
             Activation::Relu | Activation::Identity => Self::linear_shift(bits, unit),
+            Activation::Rms | Activation::Accumulator => 0,
         }
     }
 
@@ -143,11 +215,13 @@ impl Lut {
     }
 
     fn linear_shift(bits: LutBits, unit: Unit) -> u32 {
-        let codes = u64::from(unit.drive_bits.code_max());
-        let log2 = i64::from(unit.weight_max_log2) - i64::from(unit.level_bits.get());
-        // 2^(bits - 1 + lsh + log2) >= 4 (2^drive_bits - 1)
-        let least = i64::from(log2_ceil(4 * codes));
-        narrow((least - i64::from(bits.get() - 1) - log2).max(0), "at most a few dozen")
+        let [above, below] = unit.ratio();
+        // least lsh with 2^(bits - 1 + lsh) above >= 4 below
+        let mut shift = 0;
+        while u128::from(above) << (bits.get() - 1 + shift) < 4 * u128::from(below) {
+            shift += 1;
+        }
+        shift
     }
 
     fn sigmoid(alpha: Positive, bits: LutBits, unit: Unit) -> Self {
@@ -167,15 +241,12 @@ impl Lut {
     /// `z` in 0..=1, in integers; the derivative is 1 where `slope` says so of an index, else 0.
     fn linear(bits: LutBits, unit: Unit, slope: impl Fn(i64) -> bool) -> Self {
         let half = 1i64 << (bits.get() - 1);
-        let codes = i64::from(unit.drive_bits.code_max());
-        let log2 = i64::from(unit.weight_max_log2) - i64::from(unit.level_bits.get());
+        let [above, below] = unit.ratio().map(i128::from);
         let shift = Self::linear_shift(bits, unit);
-        // z = i 2^p / codes, so 255 z + 1/2 = (2 255 i 2^p + codes) / (2 codes)
-        let p = i64::from(shift) + log2;
-        let (factor, divisor) =
-            if p >= 0 { (255i64 << p, codes) } else { (255, codes << p.unsigned_abs()) };
+        // z = i 2^lsh above / below, so 255 z + 1/2 = (2 255 i 2^lsh above + below) / (2 below)
+        let factor = (255 * above) << shift;
         let activity = (-half..half).map(|i| {
-            let rounded = (2 * factor * i + divisor).div_euclid(2 * divisor);
+            let rounded = (2 * factor * i128::from(i) + below).div_euclid(2 * below);
             narrow::<u8>(rounded.clamp(0, 255), "clamped to a byte")
         });
         let derivative = (-half..half).map(|i| if slope(i) { 255 } else { 0 });
@@ -245,7 +316,7 @@ impl Rate {
             return -libm::log2(self.rate.0);
         }
         let rail = f64::from((1u32 << (self.error_bits.get() - 1)) - 1);
-        let codes = f64::from(self.unit.drive_bits.code_max());
+        let codes = self.unit.codes_of_one();
         let scale = libm::exp2(f64::from(self.error_bits.get()))
             / (codes * rail * 255.0 * self.activation.steepness());
         let levels = libm::exp2(f64::from(self.unit.level_bits.get()))
@@ -293,7 +364,7 @@ impl Rate {
             return Ok(Positive(libm::exp2(-f64::from(k))));
         }
         let rail = f64::from((1u32 << (self.error_bits.get() - 1)) - 1);
-        let codes = f64::from(self.unit.drive_bits.code_max());
+        let codes = self.unit.codes_of_one();
         let samples = f64::from(self.batch.get()) * f64::from(self.mantissa.get());
         let log2 = self.unit.weight_max_log2;
         let bits = self.unit.level_bits.get() + self.error_bits.get() + k;
@@ -360,6 +431,7 @@ mod tests {
             weight_max_log2,
             level_bits: LevelBits::new(level_bits).unwrap(),
             drive_bits: DriveBits::new(drive_bits).unwrap(),
+            full_drive: FullDrive::One,
         }
     }
 

@@ -39,6 +39,7 @@ mod lanes;
 mod levels;
 #[cfg(target_arch = "aarch64")]
 mod neon;
+mod normalise;
 mod ops;
 mod optimise;
 #[cfg(target_arch = "x86_64")]
@@ -66,6 +67,7 @@ pub use self::{
         Banks, Cells, Conversion, Dither, Drives, Ends, Extremes, Greatest, Half, LookUp,
         OneSample, Peaks, Pulsed, Rails, Scratch, TOGETHER, WriteCounts, WriteLaw, is_driven,
     },
+    normalise::{HandOn, SQUARED_MAX},
     optimise::{MEAN_BITS, SignLaw, Squares, joined},
     sums::Sums,
     team::Team,
@@ -232,6 +234,34 @@ impl Kernel {
     pub fn difference(&self, currents: [&[i32]; 2], sums: &mut [i32]) {
         assert!(currents.iter().all(|bank| bank.len() == sums.len()), "both banks have every sum");
         call!(self, difference(currents, sums));
+    }
+
+    /// Adds to each sample's sum the squares of what is above 0 in a block of 64 units, `[sample][64]`. The plan proves that
+    /// sums lie below [`SQUARED_MAX`].
+    ///
+    /// # Panics
+    /// When the sizes do not match.
+    pub fn stream_squares(&self, sums: &[i32], squares: &mut [u64]) {
+        assert_eq!(sums.len(), squares.len() * BLOCK_ROWS, "64 units a sample");
+        call!(self, stream_squares(sums, squares));
+    }
+
+    /// Normalises a block of 64 units, `[sample][64]`, by the reciprocal of each sample: what they hand on, and how steep
+    /// they are. Returns the codes that their bound changed.
+    ///
+    /// # Panics
+    /// When the sizes do not match.
+    pub fn scale(
+        &self,
+        sums: &[i32],
+        reciprocals: &[u64],
+        hand_on: HandOn,
+        values: &mut [u8],
+        derivatives: &mut [u8],
+    ) -> u64 {
+        assert_eq!(sums.len(), reciprocals.len() * BLOCK_ROWS, "64 units a sample");
+        assert!(values.len() == sums.len() && derivatives.len() == sums.len(), "a place a unit");
+        call!(self, scale(sums, reciprocals, hand_on, values, derivatives))
     }
 
     /// Latches one word a unit: `errors[b][j] = words[b][taps[j]]`, `width` words and 64 units a sample; units beyond

@@ -3,6 +3,7 @@
 
 use std::collections::BTreeMap;
 use std::fmt::Display;
+use std::iter;
 
 use super::changed::{self, UnderModel};
 use super::defaults::SetDefaults;
@@ -19,7 +20,7 @@ use crate::learn::error::Centre;
 use crate::learn::route::Route;
 use crate::learn::rule::{Rule, UpdateMode};
 use crate::num::fixed::{Batch, OutOfRange, RateMantissa};
-use crate::num::tables::{Activation, Decay, Positive, Rate, RateOf, Unit};
+use crate::num::tables::{Activation, Decay, FullDrive, Positive, Rate, RateOf, Unit};
 
 mod learning;
 mod network;
@@ -274,6 +275,14 @@ fn classify(file: &mut ExperimentFile, hardware: &Hardware) -> Result<Learnt, Co
     Ok(Learnt { data, hidden, outputs, network: made, learning: learnt, mantissas, policy: None })
 }
 
+/// What the greatest code behind a layer of this kind stands for, or of data.
+fn full_drive(below: Option<&Activation>) -> FullDrive {
+    match below {
+        Some(Activation::Rms) => FullDrive::Normalised,
+        _ => FullDrive::One,
+    }
+}
+
 /// The small factor of the rate of each layer.
 fn mantissas(
     file: &mut LearningFile,
@@ -282,8 +291,9 @@ fn mantissas(
     hardware: &Hardware,
 ) -> Result<Vec<RateMantissa>, ConfigError> {
     let layers = network.activations.iter().zip(&network.weight_max_log2);
-    let asked = learning.rates.iter().zip(layers);
-    let asked = asked.map(|(&rate, (&activation, &weight_max_log2))| Rate {
+    let below = iter::once(None).chain(network.activations.iter().map(Some));
+    let asked = learning.rates.iter().zip(layers).zip(below.map(full_drive));
+    let asked = asked.map(|((&rate, (&activation, &weight_max_log2)), full_drive)| Rate {
         rate,
         of: if learning.optimiser.is_sign() { RateOf::Pulses } else { RateOf::Sums },
         batch: learning.batch,
@@ -294,6 +304,7 @@ fn mantissas(
             weight_max_log2,
             level_bits: hardware.cell.level_bits,
             drive_bits: hardware.drive.bits,
+            full_drive,
         },
     });
     learning::mantissas(file, &asked.collect::<Vec<_>>())

@@ -4,10 +4,10 @@ use std::iter;
 
 use super::check::{Bias, wrong};
 use super::{Config, ConfigError};
-use crate::chip::layer::{DrivenBy, LayerSpec};
-use crate::chip::population::Wiring;
+use crate::chip::layer::{DrivenBy, InitialLevels, LayerSpec};
 use crate::learn::network::NetworkSpec;
-use crate::learn::rule::Rule;
+use crate::learn::rule::{Readout, Rule};
+use crate::num::tables::Activation;
 use crate::task::classify::{Augment, Experiment};
 
 impl Config {
@@ -67,22 +67,23 @@ impl Config {
         let mut sizes = vec![inputs];
         sizes.extend(hidden);
         sizes.push(outputs);
-        let driven = iter::once(DrivenBy::Shared).chain(iter::repeat(DrivenBy::Streams));
+        let behind = |activation: &Activation| match activation {
+            Activation::Rms => DrivenBy::Normalised,
+            _ => DrivenBy::Streams,
+        };
+        let driven = iter::once(DrivenBy::Shared).chain(self.activations.iter().map(behind));
         let layers = (0..hidden.len() + 1).zip(driven).map(|(layer, driven_by)| {
             let last = layer == hidden.len();
-            let wiring = match (self.rule.is_dalean(), last && self.policy.is_none()) {
-                (true, false) => Wiring::Dual,
-                (true, true) => Wiring::DualReadout,
-                (false, _) => Wiring::Single,
-            };
+            let activation = self.activations[layer];
+            let wiring = self.rule.wiring(last.then(|| Readout::of(activation)));
             LayerSpec {
                 inputs: sizes[layer],
                 units: sizes[layer + 1],
                 wiring,
                 driven_by,
-                activation: self.activations[layer],
+                activation,
                 weight_max_log2: self.weight_max_log2[layer],
-                gain_64ths: self.gain_64ths[usize::from(last)],
+                initial: InitialLevels::Uniform { gain_64ths: self.gain_64ths[usize::from(last)] },
                 constant_row: match self.bias {
                     Bias::None => false,
                     Bias::InputRow => layer == 0,

@@ -10,7 +10,7 @@ use crate::chip::hardware::{
     Adc, AdcRange, CellSpec, DigitalSpec, DitherBits, DitherPattern, DriveSpec, FloorKind,
     HardwareSpec, PulseCode, Subtract, TileSpec, Timing, WriteScheme, WriteSpec,
 };
-use crate::chip::layer::{DrivenBy, LayerSpec, Optimiser};
+use crate::chip::layer::{DrivenBy, InitialLevels, LayerSpec, Optimiser};
 use crate::learn::error::Centre;
 use crate::learn::network::NetworkSpec;
 use crate::learn::route::Route;
@@ -245,6 +245,7 @@ impl List {
             Rule::Ed => "ed",
             Rule::Kaneko => "kaneko",
             Rule::Dfa => "dfa",
+            Rule::EdNonDalean => "ed_non_dalean",
             Rule::Bp => "bp",
         };
         let mode = match mode {
@@ -298,7 +299,7 @@ impl List {
             driven_by,
             activation,
             weight_max_log2,
-            gain_64ths,
+            initial,
             constant_row,
         } = layer;
         let mut put = |key: &str, word: &dyn ToString| {
@@ -312,15 +313,23 @@ impl List {
             (0, DrivenBy::Shared) | (1.., DrivenBy::Streams) => {}
             (0, DrivenBy::Streams) => put("driven_by", &"streams"),
             (1.., DrivenBy::Shared) => put("driven_by", &"shared"),
+            (_, DrivenBy::Normalised) => put("driven_by", &"normalised"),
         }
         let activation = match activation {
             Activation::Sigmoid(alpha) => format!("sigmoid {}", alpha.get()),
             Activation::Relu => "relu".into(),
             Activation::Identity => "identity".into(),
+            Activation::Rms => "rms".into(),
+            Activation::Accumulator => "accumulator".into(),
         };
         put("activation", &activation);
         put("weight_max_log2", weight_max_log2);
-        put("gain_64ths", &format!("{} {}", gain_64ths[0], gain_64ths[1]));
+        match initial {
+            InitialLevels::Uniform { gain_64ths: [e, i] } => put("gain_64ths", &format!("{e} {i}")),
+            InitialLevels::AbsGaussian { gain: [n, d] } => {
+                put("initial", &format!("abs_gaussian {n}/{d}"));
+            }
+        }
         put("constant_row", constant_row);
     }
 

@@ -1,6 +1,7 @@
 //! What a configuration makes of an environment: actor, critic, and the experiment around them.
 
 use super::{Config, ConfigError};
+use crate::chip::layer::InitialLevels;
 use crate::learn::network::NetworkSpec;
 use crate::learn::route::Route;
 use crate::task::environment::{EnvSpec, Shown, Taken};
@@ -43,8 +44,9 @@ impl PolicySettings {
 
     /// Epochs of the run, if there are fewer than 2^32.
     pub(crate) fn epochs(&self) -> Option<u32> {
-        let of_epoch = self.method.epoch_steps(self.environments, self.horizon, self.rollouts);
-        u32::try_from(self.steps.div_ceil(of_epoch)).ok()
+        let rollout = u64::from(self.environments) * u64::from(self.horizon);
+        let of_epoch = rollout.saturating_mul(u64::from(self.rollouts));
+        u32::try_from(self.steps.div_ceil(of_epoch.max(1))).ok()
     }
 
     /// Samples read or learnt from in the whole run, roughly.
@@ -81,11 +83,7 @@ impl Config {
         let Some(policy) = &self.policy else { return Ok(None) };
         let actor = self.part(Part::Actor, policy);
         let critic = self.part(Part::Critic, policy);
-        actor.check(&self.hardware)?;
-        if matches!(policy.method, Method::Ppo(_)) {
-            critic.check(&self.hardware)?;
-        }
-        Ok(Some(PolicyExperiment {
+        let experiment = PolicyExperiment {
             seed: self.seed,
             hardware: self.hardware.clone(),
             environment: policy.environment.id.into(),
@@ -98,7 +96,9 @@ impl Config {
             horizon: policy.horizon,
             rollouts: policy.rollouts,
             evaluation: policy.evaluation,
-        }))
+        };
+        experiment.check(&policy.environment)?;
+        Ok(Some(experiment))
     }
 
     /// The networks of a run on data of this shape, whose layers are numbered through.
@@ -127,6 +127,14 @@ impl Config {
             Part::Critic => (&policy.critic_hidden, 1),
         };
         let mut network = self.network_of(policy.rows(), hidden, outputs);
+        for (at, layer) in network.layers.iter_mut().enumerate() {
+            let gain = match (part, at == hidden.len()) {
+                (_, false) => [1, 1],
+                (Part::Actor, true) => [1, 10],
+                (Part::Critic, true) => [3, 10],
+            };
+            layer.initial = InitialLevels::AbsGaussian { gain };
+        }
         if part == Part::Actor && policy.centred {
             // output layers alone can learn the mean of what they put out
             network.centred[..hidden.len()].fill(true);

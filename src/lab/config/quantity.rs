@@ -151,7 +151,7 @@ impl Quantity {
 
 /// Every quantity a model can give. An event without a line here costs nothing by itself: it says what came of
 /// another one (a saturation, a pulse that was effective).
-pub const QUANTITIES: [Quantity; 24] = [
+pub const QUANTITIES: [Quantity; 30] = [
     energy(
         "dac_slice",
         Event::DacSlices,

@@ -14,6 +14,7 @@ use crate::lab::store::record::{
 };
 use crate::learn::driver::Driver;
 use crate::learn::statistics::PathwayRecord;
+use crate::task::environment::EnvSource;
 use crate::task::policy::{
     Method, PolicyEpoch, PolicyError, PolicyExperiment, PolicyProgress, PolicyTrainer, WatchedStep,
 };
@@ -32,7 +33,7 @@ impl Policy {
             layers.extend(experiment.critic.layers.clone());
         }
         super::weigh(&layers, &experiment.hardware, super::Memory::left())?;
-        let mut trainer = PolicyTrainer::new(experiment, machine.backend())?;
+        let mut trainer = PolicyTrainer::new(experiment, machine.backend(), EnvSource::Native)?;
         let threads = machine.threads();
         for network in trainer.networks_mut() {
             let engine = network.engine_mut();

@@ -110,7 +110,7 @@ pub fn report(path: &Path, data_root: Option<&DataRoot>) -> Result<ReportMade, R
 fn watched(path: &Path, root: &DataRoot) -> Result<Film, RunError> {
     let machine = Machine::new(Backend::best(), 1)?;
     let mut steps = Vec::new();
-    let _ = super::watch(path, root, machine, 0, &mut |step| {
+    let _ = super::watch(path, root, machine, 0, &mut |_, step| {
         steps.push(step.clone());
         true
     })?;

@@ -2,9 +2,10 @@
 
 use std::path::Path;
 
-use super::train::read_again;
+use super::train::{read_again, read_config};
 use super::{Machine, RunError};
 use crate::lab::data::DataRoot;
+use crate::task::environment::EnvSpec;
 use crate::task::policy::WatchedStep;
 
 /// What is watched.
@@ -25,12 +26,12 @@ pub fn watch(
     root: &DataRoot,
     machine: Machine,
     episode: u32,
-    look: &mut dyn FnMut(&WatchedStep) -> bool,
+    look: &mut dyn FnMut(&EnvSpec, &WatchedStep) -> bool,
 ) -> Result<Watched, RunError> {
+    let none = || RunError::NoEpisodes { path: path.display().to_string() };
+    let spec = read_config(path)?.0.policy.ok_or_else(none)?.environment;
     let (mut session, receipt) = read_again(path, root, machine)?;
     let epoch = session.epoch();
-    if !session.watch(episode, look)? {
-        return Err(RunError::NoEpisodes { path: path.display().to_string() });
-    }
+    session.watch(episode, &mut |step| look(&spec, step))?;
     Ok(Watched { epoch, state_hash: receipt.epoch_hashes[epoch as usize].clone() })
 }

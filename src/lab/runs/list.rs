@@ -41,7 +41,7 @@ impl RunStatus {
 }
 
 /// A run in a list.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct ListedRun {
     /// Its folder.
     pub folder: PathBuf,

@@ -16,7 +16,7 @@ fn plain() -> NetworkSpec {
         driven_by: if inputs == 5 { DrivenBy::Shared } else { DrivenBy::Streams },
         activation: Activation::Sigmoid(Positive::new(4.0).unwrap()),
         weight_max_log2: 2,
-        gain_64ths: [96, 32],
+        initial: InitialLevels::Uniform { gain_64ths: [96, 32] },
         constant_row: false,
     };
     NetworkSpec {
@@ -81,8 +81,12 @@ fn everything_that_does_not_fit_together_is_refused_with_its_key() {
         }),
         ("network.weight_max", "of layer 0 is 2^9", |n| n.layers[0].weight_max_log2 = 9),
         ("network.weight_max", "of layer 1 is 2^-9", |n| n.layers[1].weight_max_log2 = -9),
-        ("network.init_gain", "1025/64", |n| n.layers[0].gain_64ths = [1024, 1025]),
-        ("network.init_gain_output", "0/64", |n| n.layers[1].gain_64ths = [0, 1]),
+        ("network.init_gain", "1025/64", |n| {
+            n.layers[0].initial = InitialLevels::Uniform { gain_64ths: [1024, 1025] }
+        }),
+        ("network.init_gain_output", "0/64", |n| {
+            n.layers[1].initial = InitialLevels::Uniform { gain_64ths: [0, 1] }
+        }),
         ("learning.rule", "two classes", |n| n.rule = Rule::Kaneko),
         ("learning.rule", "make arrays that are differential pairs", |n| {
             (n.rule, n.route) = (Rule::Dfa, Some(Route::RandomDense { shift: None }));

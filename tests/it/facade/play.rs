@@ -11,8 +11,8 @@ use dalean::hardware::{
     SliceTimes, Subtract, TileSpec, Timing, Window, WriteScheme, WriteSpec,
 };
 use dalean::network::{
-    Activation, Augment, Batch, Centre, Decay, DrivenBy, LayerSpec, Optimiser, Positive,
-    RateMantissa, Route, Rule, UpdateMode, Wiring,
+    Activation, Augment, Batch, Centre, Decay, DrivenBy, InitialLevels, LayerSpec, Optimiser,
+    Positive, RateMantissa, Route, Rule, UpdateMode, Wiring,
 };
 use dalean::{
     Backend, Classifier, Config, Data, DataRoot, Examples, Experiment, Hardware, HardwareSpec,
@@ -211,7 +211,9 @@ fn network(c: &mut Choices<'_>, inputs: usize, outputs: usize) -> NetworkSpec {
             _ => Activation::Sigmoid(positive(c)),
         },
         weight_max_log2: c.near(-8, 8) as i32,
-        gain_64ths: [c.near(1, 1024) as u32, c.near(1, 1024) as u32],
+        initial: InitialLevels::Uniform {
+            gain_64ths: [c.near(1, 1024) as u32, c.near(1, 1024) as u32],
+        },
         constant_row: c.one_in(2),
     });
     let layers: Vec<_> = layers.collect();

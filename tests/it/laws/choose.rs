@@ -4,7 +4,7 @@ use dalean::chip::hardware::{
     Adc, AdcRange, ConverterKind, DitherBits, DitherPattern, FloorKind, Hardware, HardwareSpec,
     PulseCode, SliceTime, SliceTimes, Subtract, Timing, Window, WriteScheme, converter,
 };
-use dalean::chip::layer::{Delivery, DrivenBy, LayerSpec, Taps, WordSource};
+use dalean::chip::layer::{Delivery, DrivenBy, InitialLevels, LayerSpec, Taps, WordSource};
 use dalean::chip::population::Wiring;
 use dalean::learn::error::Centre;
 use dalean::num::fixed::*;
@@ -229,7 +229,7 @@ pub(crate) fn net(sides: impl Strategy<Value = Vec<usize>>) -> impl Strategy<Val
                     },
                     activation,
                     weight_max_log2,
-                    gain_64ths: [96, 32],
+                    initial: InitialLevels::Uniform { gain_64ths: [96, 32] },
                     constant_row,
                 });
                 let above = reads_backwards && last == Wiring::Single && at + 1 < count;

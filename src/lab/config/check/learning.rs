@@ -43,9 +43,10 @@ pub(super) enum Named {
 }
 
 /// `learning.rule`.
-pub(super) const RULES: [(&str, Named); 6] = [
+pub(super) const RULES: [(&str, Named); 7] = [
     ("ed", Named::Rule(Rule::Ed)),
     ("ed_seed", Named::Seeded),
+    ("ed_non_dalean", Named::Rule(Rule::EdNonDalean)),
     ("kaneko", Named::Rule(Rule::Kaneko)),
     ("dfa", Named::Rule(Rule::Dfa)),
     ("bp", Named::Rule(Rule::Bp)),
@@ -113,7 +114,7 @@ pub(super) fn resolve(
         Named::Rule(rule) => Kind { rule, seeded: false },
         Named::Seeded => Kind { rule: Rule::Ed, seeded: true },
         Named::Evolution => {
-            let allowed = "evolution belongs to task = \"policy\": say that, or use ed, ed_seed, kaneko, dfa or bp";
+            let allowed = "evolution belongs to task = \"policy\": say that, or use ed, ed_seed, ed_non_dalean, kaneko, dfa or bp";
             return Err(wrong("learning.rule", "is \"es\"", allowed));
         }
     };

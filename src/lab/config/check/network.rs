@@ -25,7 +25,7 @@ pub(super) const ACTIVATIONS: [(&str, Option<Activation>); 4] = [
     ("sigmoid", None),
     ("relu", Some(Activation::Relu)),
     ("identity", Some(Activation::Identity)),
-    ("rms", Some(Activation::Relu)),
+    ("rms", Some(Activation::Rms)),
 ];
 
 /// Checks a network of so many layers and writes defaults back.

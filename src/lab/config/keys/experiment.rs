@@ -256,6 +256,8 @@ const LEARNING: &[KeyEntry] = &[
         &[
             ("ed", "error diffusion under Dale's law"),
             ("ed_seed", "the same as the paper's seed rule: width 1, raw errors, symmetric gains"),
+            ("ed_non_dalean", "error diffusion on pathways of differential pairs: what Dale's law costs"),
+            ("ed_non_dalean", "the same on differential pairs in two populations: what Dale's law costs"),
             ("kaneko", "Kaneko's original, which only potentiates: one output, two classes"),
             ("dfa", "direct feedback alignment on differential pairs"),
             ("bp", "back-propagation on differential pairs, by transposed reads"),

@@ -90,6 +90,6 @@ fn activations(file: &mut NetworkFile, hidden: usize) -> Result<Vec<Activation>,
             alphas.into_iter().map(sigmoid).collect::<Result<_, _>>()?
         }
     };
-    all.push(Activation::Identity);
+    all.push(Activation::Accumulator);
     Ok(all)
 }

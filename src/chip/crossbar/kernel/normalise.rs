@@ -1,0 +1,163 @@
+//! Normalised activities, a block of 64 units at a time: sums of squares, and codes.
+//!
+//! ```text
+//! squares[b] += sum_j max(sum[b][j], 0)^2                            |sum| < 2^29, so that 64 squares fit 64 bits
+//! code        = min( (max(sum, 0) rc[b] + 2^39) >> 40, 255 );  value = min( rsh(code, shift), max )
+//! ```
+//!
+//! The law is `chip::periphery::normalise`, one unit after the other; its twin is written so that compilers make vectors of
+//! it. See docs/MODEL.md, 2.3.
+#![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
+
+use crate::chip::crossbar::layout::BLOCK_ROWS;
+use crate::chip::periphery::normalise;
+use crate::num::fixed::DriveBits;
+
+/// How an activity code becomes what a unit hands on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct HandOn {
+    /// Bits that are rounded off.
+    shift: u32,
+    /// Greatest value.
+    max: u32,
+}
+
+impl HandOn {
+    /// As the drive code of the next layer.
+    #[must_use]
+    pub fn new(bits: DriveBits) -> Self {
+        Self { shift: 8 - bits.get(), max: bits.code_max().into() }
+    }
+}
+
+/// Sums below this square to what 64 bits hold 64 of.
+pub const SQUARED_MAX: u32 = 1 << 29;
+
+impl HandOn {
+    /// What a unit hands on whose activity is `code`.
+    #[inline(always)]
+    #[must_use]
+    pub const fn value(self, code: u8) -> u8 {
+        let rounded = (code as u32 + ((1 << self.shift) >> 1)) >> self.shift;
+        (if rounded > self.max { self.max } else { rounded }) as u8
+    }
+}
+
+pub(super) fn law_squares(sums: &[i32], squares: &mut [u64]) {
+    for (square, sums) in squares.iter_mut().zip(sums.chunks_exact(BLOCK_ROWS)) {
+        let more = normalise::squares(sums.iter().map(|&sum| i64::from(sum)));
+        *square += u64::try_from(more).expect("sums lie below `SQUARED_MAX`");
+    }
+}
+
+pub(super) fn law_scale(
+    sums: &[i32],
+    reciprocals: &[u64],
+    hand_on: HandOn,
+    values: &mut [u8],
+    derivatives: &mut [u8],
+) -> u64 {
+    let mut saturated = 0;
+    for (at, &sum) in sums.iter().enumerate() {
+        let (code, beyond) = normalise::code(sum.into(), reciprocals[at / BLOCK_ROWS]);
+        values[at] = hand_on.value(code);
+        derivatives[at] = normalise::slope(sum.into());
+        saturated += u64::from(beyond);
+    }
+    saturated
+}
+
+#[inline(always)]
+pub(super) fn stream_squares(sums: &[i32], squares: &mut [u64]) {
+    for (square, sums) in squares.iter_mut().zip(sums.as_chunks::<BLOCK_ROWS>().0) {
+        let mut total = 0;
+        for &sum in sums {
+            let v = u64::from(sum.max(0).unsigned_abs());
+            total += v * v;
+        }
+        *square += total;
+    }
+}
+
+#[inline(always)]
+pub(super) fn scale(
+    sums: &[i32],
+    reciprocals: &[u64],
+    hand_on: HandOn,
+    values: &mut [u8],
+    derivatives: &mut [u8],
+) -> u64 {
+    let HandOn { shift, max } = hand_on;
+    let half = (1 << shift) >> 1;
+    let mut saturated = 0;
+    let rows = values.as_chunks_mut::<BLOCK_ROWS>().0.iter_mut();
+    let rows = rows.zip(derivatives.as_chunks_mut::<BLOCK_ROWS>().0);
+    let sums = sums.as_chunks::<BLOCK_ROWS>().0.iter().zip(reciprocals);
+    for ((sums, &rc), (values, derivatives)) in sums.zip(rows) {
+        let mut codes = [0u32; BLOCK_ROWS];
+        for (code, &sum) in codes.iter_mut().zip(sums) {
+            let v = u64::from(sum.max(0).unsigned_abs());
+            *code = ((v * rc + (1 << 39)) >> 40) as u32;
+        }
+        let mut beyond = 0u32;
+        for ((code, &sum), (value, derivative)) in
+            codes.iter().zip(sums).zip(values.iter_mut().zip(derivatives))
+        {
+            beyond += u32::from(*code > 255);
+            *value = ((((*code).min(255) + half) >> shift).min(max)) as u8;
+            *derivative = if sum > 0 { 255 } else { 0 };
+        }
+        saturated += u64::from(beyond);
+    }
+    saturated
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{Backend, Kernel};
+    use super::*;
+    use crate::chip::periphery;
+    use proptest::prelude::*;
+
+    #[test]
+    fn what_is_handed_on_is_the_drive_of_the_activity() {
+        for bits in 1..=8 {
+            let bits = DriveBits::new(bits).unwrap();
+            let hand_on = HandOn::new(bits);
+            assert!((0..=255).all(|code| hand_on.value(code) == periphery::drive(code, bits)));
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn every_back_end_normalises_as_the_law(
+            sums in prop::collection::vec(
+                prop_oneof![-300i32..300, -(1i32 << 20)..1 << 20, Just(0), 1i32 - (1 << 29)..1 << 29],
+                64 * 5,
+            ),
+            samples in 0usize..=5,
+            roots in prop::array::uniform5(1u64..1 << 29),
+            bits in 1i64..=8,
+        ) {
+            let sums = &sums[..64 * samples];
+            let rc: Vec<u64> = sums.chunks(64).zip(roots).map(|(sums, root)| {
+                // as great as the plan lets it be
+                let most = sums.iter().max().unwrap_or(&1);
+                (1 << 45) / root.max((*most / 512).max(1) as u64)
+            }).collect();
+            let hand_on = HandOn::new(DriveBits::new(bits).unwrap());
+            let of = |backend| {
+                let kernel = Kernel::start(backend);
+                let mut squares = vec![7; samples];
+                kernel.stream_squares(sums, &mut squares);
+                let (mut values, mut slopes) = (vec![1; sums.len()], vec![1; sums.len()]);
+                let beyond = kernel.scale(sums, &rc, hand_on, &mut values, &mut slopes);
+                (squares, values, slopes, beyond)
+            };
+            let want = of(Backend::Scalar);
+            for backend in Backend::available() {
+                prop_assert_eq!(of(backend), want.clone(), "{}", backend.name());
+            }
+        }
+    }
+}
