@@ -20,8 +20,10 @@ use fixed::types::I16F16;
 use crate::chip::state::State;
 
 pub mod acrobot;
+pub mod canvas;
 pub mod cart_pole;
 pub mod fine;
+pub mod foray;
 pub mod mountain_car;
 pub mod one;
 pub mod pendulum;
@@ -252,13 +254,14 @@ pub trait VecEnv: State + fmt::Debug + Send {
 pub type MakeEnv = fn(seed: u64, count: usize) -> Box<dyn VecEnv>;
 
 /// Every environment, by what it is called.
-pub const ENVIRONMENTS: [(&str, MakeEnv); 4] = [
+pub const ENVIRONMENTS: [(&str, MakeEnv); 5] = [
     ("CartPole-v1", |seed, count| Box::new(SideBySide::<cart_pole::CartPole>::new(seed, count))),
     ("Acrobot-v1", |seed, count| Box::new(SideBySide::<acrobot::Acrobot>::new(seed, count))),
     ("Pendulum-v1", |seed, count| Box::new(SideBySide::<pendulum::Pendulum>::new(seed, count))),
     ("MountainCarContinuous-v0", |seed, count| {
         Box::new(SideBySide::<mountain_car::MountainCar>::new(seed, count))
     }),
+    ("Foray-v0", |seed, count| Box::new(SideBySide::<foray::Foray>::new(seed, count))),
 ];
 
 /// An environment that there is not.

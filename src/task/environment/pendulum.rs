@@ -8,9 +8,10 @@
 //! ```
 //!
 //! `a` is in radians, upwards 0, and counts turns: it is at most `pi + 200 x 0.05 x 8` in size. As Gymnasium 1.4 has it, to
-//! 2^-25 in a step; see docs/MODEL.md, 5.
+//! 2^-28 of a range in a step; see docs/MODEL.md, 5.
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
+use super::canvas::Canvas;
 use super::fine::{Fine, shown, sin, sin_cos, taken, uniform};
 use super::one::{Action, Came, Environment, StatePart};
 use super::{EnvSpec, Observations, Shown, Taken};
@@ -89,6 +90,13 @@ impl Environment for Pendulum {
     }
 
     fn picture(&self) -> String {
-        String::new()
+        let mut canvas = Canvas::new(25, 13);
+        let hinge = [12, 6].map(Fine::from_num);
+        let (sin, cos) = sin_cos(self.angle);
+        // what turns to the left as the angle grows
+        let tip = [hinge[0] - sin * 12, hinge[1] - cos * 6];
+        canvas.line(hinge, tip, 'o');
+        canvas.put(hinge, '+');
+        canvas.to_string()
     }
 }
