@@ -117,7 +117,7 @@ fn every_command_knows_a_policy() {
     assert_eq!((&done["episodes"], &done["steps"]), (&2.into(), &32.into()));
     assert!(done["test_accuracy"].is_null() && done["images_per_second"].is_null(), "{done}");
     let each = done["per_act"].as_array().unwrap();
-    assert!(each.iter().any(|one| one["updates"] == 16), "{done}");
+    assert!(each.iter().any(|one| one["updates"] == 8), "{done}");
     assert!(each.iter().any(|one| one["decisions"].as_u64() > Some(0)), "{done}");
 
     let ran = |words: &[&str]| {

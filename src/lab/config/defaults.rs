@@ -40,8 +40,13 @@ pub struct SetDefaults {
 }
 
 /// Keys whose default follows from other keys of an experiment than data and rule.
-pub(super) const FOLLOWING: [&str; 4] =
-    ["learning.rate", "learning.rate_multipliers", "learning.centre", "environment.rollouts"];
+pub(super) const FOLLOWING: [&str; 5] = [
+    "learning.rate",
+    "learning.rate_multipliers",
+    "learning.centre",
+    "environment.rollouts",
+    "network.critic_hidden",
+];
 
 /// One entry a data set that has defaults of its own, then the entry of all others.
 pub const SET_DEFAULTS: [SetDefaults; 2] = [

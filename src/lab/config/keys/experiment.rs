@@ -383,15 +383,7 @@ const LEARNING: &[KeyEntry] = &[
 ];
 
 const ENVIRONMENT: &[KeyEntry] = &[
-    words(
-        "id",
-        &[
-            ("CartPole-v1", "a pole on a cart: push left or right"),
-            ("Acrobot-v1", "two links that hang: swing the end up"),
-            ("Pendulum-v1", "a pendulum: swing it up and hold it"),
-            ("MountainCarContinuous-v0", "a weak car in a valley: get up the hill"),
-        ],
-    )
+    other("id", "the name of an environment, such as Acrobot-v1; a wrong one is answered with all there are")
     .default("\"CartPole-v1\"")
     .only(ON_POLICY, POLICY),
     whole("count", 1, 1024).default("16").only(ON_POLICY, POLICY),
