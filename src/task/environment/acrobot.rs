@@ -18,7 +18,7 @@
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
 use super::canvas::Canvas;
-use super::fine::{Fine, cos, reciprocal, shown, sin_cos, uniform};
+use super::fine::{Fine, cos, reciprocal, shown, sin_cos, turned, uniform};
 use super::one::{Action, Came, Environment, StatePart};
 use super::{EnvSpec, Observations, Real, Shown, Taken};
 
@@ -62,15 +62,6 @@ fn moved(from: [Fine; 4], time: Fine, change: [Fine; 4]) -> [Fine; 4] {
     let held = |speed: Fine| speed.clamp(-STAGE_SPEED_MAX, STAGE_SPEED_MAX);
     let [a, b, v, w] = std::array::from_fn(|i| from[i] + time * change[i]);
     [a, b, held(v), held(w)]
-}
-
-/// The same direction, from -pi to pi.
-#[inline]
-fn turned(angle: Fine) -> Fine {
-    if angle.abs() <= Fine::PI {
-        return angle;
-    }
-    (angle + Fine::PI).rem_euclid(Fine::TAU) - Fine::PI
 }
 
 impl Environment for Acrobot {
