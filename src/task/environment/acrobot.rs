@@ -14,7 +14,7 @@
 //! Angle `a` of the upper link is from straight down, `b` of the lower from the upper, in radians; `v` and `w` are their
 //! speeds. Masses, lengths and moments are 1, centres of mass at half a length, g = 9.8. Between the four stages speeds
 //! are held to 2048 in size, so that nothing overflows: from two million states drawn from the whole box none went beyond
-//! 900. As Gymnasium 1.4 has it, to 2^-24 of a range in a step; see docs/MODEL.md, 5.
+//! 900. As Gymnasium 1.4 has it, to 2^-24 of a range in a step; see docs/MODEL.md, 5.4.
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
 use super::canvas::Canvas;

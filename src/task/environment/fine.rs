@@ -12,7 +12,7 @@
 //! uniform      low + floor((high - low) word / 2^32)             one word, from `low` up to below `high`
 //! ```
 //!
-//! See docs/MODEL.md, 5.
+//! See docs/MODEL.md, 5.4.
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
 use fixed::types::I32F32;

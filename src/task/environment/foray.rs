@@ -26,7 +26,7 @@
 //! ```
 //!
 //! Nothing is drawn after the beginning. Mean return of 10000 episodes: uniform random actions 3.5, the script that goes for
-//! what pays at once 4.2, the one with foresight 18.1 ([`greedy`]). See docs/MODEL.md, 5.
+//! what pays at once 4.2, the one with foresight 18.1 ([`greedy`]). See docs/MODEL.md, 5.4.
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
 use super::one::{Action, Came, Environment, StatePart};

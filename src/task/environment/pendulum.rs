@@ -9,7 +9,7 @@
 //! ```
 //!
 //! `a` is in radians, upwards 0. As Gymnasium 1.4 has it, which counts whole turns in `a` and takes them out where it matters:
-//! to 2^-28 of a range in a step; see docs/MODEL.md, 5.
+//! to 2^-28 of a range in a step; see docs/MODEL.md, 5.4.
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
 use super::canvas::Canvas;
