@@ -12,7 +12,7 @@ pub struct LayerFootprint {
     pub rows: u64,
     /// Columns of an array.
     pub columns: u64,
-    /// Targets: two arrays each.
+    /// Pairs of arrays: one a target or, where each pathway is a pair, two.
     pub targets: u64,
 }
 
@@ -30,7 +30,7 @@ impl Footprint {
         let layer = |layer: &Layer| LayerFootprint {
             rows: layer.layout.rows as u64,
             columns: layer.layout.columns as u64,
-            targets: layer.spec.wiring.targets().len() as u64,
+            targets: layer.spec.wiring.planes().count() as u64,
         };
         Self { layers: layers.map(layer).collect() }
     }
@@ -49,7 +49,7 @@ impl Footprint {
             }
         }
         let layers = layers.into_iter().map(|(layer, arrays)| LayerFootprint {
-            // a target has two banks
+            // a pair has two banks
             targets: arrays / 2,
             ..layer
         });

@@ -58,7 +58,7 @@ pub(super) fn pathway(name: &str, excites: bool) -> &'static str {
 
 /// Whether the pathway's line is dashed: its target is the n stream.
 pub(super) fn dashed(name: &str) -> bool {
-    name.ends_with('n')
+    name.trim_end_matches("_i").ends_with('n')
 }
 
 /// Dark violet through green to yellow: anchors at equal steps of lightness, straight lines between.

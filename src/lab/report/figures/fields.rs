@@ -14,6 +14,10 @@ pub(super) fn draw(view: &RunView<'_>) -> Option<Figure> {
     let first = view.heats.iter().map(|heat| heat.layer).min()?;
     let find =
         |name: &str| view.heats.iter().find(|heat| heat.layer == first && heat.pathway == name);
+    if find("pp_i").is_some() {
+        // a field of four arrays
+        return None;
+    }
     let (plus, minus, formula) = match (find("pp"), find("np")) {
         (Some(plus), Some(minus)) => (plus, minus, "pp − np"),
         _ => (find("e")?, find("i")?, "e − i"),

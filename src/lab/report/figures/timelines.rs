@@ -69,7 +69,7 @@ fn legend(view: &RunView<'_>) -> String {
         if !seen.contains(&one.pathway.as_str()) {
             seen.push(&one.pathway);
             let sign = if one.excites { "excites" } else { "inhibits" };
-            let target = match one.pathway.as_str() {
+            let target = match one.pathway.trim_end_matches("_i") {
                 "pp" | "np" => " p",
                 "nn" | "pn" => " n, dashed",
                 _ => "",
