@@ -24,7 +24,7 @@ mod trains;
 mod words;
 mod write;
 
-pub use optimise::{Asks, Form};
+pub use optimise::{Adam, Asks, Form, Momentum};
 pub use pulses::{Collect, Collected, RowPeaks};
 pub use trains::ColumnTrain;
 pub use write::{WriteRequest, Written};

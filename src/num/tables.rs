@@ -6,6 +6,7 @@
 //! lsh      = least shift >= 0 with 2^(lut_bits - 1 + lsh) units >= 4 alpha (sigmoid), 4 (ReLU, identity)
 //! exact    : units are rational, so tables of ReLU and identity, and their lsh, are computed in integers:
 //!            lut_a[i] = floor( (2 * 255 * i * 2^p + D) / (2 D) ),  p = lsh + log2(weight_max) - level_bits,  D = 2^drive_bits - 1
+//! c, 2^14 - c, scales of a layer by its sums: `scales`
 //! k        = integer nearest to -log2( rate / (B m) * 2^error_bits
 //!            / ( (2^drive_bits - 1) (2^(error_bits-1) - 1) 255 * 2 alpha ) * 2^level_bits / weight_max ),  0..=30
 //! ```
@@ -18,8 +19,10 @@
 mod policy;
 #[cfg(test)]
 pub(crate) mod precise;
+mod scales;
 
 pub use policy::PolicyTables;
+pub use scales::{Factor, Scales};
 
 use super::fixed::{
     Batch, DriveBits, ErrorBits, LevelBits, LutBits, OutOfRange, RateMantissa, log2_ceil, narrow,
@@ -212,6 +215,16 @@ pub enum RateOf {
     Sums,
     /// The chance of a pulse itself: `k` is the integer nearest to `-log2(rate)`.
     Pulses,
+    /// The root mean square of the steps of the weights of a layer, times `sqrt(fan_in)`. What stands in the place of `k` is
+    /// `2^14 - c`, `c = floor( 256 (log2(cells)/2 + log2(rho)) + 1/2 )`, where `rho` is that step in levels.
+    Levels {
+        /// Inputs of a pathway.
+        fan_in: usize,
+        /// Cells that the mean is taken over.
+        cells: usize,
+    },
+    /// The step of a weight for a request of `2^12`.
+    Requests,
 }
 
 /// What a layer's rate is made of.
@@ -238,20 +251,37 @@ pub const STEP_SHIFT_MAX: u32 = 30;
 
 /// Greatest shift of a rate.
 pub const SHIFT_MAX: u32 = 30;
+/// What stands in its place where a rate is of levels.
+pub const LEVELS_SHIFT_MAX: u32 = 1 << 15;
 
 impl Rate {
+    /// Levels in a weight of 1.
+    fn levels(self) -> f64 {
+        libm::exp2(f64::from(self.unit.level_bits.get()))
+            / libm::exp2(f64::from(self.unit.weight_max_log2))
+    }
+
     fn shift_exact(self) -> f64 {
-        if self.of == RateOf::Pulses {
-            return -libm::log2(self.rate.0);
+        match self.of {
+            RateOf::Sums => {}
+            RateOf::Pulses => return -libm::log2(self.rate.0),
+            RateOf::Levels { fan_in, cells } => {
+                #[expect(clippy::cast_precision_loss, reason = "sizes of arrays, below 2^40")]
+                let [fan_in, cells] = [fan_in, cells].map(|count| libm::log2(count as f64));
+                let rho = libm::log2(self.rate.0 * self.levels()) - 0.5 * fan_in;
+                return 64.0 - (0.5 * cells + rho);
+            }
+            RateOf::Requests => {
+                let mantissa = f64::from(self.mantissa.get());
+                return 12.0 - libm::log2(self.rate.0 / mantissa * self.levels());
+            }
         }
         let rail = f64::from((1u32 << (self.error_bits.get() - 1)) - 1);
         let codes = f64::from(self.unit.drive_bits.code_max());
         let scale = libm::exp2(f64::from(self.error_bits.get()))
             / (codes * rail * 255.0 * self.activation.steepness());
-        let levels = libm::exp2(f64::from(self.unit.level_bits.get()))
-            / libm::exp2(f64::from(self.unit.weight_max_log2));
         let samples = f64::from(self.batch.get()) * f64::from(self.mantissa.get());
-        -libm::log2(self.rate.0 / samples * scale * levels)
+        -libm::log2(self.rate.0 / samples * scale * self.levels())
     }
 
     /// `k` before any decay: the integer nearest to the exact shift.
@@ -259,6 +289,9 @@ impl Rate {
     /// # Errors
     /// When it lies outside `0..=SHIFT_MAX`: no shift stands for such a rate.
     pub fn shift(self) -> Result<u32, OutOfRange> {
+        if matches!(self.of, RateOf::Levels { .. }) {
+            return Ok(self.shift_at(Decay::Constant, 0, 1));
+        }
         let nearest = libm::floor(self.shift_exact() + 0.5);
         #[expect(clippy::cast_possible_truncation, reason = "a logarithm: some hundreds at most")]
         let found = nearest as i64;
@@ -289,8 +322,15 @@ impl Rate {
     /// As of [`Rate::shift`].
     pub fn effective(self) -> Result<Positive, OutOfRange> {
         let k = self.shift()?;
-        if self.of == RateOf::Pulses {
-            return Ok(Positive(libm::exp2(-f64::from(k))));
+        match self.of {
+            RateOf::Sums => {}
+            RateOf::Pulses => return Ok(Positive(libm::exp2(-f64::from(k)))),
+            // to a 256th of a doubling; the mantissas of the moment come within 6 % of it
+            RateOf::Levels { .. } => return Ok(self.rate),
+            RateOf::Requests => {
+                let mantissa = f64::from(self.mantissa.get());
+                return Ok(Positive(libm::exp2(12.0 - f64::from(k)) * mantissa / self.levels()));
+            }
         }
         let rail = f64::from((1u32 << (self.error_bits.get() - 1)) - 1);
         let codes = f64::from(self.unit.drive_bits.code_max());
@@ -343,10 +383,15 @@ impl Rate {
             Decay::Cosine => 0.5 * (1.0 + libm::cos(std::f64::consts::PI * t)),
             Decay::Linear => 1.0 - t,
         };
-        let nearest = libm::floor(self.shift_exact() - libm::log2(factor) + 0.5);
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0..=30")]
+        let exact = self.shift_exact() - libm::log2(factor);
+        let (nearest, end) = match self.of {
+            // 2^14 - floor(x + 1/2) of 2^14 less the exact one
+            RateOf::Levels { .. } => (libm::ceil(256.0 * exact - 0.5), LEVELS_SHIFT_MAX),
+            _ => (libm::floor(exact + 0.5), SHIFT_MAX),
+        };
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0..=end")]
         {
-            nearest.min(f64::from(SHIFT_MAX)) as u32
+            nearest.clamp(0.0, f64::from(end)) as u32
         }
     }
 }

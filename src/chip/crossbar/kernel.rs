@@ -366,7 +366,7 @@ impl Kernel {
     ) -> WriteCounts {
         assert!(write.floor <= write.ceiling, "the window is not empty");
         let sums = sums.into();
-        let shift_max = if matches!(sums, Sums::Narrow(_)) { 31 } else { 39 };
+        let shift_max = if matches!(sums, Sums::Narrow(_)) { 31 } else { 55 };
         let fits = write.shift <= shift_max && (1..=15).contains(&write.mantissa);
         assert!(fits, "products fit 32 bits, and what is added before a shift too");
         assert!((1..=127).contains(&write.increment_max), "pulses fit a byte");

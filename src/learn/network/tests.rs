@@ -185,6 +185,8 @@ fn networks_whose_layers_are_numbered_through_share_no_draw() {
     longer.layers.insert(1, second);
     longer.rates = vec![network.rates[0]; 4];
     longer.mantissas = vec![network.mantissas[0]; 4];
+    longer.optimisers = vec![Optimiser::Plain; 4];
+    longer.centred = vec![false; 4];
     let longer = build(&longer, PLACE).unwrap();
     assert_eq!(levels(&longer, 3), levels(&critic, 1));
     assert_ne!(levels(&longer, 3), levels(&actor, 1));
