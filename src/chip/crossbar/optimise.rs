@@ -16,7 +16,7 @@ pub use adam::Adam;
 pub use momentum::Momentum;
 
 use super::StripMut;
-use super::kernel::{Draws, Half, Kernel, SignLaw, Squares, WriteCounts, WriteLaw, is_driven};
+use super::kernel::{Draws, Half, Kernel, SignLaw, WriteCounts, WriteLaw, is_driven, joined};
 use super::layout::{BLOCK_ROWS, HALF_CELLS, HALF_COLUMNS, PANEL_COLUMNS};
 use super::pulses::Collector;
 use super::words::Words;
@@ -39,8 +39,10 @@ pub enum Asks<'a> {
     Signs(SignLaw),
     /// Nothing.
     Nothing,
-    /// As many pulses as they are rounded to.
+    /// As many pulses as they are rounded to. They may be 16 times as large as those of a batch.
     Sums,
+    /// The same, of sums that are not.
+    Narrow,
     /// What comes of accumulators of the cells, which lie as sums do.
     Momentum(Momentum, &'a mut [i64]),
     /// What comes of two means of the cells, which lie as sums do.
@@ -60,7 +62,7 @@ impl Asks<'_> {
     fn requests(&mut self, sums: &Half<i32>, at: usize) -> Half<i64> {
         let mut requests = sums.map(i64::from);
         match self {
-            Self::Signs(_) | Self::Nothing | Self::Sums => {}
+            Self::Signs(_) | Self::Nothing | Self::Narrow | Self::Sums => {}
             Self::Momentum(momentum, moments) => {
                 for (request, moment) in requests.iter_mut().zip(&mut moments[at..]) {
                     *moment = momentum.after(*moment, *request);
@@ -88,16 +90,17 @@ impl StripMut<'_> {
         gates: &[i8],
         form: Form<'_>,
         sums: &mut [i32],
-    ) -> Squares {
+    ) -> u128 {
         let blocks = self.layout.blocks();
-        let mut squares = [0; 2];
+        let mut squares = 0;
         if request.stride == 0 {
             sums.fill(0);
             return squares;
         }
         for (half, gates) in gates.chunks_exact(HALF_COLUMNS * request.stride).enumerate() {
             let live = is_driven(gates);
-            let totals = if live && form.means.is_some() { totals(gates) } else { [0; _] };
+            let centred = live && form.means.is_some();
+            let totals = if centred { kernel.gate_totals(gates) } else { [0; _] };
             for (block, turned) in request.turned.iter().enumerate() {
                 let sums = half_of(sums, place(half, block, blocks));
                 match turned {
@@ -109,8 +112,8 @@ impl StripMut<'_> {
                     kernel.centre(sums, means, &totals);
                 }
                 if form.squares && live {
-                    let more = kernel.squares(sums);
-                    squares.iter_mut().zip(more).for_each(|(sum, more)| *sum += more);
+                    let more = kernel.squares(sums, form.means.is_some());
+                    squares += joined(more);
                 }
             }
         }
@@ -157,6 +160,14 @@ impl StripMut<'_> {
                             kernel.program_signs(cells, sums, &law, words, request.write.ends());
                     }
                     groups
+                } else if let Asks::Narrow = asks {
+                    let groups = kernel.may_move(sums, &request.write, bits.get());
+                    if groups != 0 {
+                        let law = WriteLaw { groups, ..request.write };
+                        let words = words.draw(kernel, column, block);
+                        counts += kernel.program(cells, sums, &law, words);
+                    }
+                    groups
                 } else {
                     let requests = asks.requests(sums, at);
                     let groups = kernel.may_move(&requests, &request.write, bits.get());
@@ -183,15 +194,4 @@ const fn place(half: usize, block: usize, blocks: usize) -> usize {
 
 fn half_of(sums: &mut [i32], at: usize) -> &mut Half<i32> {
     (&mut sums[at..at + HALF_CELLS]).try_into().expect("a half block has 1024 sums")
-}
-
-/// Sums of the gates of the columns of a half block.
-fn totals(gates: &[i8]) -> [i32; HALF_COLUMNS] {
-    let mut totals = [0; HALF_COLUMNS];
-    for quad in gates.as_chunks::<{ 4 * HALF_COLUMNS }>().0 {
-        for (total, gates) in totals.iter_mut().zip(quad.as_chunks::<4>().0) {
-            *total += gates.iter().map(|&gate| i32::from(gate)).sum::<i32>();
-        }
-    }
-    totals
 }

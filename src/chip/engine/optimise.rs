@@ -14,7 +14,7 @@ mod tests;
 use super::Engine;
 use super::each::each;
 use super::update::{Ready, SUM_BITS, strips};
-use crate::chip::crossbar::kernel::{MEAN_BITS, SignLaw, joined};
+use crate::chip::crossbar::kernel::{MEAN_BITS, SignLaw};
 use crate::chip::crossbar::layout::{BLOCK_ROWS, PANEL_COLUMNS};
 use crate::chip::crossbar::{Adam, Asks, Crossbar, Form, Momentum, Written};
 use crate::chip::layer::requests::{dead_zone, first_mean, next_mean};
@@ -88,7 +88,7 @@ impl Engine {
             let squares = strip.form(kernel, &ready.request(array), gates, form, sums);
             (strip.panels().start, (array, strip, &*sums), squares)
         });
-        let squares: u128 = formed.iter().map(|(.., squares)| joined(*squares)).sum();
+        let squares: u128 = formed.iter().map(|(.., squares)| squares).sum();
         let finer = if window.is_some() { MEAN_BITS } else { 0 };
         let pairs = this.spec.wiring.shift_extra();
         let chance = shift + pairs;
@@ -127,6 +127,7 @@ impl Engine {
             request.write.mantissa = i32::try_from(scale).expect("1..=15");
             let asks = match optimiser {
                 _ if silent => Asks::Nothing,
+                Optimiser::Plain | Optimiser::Rms if finer == 0 && shift <= 31 => Asks::Narrow,
                 Optimiser::Plain | Optimiser::Rms => Asks::Sums,
                 Optimiser::Sign { .. } => {
                     Asks::Signs(SignLaw::new(least, chance, request.write.negate))
@@ -151,20 +152,16 @@ impl Engine {
     }
 
     /// Sums of the drive codes of each row, padded, by set of drives.
-    fn codes(&self, layer: usize, ready: &Ready<'_>) -> [Vec<i64>; 2] {
+    fn codes(&mut self, layer: usize, ready: &Ready<'_>) -> [Vec<i64>; 2] {
         let mut codes = [vec![], vec![]];
-        for (set, turned) in self.layers[layer].spec.drive_sets().iter().zip(&ready.turned) {
-            for block in turned {
-                let row = |row: &[u8]| -> i64 {
-                    row.iter().map(|&code| u32::from(code)).sum::<u32>().into()
-                };
-                match block {
-                    Some(rows) => {
-                        codes[set.index()].extend(rows.chunks_exact(ready.stride).map(row))
-                    }
-                    None => codes[set.index()].extend([0; BLOCK_ROWS]),
-                }
-            }
+        let sets = self.layers[layer].spec.drive_sets();
+        let blocks: Vec<_> = ready.turned.iter().flatten().copied().collect();
+        let sums = self.team.alone(blocks, |kernel, block| {
+            block.map_or([0; BLOCK_ROWS], |turned| kernel.drive_totals(turned, ready.stride))
+        });
+        let rows = sums.chunks((sums.len() / sets.len()).max(1));
+        for (set, rows) in sets.iter().zip(rows) {
+            codes[set.index()].extend(rows.as_flattened().iter().map(|&sum| i64::from(sum)));
         }
         codes
     }

@@ -56,6 +56,8 @@ pub(super) const OPS: Ops = Ops {
     pulses,
     levels,
     centre,
+    gate_totals,
+    drive_totals,
     squares,
     loud,
     signs,

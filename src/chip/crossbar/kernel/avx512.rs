@@ -70,6 +70,8 @@ pub(super) const OPS: Ops = Ops {
     pulses,
     levels,
     centre,
+    gate_totals,
+    drive_totals,
     squares,
     loud,
     signs,
