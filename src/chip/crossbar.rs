@@ -11,10 +11,11 @@ use aligned_vec::{AVec, avec};
 use bitvec::prelude::*;
 
 use super::hardware::{FloorKind, Hardware, Window};
-use crate::num::draw::{Place, Site};
+
 use kernel::{Cells, Drives, Kernel};
 use layout::{BLOCK_CELLS, BLOCK_ROWS, HALF_CELLS, HALF_COLUMNS, Layout, PANEL_COLUMNS};
 
+mod initial;
 pub mod kernel;
 pub mod layout;
 mod optimise;
@@ -24,6 +25,7 @@ mod trains;
 mod words;
 mod write;
 
+pub use initial::{InitialLaw, initial_levels, initial_scale};
 pub use optimise::{Adam, Asks, Form, Momentum};
 pub use pulses::{Collect, Collected, RowPeaks};
 pub use trains::ColumnTrain;
@@ -263,67 +265,5 @@ impl Crossbar {
             residual: residual.as_mut().map(|chunks| chunks.next().expect("one chunk a strip")),
             pruned: pruned.as_mut().map(|chunks| chunks.next().expect("one chunk a strip")),
         })
-    }
-}
-
-/// The levels of a fresh array.
-///
-/// ```text
-/// level = clamp( (u G + (r << 16)) >> 32, floor, ceiling )      u, r: 16-bit words at sub 0 and sub 1
-/// ```
-///
-/// `scale` is G. Calls `row` with each row of levels.
-pub fn initial_levels(
-    layout: Layout,
-    window: Window,
-    scale: u64,
-    place: Place,
-    mut row: impl FnMut(usize, &[u16]),
-) {
-    debug_assert!(place.site == Site::InitialLevels && place.count == 0);
-    let words = |sub: u32, column, group| Place { sub, ..place }.halves(layout.rows, column, group);
-    let mut levels = vec![0; 32 * layout.columns];
-    for group in 0..layout.rows.div_ceil(32) {
-        for column in 0..layout.columns {
-            let (u, r) = (words(0, column, group), words(1, column, group));
-            for i in 0..32 {
-                let wanted = (u64::from(u[i]) * scale + (u64::from(r[i]) << 16)) >> 32;
-                let ceiling = u64::from(window.ceiling());
-                let held = wanted.clamp(u64::from(window.floor()), ceiling);
-                levels[i * layout.columns + column] = u16::try_from(held).expect("in the window");
-            }
-        }
-        for (i, levels) in levels.chunks(layout.columns).enumerate() {
-            if group * 32 + i < layout.rows {
-                row(group * 32 + i, levels);
-            }
-        }
-    }
-}
-
-/// `G = floor( 2^16 gain 2^level_bits / (weight_max sqrt(fan_in)) + 1/2 )`, exact by integer square root.
-/// `gain_64ths` is the gain in units of 1/64.
-#[must_use]
-pub fn initial_scale(gain_64ths: u32, level_bits: u32, weight_max_log2: i32, fan_in: usize) -> u64 {
-    // y = floor(2A / sqrt(f)) with A = 2^16 gain 2^level_bits / weight_max; G = floor((y + 1) / 2)
-    let exponent = 2 * (17 + i64::from(level_bits) - i64::from(weight_max_log2)) - 12;
-    let gain = u128::from(gain_64ths).pow(2);
-    let square = if exponent >= 0 { gain << exponent } else { gain >> -exponent };
-    let y = (square / fan_in as u128).isqrt();
-    u64::try_from(y.div_ceil(2)).expect("at most 2^30")
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_initial_scale_is_rounded_to_nearest() {
-        // gain 3/2, 8 bits, weight_max 4, fan_in 784: 65536 * 1.5 * 64 / 28 = 224694.857
-        assert_eq!(initial_scale(96, 8, 2, 784), 224_695);
-        // gain 1, 8 bits, weight_max 2, fan_in 4: 65536 * 128 / 2
-        assert_eq!(initial_scale(64, 8, 1, 4), 65536 * 64);
-        // 65536 * 256 / sqrt(2) = 11863283.2
-        assert_eq!(initial_scale(64, 8, 0, 2), 11_863_283);
     }
 }

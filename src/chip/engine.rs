@@ -18,7 +18,7 @@ use std::ops::Range;
 use aligned_vec::{AVec, CACHELINE_ALIGN};
 
 use super::crossbar::Collect;
-use super::crossbar::kernel::{Backend, LookUp, Team};
+use super::crossbar::kernel::{Backend, Team};
 use super::crossbar::layout::BLOCK_ROWS;
 use super::hardware::Hardware;
 use super::layer::{DrivenBy, Layer};
@@ -33,12 +33,14 @@ mod each;
 mod error;
 mod forward;
 mod mute;
+mod normalise;
 mod optimise;
 #[cfg(test)]
 mod pairs;
 mod passes;
 mod pulses;
 mod read;
+mod readout;
 mod schedule;
 mod state;
 mod tape;
@@ -50,6 +52,7 @@ mod update;
 mod words;
 
 use each::{MOVE, each};
+use forward::Units;
 use schedule::Schedule;
 
 pub use calibrate::Calibration;
@@ -173,9 +176,11 @@ struct Registers {
     gates: [Lines<i8>; 2],
     /// Drives by source stream as an update takes them: `[block][64 rows][stride]`.
     turned: [Lines<u8>; 2],
+    /// Sums by target stream, where units are normalised: they lie here until all of a stream are known.
+    unscaled: [Lines<i32>; 2],
     /// Accumulators by target stream, of the last layer.
     accumulators: [Vec<i64>; 2],
-    /// Activities by target stream, of the last layer.
+    /// Activities by target stream, of the last layer where it has some.
     activities: [Vec<u8>; 2],
     /// Row sums of the last transposed read, `[sample][rows]`.
     backward: Vec<i64>,
@@ -232,8 +237,8 @@ pub struct Engine {
     scales: Option<Scales>,
     unit: ErrorUnit,
     layers: Vec<Layer>,
-    /// What units hand on and how steep they are there, by layer.
-    tables: Vec<LookUp>,
+    /// What units do with their accumulators, by layer.
+    units: Vec<Units>,
     registers: Vec<Registers>,
     currents: Vec<Currents>,
     /// What layers said while they were evaluated.
@@ -269,7 +274,7 @@ impl Engine {
             if schedule.is_some() { Ledger::with_cycles(count) } else { Ledger::new(count) };
         let last = layers.len() - 1;
         let codes = |layer: usize| (layer < last).then_some(hardware.drive.bits);
-        let tables = layers.iter().zip(0..).map(|(l, at)| l.look_up(codes(at))).collect();
+        let units = layers.iter().zip(0..).map(|(l, at)| Units::new(l, codes(at))).collect();
         let collect = passes::collect(&hardware);
         Self {
             backend,
@@ -288,7 +293,7 @@ impl Engine {
             currents: vec![[[0; 2]; 2]; layers.len()],
             said: vec![mute::Said::default(); layers.len()],
             row_sums: vec![None; layers.len()],
-            tables,
+            units,
             layers,
             samples: 0,
             loaded: [0; 3],
@@ -428,29 +433,6 @@ impl Engine {
     pub fn take_currents(&mut self) -> Vec<Currents> {
         let zero = vec![[[0; 2]; 2]; self.layers.len()];
         std::mem::replace(&mut self.currents, zero)
-    }
-
-    /// Accumulator and activity of a unit of the last layer, of one of its target streams.
-    ///
-    /// # Panics
-    /// When the last layer has no such stream, or has not been read.
-    #[must_use]
-    pub fn output(&self, target: Stream, sample: usize, unit: usize) -> (i64, u8) {
-        let registers = self.registers.last().expect("a network has layers");
-        let (at, stream) = (self.register_at(sample, unit), target.index());
-        (registers.accumulators[stream][at], registers.activities[stream][at])
-    }
-
-    /// Accumulator of a unit of the last layer's p stream, which predicts.
-    #[must_use]
-    pub fn output_accumulator(&self, sample: usize, unit: usize) -> i64 {
-        self.output(Stream::P, sample, unit).0
-    }
-
-    /// Activity code of a unit of the last layer's p stream.
-    #[must_use]
-    pub fn output_activity(&self, sample: usize, unit: usize) -> u8 {
-        self.output(Stream::P, sample, unit).1
     }
 
     /// Row sums of the last transposed read of `layer`, `[sample][inputs]`.

@@ -14,7 +14,7 @@ use super::hardware::{Adc, AdcRange, Hardware};
 use super::periphery;
 use super::population::{Stream, Wiring};
 use crate::num::fixed::DriveBits;
-use crate::num::tables::{Activation, Lut, Unit};
+use crate::num::tables::{Activation, FullDrive, Lut, Unit};
 
 mod delivery;
 pub mod requests;
@@ -31,6 +31,19 @@ pub enum DrivenBy {
     Shared,
     /// A set for each stream: activities of the array before.
     Streams,
+    /// A set for each stream: normalised activities of the array before, of which code 32 is 1.
+    Normalised,
+}
+
+impl DrivenBy {
+    /// What code 255 stands for.
+    #[must_use]
+    pub const fn full_drive(self) -> FullDrive {
+        match self {
+            Self::Shared | Self::Streams => FullDrive::One,
+            Self::Normalised => FullDrive::Normalised,
+        }
+    }
 }
 
 /// What a layer is made of. A network is a list of stages, input to output; an array, which is a layer, is the only
@@ -49,10 +62,26 @@ pub struct LayerSpec {
     pub activation: Activation,
     /// `log2(weight_max)`.
     pub weight_max_log2: i32,
-    /// Initial gain of excitatory and of inhibitory arrays, in 64ths.
-    pub gain_64ths: [u32; 2],
+    /// How initial levels are drawn.
+    pub initial: InitialLevels,
     /// Whether a constant row is driven at full code.
     pub constant_row: bool,
+}
+
+/// How the levels of a new layer are drawn.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum InitialLevels {
+    /// Evenly between 0 and a greatest level.
+    Uniform {
+        /// Gain of excitatory and of inhibitory arrays, in 64ths.
+        gain_64ths: [u32; 2],
+    },
+    /// The absolute value of a Gaussian, of excitatory and inhibitory arrays alike.
+    AbsGaussian {
+        /// Gain, as numerator and denominator, of a width of `1 / sqrt(2 fan_in)`.
+        gain: [u32; 2],
+    },
 }
 
 impl LayerSpec {
@@ -61,7 +90,7 @@ impl LayerSpec {
     pub const fn drives_of(&self, source: Stream) -> Stream {
         match self.driven_by {
             DrivenBy::Shared => Stream::P,
-            DrivenBy::Streams => source,
+            DrivenBy::Streams | DrivenBy::Normalised => source,
         }
     }
 
@@ -70,7 +99,7 @@ impl LayerSpec {
     pub const fn drive_sets(&self) -> &'static [Stream] {
         match self.driven_by {
             DrivenBy::Shared => &[Stream::P],
-            DrivenBy::Streams => self.wiring.sources(),
+            DrivenBy::Streams | DrivenBy::Normalised => self.wiring.sources(),
         }
     }
 
@@ -226,6 +255,7 @@ pub fn unit(spec: &LayerSpec, hardware: &Hardware) -> Unit {
         weight_max_log2: spec.weight_max_log2,
         level_bits: hardware.cell.level_bits,
         drive_bits: hardware.drive.bits,
+        full_drive: spec.driven_by.full_drive(),
     }
 }
 

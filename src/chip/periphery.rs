@@ -12,6 +12,8 @@
 //! A saturation is a value that its clamp changed; reaching the rail is none. See docs/MODEL.md, 2.
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
+pub mod normalise;
+
 use super::hardware::Subtract;
 use crate::num::fixed::{AdcBits, DriveBits, ErrorBits, rsh, sat};
 

@@ -3,6 +3,7 @@
 //! ```text
 //! dual stream     target p: E = pp, I = np        target n: E = nn, I = pn
 //! single stream   W = E - I of two unsigned cells (codes 0 and 4): breaks Dale's law, for baselines
+//! dual pairs      each of the four pathways is such a pair: what both pairs of a target read adds up
 //! ```
 //!
 //! A pathway is written source then target. `pp` and `nn` excite, `np` and `pn` inhibit; polarity belongs to
@@ -73,6 +74,17 @@ const NN: Pathway = pathway(2, "nn", N, N, Excites);
 const PN: Pathway = pathway(3, "pn", P, N, Inhibits);
 const PLUS: Pathway = pathway(0, "e", P, P, Excites);
 const MINUS: Pathway = pathway(4, "i", P, P, Inhibits);
+/// Pathways as differential pairs: those that excite, then those that inhibit.
+const PAIRS: [Pathway; 8] = [
+    PP,
+    Pathway { polarity: Excites, ..NP },
+    NN,
+    Pathway { polarity: Excites, ..PN },
+    pathway(4, "pp_i", P, P, Inhibits),
+    pathway(5, "np_i", N, P, Inhibits),
+    pathway(6, "nn_i", N, N, Inhibits),
+    pathway(7, "pn_i", P, N, Inhibits),
+];
 
 /// How a layer's arrays are wired.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -84,10 +96,10 @@ pub enum Wiring {
     DualReadout,
     /// One signed stream of differential pairs.
     Single,
-    /// Two populations whose four pathways are differential pairs: no rule uses it yet, so that it is here to show that
-    /// a target may have more than two banks.
-    #[cfg(test)]
+    /// Two populations whose four pathways are differential pairs.
     DualPairs,
+    /// Two populations read, one read out, both of its pathways differential pairs.
+    DualReadoutPairs,
 }
 
 impl Wiring {
@@ -98,8 +110,8 @@ impl Wiring {
             Self::Dual => "dual",
             Self::DualReadout => "dual_readout",
             Self::Single => "single",
-            #[cfg(test)]
             Self::DualPairs => "dual_pairs",
+            Self::DualReadoutPairs => "dual_readout_pairs",
         }
     }
 
@@ -110,8 +122,8 @@ impl Wiring {
             Self::Dual => &[PP, NP, NN, PN],
             Self::DualReadout => &[PP, NP],
             Self::Single => &[PLUS, MINUS],
-            #[cfg(test)]
-            Self::DualPairs => &tests::PAIRS,
+            Self::DualPairs => &PAIRS,
+            Self::DualReadoutPairs => &[PAIRS[0], PAIRS[1], PAIRS[4], PAIRS[5]],
         }
     }
 
@@ -119,10 +131,8 @@ impl Wiring {
     #[must_use]
     pub const fn targets(self) -> &'static [Stream] {
         match self {
-            Self::Dual => &[P, N],
-            #[cfg(test)]
-            Self::DualPairs => &[P, N],
-            Self::DualReadout | Self::Single => &[P],
+            Self::Dual | Self::DualPairs => &[P, N],
+            Self::DualReadout | Self::DualReadoutPairs | Self::Single => &[P],
         }
     }
 
@@ -130,10 +140,8 @@ impl Wiring {
     #[must_use]
     pub const fn sources(self) -> &'static [Stream] {
         match self {
-            Self::Dual | Self::DualReadout => &[P, N],
+            Self::Dual | Self::DualReadout | Self::DualPairs | Self::DualReadoutPairs => &[P, N],
             Self::Single => &[P],
-            #[cfg(test)]
-            Self::DualPairs => &[P, N],
         }
     }
 
@@ -142,10 +150,9 @@ impl Wiring {
     #[must_use]
     pub const fn pairs(self, target: Stream) -> &'static [[usize; 2]] {
         match (self, target) {
-            #[cfg(test)]
             (Self::DualPairs, P) => &[[0, 4], [1, 5]],
-            #[cfg(test)]
             (Self::DualPairs, N) => &[[2, 6], [3, 7]],
+            (Self::DualReadoutPairs, _) => &[[0, 2], [1, 3]],
             (_, P) => &[[0, 1]],
             (_, N) => &[[2, 3]],
         }
@@ -168,9 +175,7 @@ impl Wiring {
     pub const fn shift_extra(self) -> u32 {
         match self {
             Self::Dual | Self::DualReadout => 0,
-            Self::Single => 1,
-            #[cfg(test)]
-            Self::DualPairs => 1,
+            Self::Single | Self::DualPairs | Self::DualReadoutPairs => 1,
         }
     }
 }
@@ -179,22 +184,17 @@ impl Wiring {
 mod tests {
     use super::*;
 
-    /// Pathways of [`Wiring::DualPairs`].
-    pub(super) const PAIRS: [Pathway; 8] = [
-        pathway(0, "pp", P, P, Excites),
-        pathway(1, "np", N, P, Excites),
-        pathway(2, "nn", N, N, Excites),
-        pathway(3, "pn", P, N, Excites),
-        pathway(4, "pp_i", P, P, Inhibits),
-        pathway(5, "np_i", N, P, Inhibits),
-        pathway(6, "nn_i", N, N, Inhibits),
-        pathway(7, "pn_i", P, N, Inhibits),
+    const ALL: [Wiring; 5] = [
+        Wiring::Dual,
+        Wiring::DualReadout,
+        Wiring::Single,
+        Wiring::DualPairs,
+        Wiring::DualReadoutPairs,
     ];
 
     #[test]
     fn the_banks_of_a_target_excite_and_inhibit_it() {
-        let all = [Wiring::Dual, Wiring::DualReadout, Wiring::Single, Wiring::DualPairs];
-        for wiring in all {
+        for wiring in ALL {
             for &target in wiring.targets() {
                 for pair in wiring.pairs(target) {
                     let [e, i] = pair.map(|at| wiring.pathways()[at]);
@@ -206,6 +206,16 @@ mod tests {
                 assert!(wiring.banks(target).len() <= BANKS_MAX);
             }
             assert!(wiring.pathways().is_sorted_by_key(|pathway| pathway.code));
+        }
+    }
+
+    #[test]
+    fn a_pair_joins_two_cells_of_one_pathway_and_the_one_that_inhibits_adds_4_to_the_code() {
+        for wiring in ALL.into_iter().filter(|wiring| wiring.shift_extra() == 1) {
+            for (_, pair) in wiring.planes() {
+                let [e, i] = pair.map(|at| wiring.pathways()[at]);
+                assert_eq!((e.source, e.target, e.code + 4), (i.source, i.target, i.code));
+            }
         }
     }
 

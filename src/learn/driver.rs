@@ -145,7 +145,7 @@ mod tests {
     use crate::chip::crossbar::kernel::Backend;
     use crate::chip::engine::Phase;
     use crate::chip::hardware::{DitherBits, Hardware};
-    use crate::chip::layer::{Delivery, DrivenBy, Layer, LayerSpec};
+    use crate::chip::layer::{Delivery, DrivenBy, InitialLevels, Layer, LayerSpec};
     use crate::chip::ledger::{During, Event};
     use crate::chip::population::Wiring;
     use crate::learn::error::Centre;
@@ -171,7 +171,7 @@ mod tests {
             driven_by: DrivenBy::Shared,
             activation: Activation::Identity,
             weight_max_log2: 2,
-            gain_64ths: [64, 64],
+            initial: InitialLevels::Uniform { gain_64ths: [64, 64] },
             constant_row: false,
         };
         let dense = Route::RandomDense { shift: Some(0) };

@@ -18,14 +18,14 @@ use super::error::{Centre, ErrorUnit};
 use super::route::Route;
 use super::rule::{Rule, UpdateMode};
 use crate::chip::crossbar::kernel::Backend;
-use crate::chip::crossbar::{initial_levels, initial_scale};
+use crate::chip::crossbar::{InitialLaw, initial_levels, initial_scale};
 use crate::chip::engine::{Engine, Operation};
 use crate::chip::hardware::Hardware;
-use crate::chip::layer::{self, Delivery, Layer, LayerSpec, Optimiser, PlanError};
+use crate::chip::layer::{self, Delivery, InitialLevels, Layer, LayerSpec, Optimiser, PlanError};
 use crate::chip::population::{Pathway, Polarity};
 use crate::num::draw::{Place, Site};
 use crate::num::fixed::{Batch, RateMantissa, log2_ceil};
-use crate::num::tables::{Decay, Positive, Rate, RateOf};
+use crate::num::tables::{Activation, Decay, Positive, Rate, RateOf, half_gaussian};
 
 /// `log2` of the batches after which a mean drive has come all the way, were it not to turn: 0.1 a batch is the rate that
 /// was measured, and an eighth the nearest power of two.
@@ -201,7 +201,11 @@ impl NetworkSpec {
         let windows: Vec<_> = self.centred.iter().map(|on| on.then_some(window)).collect();
         engine.set_centred(&windows);
         load_initial_levels(&mut engine, place.seed);
-        let unit = ErrorUnit::new(self.centre, hardware.digital.error_bits, self.outputs());
+        let bits = hardware.digital.error_bits;
+        let unit = match self.layers.last().map(|last| last.activation) {
+            Some(Activation::Accumulator) => ErrorUnit::handed(bits),
+            _ => ErrorUnit::new(self.centre, bits, self.outputs()),
+        };
         let learning = Learning { rule: self.rule, mode: self.mode, shifts };
         Ok(Driver::new(engine, learning, unit))
     }
@@ -253,15 +257,25 @@ fn rate_of(spec: &LayerSpec, optimiser: Optimiser) -> RateOf {
 /// Draws the initial levels of every array and loads them row by row.
 fn load_initial_levels(engine: &mut Engine, seed: u64) {
     let (level_bits, window) = (engine.hardware().cell.level_bits, engine.hardware().cell.window);
+    let half = half_gaussian();
     for layer in 0..engine.layers().len() {
         let this = &engine.layers()[layer];
         let (layout, number, wiring) = (this.layout, this.index, this.spec.wiring);
-        let (gains, weight_max_log2, fan_in) =
-            (this.spec.gain_64ths, this.spec.weight_max_log2, this.spec.inputs);
+        let (initial, weight_max_log2, fan_in) =
+            (this.spec.initial, this.spec.weight_max_log2, this.spec.inputs);
         for (array, pathway) in wiring.pathways().iter().enumerate() {
             let inhibits = pathway.polarity == Polarity::Inhibits;
-            let gain = gains[usize::from(inhibits)];
-            let scale = initial_scale(gain, level_bits.get(), weight_max_log2, fan_in);
+            let scale = |gain, halved| {
+                initial_scale(gain, halved, level_bits.get(), weight_max_log2, fan_in)
+            };
+            let law = match initial {
+                InitialLevels::Uniform { gain_64ths } => {
+                    InitialLaw::Uniform(scale([gain_64ths[usize::from(inhibits)], 64], false))
+                }
+                InitialLevels::AbsGaussian { gain } => {
+                    InitialLaw::AbsGaussian(scale(gain, true), &half)
+                }
+            };
             let place = Place {
                 seed,
                 site: Site::InitialLevels,
@@ -270,7 +284,7 @@ fn load_initial_levels(engine: &mut Engine, seed: u64) {
                 sub: 0,
                 count: 0,
             };
-            initial_levels(layout, window, scale, place, |row, levels| {
+            initial_levels(layout, window, law, place, |row, levels| {
                 engine.execute(&Operation::LoadWeights { layer, array, row, levels });
             });
         }

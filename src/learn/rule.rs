@@ -2,6 +2,8 @@
 //! never touches a cell.
 
 use crate::chip::engine::Write;
+use crate::chip::population::Wiring;
+use crate::num::tables::Activation;
 use std::ops::Range;
 
 mod bp;
@@ -45,12 +47,31 @@ pub enum UpdateMode {
     Online,
 }
 
+/// What a last layer is read out of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Readout {
+    /// Stream p.
+    P,
+    /// All its streams: `acc_p - acc_n`, or the one that there is.
+    All,
+}
+
+impl Readout {
+    /// That of a last layer with units of this kind.
+    #[must_use]
+    pub fn of(activation: Activation) -> Self {
+        if activation == Activation::Accumulator { Self::All } else { Self::P }
+    }
+}
+
 /// A learning rule.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Rule {
     /// Error diffusion: every layer hears the output error over its route.
     Ed,
+    /// As `Ed`, on two populations whose pathways are differential pairs: what Dale's law costs.
+    EdNonDalean,
     /// Kaneko's original: error diffusion that only potentiates.
     Kaneko,
     /// Direct feedback alignment on differential pairs: random dense route.
@@ -66,11 +87,26 @@ impl Rule {
         matches!(self, Self::Ed | Self::Kaneko)
     }
 
+    /// The arrays of a layer whose units drive others and, with `readout`, of a last one: whether it is read out of all
+    /// streams or of stream p alone.
+    #[must_use]
+    pub const fn wiring(self, readout: Option<Readout>) -> Wiring {
+        match (self, readout) {
+            (Self::Ed | Self::Kaneko, None | Some(Readout::All)) => Wiring::Dual,
+            (Self::Ed | Self::Kaneko, Some(Readout::P)) => Wiring::DualReadout,
+            (Self::EdNonDalean, None | Some(Readout::All)) => Wiring::DualPairs,
+            (Self::EdNonDalean, Some(Readout::P)) => Wiring::DualReadoutPairs,
+            (Self::Dfa | Self::Bp, _) => Wiring::Single,
+        }
+    }
+
     /// The steps of one update of `layers` layers over a batch whose forward pass is done.
     #[must_use]
     pub(crate) fn steps(self, mode: UpdateMode, layers: usize, samples: usize) -> Vec<Step> {
         match self {
-            Self::Ed | Self::Kaneko | Self::Dfa => ed::steps(mode, layers, samples),
+            Self::Ed | Self::EdNonDalean | Self::Kaneko | Self::Dfa => {
+                ed::steps(mode, layers, samples)
+            }
             Self::Bp => bp::steps(mode, layers, samples),
         }
     }
@@ -101,7 +137,7 @@ mod tests {
 
     #[test]
     fn ed_delivers_each_layer_once_and_never_reads_backwards() {
-        for rule in [Rule::Ed, Rule::Kaneko, Rule::Dfa] {
+        for rule in [Rule::Ed, Rule::EdNonDalean, Rule::Kaneko, Rule::Dfa] {
             let steps = rule.steps(UpdateMode::Accumulate, 2, 5);
             assert_eq!(
                 steps,
@@ -119,8 +155,14 @@ mod tests {
 
     #[test]
     fn differential_pairs_break_dales_law() {
-        let rules = [Rule::Ed, Rule::Kaneko, Rule::Dfa, Rule::Bp];
-        assert_eq!(rules.map(Rule::is_dalean), [true, true, false, false]);
+        let rules = [Rule::Ed, Rule::Kaneko, Rule::EdNonDalean, Rule::Dfa, Rule::Bp];
+        assert_eq!(rules.map(Rule::is_dalean), [true, true, false, false, false]);
+        for rule in rules {
+            for readout in [None, Some(Readout::P), Some(Readout::All)] {
+                let breaks = rule.wiring(readout).shift_extra() == 1;
+                assert_eq!(breaks, !rule.is_dalean(), "{rule:?} {readout:?}");
+            }
+        }
     }
 
     #[test]

@@ -167,7 +167,7 @@ mod tests {
     use crate::chip::crossbar::kernel::Backend;
     use crate::chip::crossbar::layout::Layout;
     use crate::chip::hardware::{FloorKind, Window};
-    use crate::chip::layer::{DrivenBy, Layer, LayerSpec, Taps};
+    use crate::chip::layer::{DrivenBy, InitialLevels, Layer, LayerSpec, Taps};
     use crate::chip::population::Wiring;
     use crate::num::fixed::LevelBits;
     use crate::num::tables::Activation;
@@ -243,7 +243,7 @@ mod tests {
             driven_by: if wiring == Wiring::Dual { DrivenBy::Shared } else { DrivenBy::Streams },
             activation: Activation::Relu,
             weight_max_log2: 0,
-            gain_64ths: [64, 64],
+            initial: InitialLevels::Uniform { gain_64ths: [64, 64] },
             constant_row: false,
         };
         let layers = [Wiring::Dual, Wiring::DualReadout].into_iter().zip(0u16..);

@@ -16,17 +16,19 @@
 #![expect(clippy::float_arithmetic, reason = "floats become integers here and nowhere else")]
 #![deny(clippy::disallowed_types, clippy::disallowed_methods)]
 
+mod gaussian;
 mod policy;
 #[cfg(test)]
 pub(crate) mod precise;
 mod scales;
+mod unit;
 
+pub use gaussian::half_gaussian;
 pub use policy::PolicyTables;
 pub use scales::{Factor, Scales};
+pub use unit::{FullDrive, Unit};
 
-use super::fixed::{
-    Batch, DriveBits, ErrorBits, LevelBits, LutBits, OutOfRange, RateMantissa, log2_ceil, narrow,
-};
+use super::fixed::{Batch, ErrorBits, LutBits, OutOfRange, RateMantissa, narrow};
 
 /// A finite number above 0, given by the user: a width, a rate, a factor.
 ///
@@ -73,6 +75,12 @@ pub enum Activation {
     Relu,
     /// `z` in 0..=1.
     Identity,
+    /// `max(z, 0)` over its root mean square in the stream: code 32 where they are equal, derivative 1 where `z > 0`. No
+    /// table: `chip::periphery::normalise`. For layers whose units drive others.
+    Rms,
+    /// The accumulator itself, derivative 1 everywhere. No table: what is read out is `acc_p - acc_n`, or `acc_p` alone. For a
+    /// last layer.
+    Accumulator,
 }
 
 impl Activation {
@@ -80,31 +88,18 @@ impl Activation {
     fn steepness(self) -> f64 {
         match self {
             Self::Sigmoid(alpha) => 2.0 * alpha.0,
-            Self::Relu | Self::Identity => 1.0,
+            Self::Relu | Self::Identity | Self::Rms | Self::Accumulator => 1.0,
         }
     }
-}
 
-/// What one accumulator unit stands for.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Unit {
-    /// `log2(weight_max)`.
-    pub weight_max_log2: i32,
-    /// Bits of a level.
-    pub level_bits: LevelBits,
-    /// Bits of a drive code.
-    pub drive_bits: DriveBits,
-}
-
-impl Unit {
-    fn of_z(self) -> f64 {
-        let levels = libm::exp2(f64::from(self.level_bits.get()));
-        libm::exp2(f64::from(self.weight_max_log2))
-            / (levels * f64::from(self.drive_bits.code_max()))
+    /// Whether accumulators are looked up in a table.
+    #[must_use]
+    pub const fn has_table(self) -> bool {
+        !matches!(self, Self::Rms | Self::Accumulator)
     }
 }
 
-/// Activation and derivative of a layer, by table index.
+/// Activation and derivative of a layer, by table index; empty where an activation has no table.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Lut {
     /// `lut_a`: activity code at index `i + 2^(bits-1)`.
@@ -123,6 +118,9 @@ impl Lut {
             Activation::Sigmoid(alpha) => Self::sigmoid(alpha, bits, unit),
             Activation::Relu => Self::linear(bits, unit, |i| i > 0),
             Activation::Identity => Self::linear(bits, unit, |_| true),
+            Activation::Rms | Activation::Accumulator => {
+                Self { activity: vec![], derivative: vec![], shift: 0 }
+            }
         }
     }
 
@@ -132,6 +130,7 @@ impl Lut {
         match activation {
             Activation::Sigmoid(alpha) => Self::sigmoid_shift(alpha, bits, unit),
             Activation::Relu | Activation::Identity => Self::linear_shift(bits, unit),
+            Activation::Rms | Activation::Accumulator => 0,
         }
     }
 
@@ -146,11 +145,13 @@ impl Lut {
     }
 
     fn linear_shift(bits: LutBits, unit: Unit) -> u32 {
-        let codes = u64::from(unit.drive_bits.code_max());
-        let log2 = i64::from(unit.weight_max_log2) - i64::from(unit.level_bits.get());
-        // 2^(bits - 1 + lsh + log2) >= 4 (2^drive_bits - 1)
-        let least = i64::from(log2_ceil(4 * codes));
-        narrow((least - i64::from(bits.get() - 1) - log2).max(0), "at most a few dozen")
+        let [above, below] = unit.ratio();
+        // least lsh with 2^(bits - 1 + lsh) above >= 4 below
+        let mut shift = 0;
+        while u128::from(above) << (bits.get() - 1 + shift) < 4 * u128::from(below) {
+            shift += 1;
+        }
+        shift
     }
 
     fn sigmoid(alpha: Positive, bits: LutBits, unit: Unit) -> Self {
@@ -170,15 +171,12 @@ impl Lut {
     /// `z` in 0..=1, in integers; the derivative is 1 where `slope` says so of an index, else 0.
     fn linear(bits: LutBits, unit: Unit, slope: impl Fn(i64) -> bool) -> Self {
         let half = 1i64 << (bits.get() - 1);
-        let codes = i64::from(unit.drive_bits.code_max());
-        let log2 = i64::from(unit.weight_max_log2) - i64::from(unit.level_bits.get());
+        let [above, below] = unit.ratio().map(i128::from);
         let shift = Self::linear_shift(bits, unit);
-        // z = i 2^p / codes, so 255 z + 1/2 = (2 255 i 2^p + codes) / (2 codes)
-        let p = i64::from(shift) + log2;
-        let (factor, divisor) =
-            if p >= 0 { (255i64 << p, codes) } else { (255, codes << p.unsigned_abs()) };
+        // z = i 2^lsh above / below, so 255 z + 1/2 = (2 255 i 2^lsh above + below) / (2 below)
+        let factor = (255 * above) << shift;
         let activity = (-half..half).map(|i| {
-            let rounded = (2 * factor * i + divisor).div_euclid(2 * divisor);
+            let rounded = (2 * factor * i128::from(i) + below).div_euclid(2 * below);
             narrow::<u8>(rounded.clamp(0, 255), "clamped to a byte")
         });
         let derivative = (-half..half).map(|i| if slope(i) { 255 } else { 0 });
@@ -277,7 +275,7 @@ impl Rate {
             }
         }
         let rail = f64::from((1u32 << (self.error_bits.get() - 1)) - 1);
-        let codes = f64::from(self.unit.drive_bits.code_max());
+        let codes = self.unit.codes_of_one();
         let scale = libm::exp2(f64::from(self.error_bits.get()))
             / (codes * rail * 255.0 * self.activation.steepness());
         let samples = f64::from(self.batch.get()) * f64::from(self.mantissa.get());
@@ -333,7 +331,7 @@ impl Rate {
             }
         }
         let rail = f64::from((1u32 << (self.error_bits.get() - 1)) - 1);
-        let codes = f64::from(self.unit.drive_bits.code_max());
+        let codes = self.unit.codes_of_one();
         let samples = f64::from(self.batch.get()) * f64::from(self.mantissa.get());
         let log2 = self.unit.weight_max_log2;
         let bits = self.unit.level_bits.get() + self.error_bits.get() + k;
@@ -399,12 +397,14 @@ impl Rate {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::num::fixed::{DriveBits, LevelBits};
 
     fn unit(weight_max_log2: i32, level_bits: i64, drive_bits: i64) -> Unit {
         Unit {
             weight_max_log2,
             level_bits: LevelBits::new(level_bits).unwrap(),
             drive_bits: DriveBits::new(drive_bits).unwrap(),
+            full_drive: FullDrive::One,
         }
     }
 

@@ -10,7 +10,7 @@
 //! episode.
 //!
 //! Which environments there are stands in [`ENVIRONMENTS`]; each is one small file with its law at its head, and becomes
-//! many of it side by side in [`one`]. See docs/MODEL.md, 5.
+//! many of it side by side in [`one`]. See docs/MODEL.md, 5.4.
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
 use std::fmt;
@@ -20,13 +20,17 @@ use fixed::types::I16F16;
 use crate::chip::state::State;
 
 pub mod acrobot;
+pub mod canvas;
 pub mod cart_pole;
 pub mod fine;
+pub mod foray;
 pub mod mountain_car;
 pub mod one;
 pub mod pendulum;
+mod stream;
 
 use one::SideBySide;
+pub use stream::{EnvSource, KeptPiece, Purpose, Record, Replaying, Stream};
 
 /// An observation, an action or a reward.
 pub type Real = I16F16;
@@ -69,6 +73,17 @@ pub struct EnvSpec {
     pub inputs: Vec<(&'static str, usize)>,
 }
 
+impl EnvSpec {
+    /// Numbers that it shows; 0 where it shows lines.
+    #[must_use]
+    pub const fn values(&self) -> usize {
+        match self.shown {
+            Shown::Dense(values) => values,
+            Shown::Sparse { .. } => 0,
+        }
+    }
+}
+
 /// What some environments show, one after the other.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Observations {
@@ -86,6 +101,25 @@ impl Observations {
         self.values.clear();
         self.active.clear();
         self.ends.clear();
+    }
+
+    /// Puts others behind these.
+    pub fn append(&mut self, others: &Self) {
+        let before = self.active.len();
+        self.values.extend_from_slice(&others.values);
+        self.active.extend_from_slice(&others.active);
+        self.ends.extend(others.ends.iter().map(|end| before + end));
+    }
+
+    /// What environment number `which` shows, for people: its numbers, 16 fractional bits, or its lines that are on.
+    #[must_use]
+    pub fn numbers_of(&self, which: usize, spec: &EnvSpec) -> Vec<i64> {
+        match spec.shown {
+            Shown::Dense(values) => {
+                self.values_of(which, values).iter().map(|v| v.to_bits().into()).collect()
+            }
+            Shown::Sparse { .. } => self.lines_of(which).iter().map(|&line| line.into()).collect(),
+        }
     }
 
     /// The numbers of environment number `which`, of `values` each.
@@ -124,6 +158,55 @@ pub struct Outcomes {
     pub terminated: Vec<bool>,
     /// Who was stopped. Never both.
     pub truncated: Vec<bool>,
+}
+
+impl Outcomes {
+    /// Checks that these are outcomes of so many environments, whoever made them.
+    ///
+    /// # Errors
+    /// When they are not.
+    pub fn check(&self, spec: &EnvSpec, count: usize) -> Result<(), EnvError> {
+        let wrong = |which, found: String, allowed: &str| {
+            Err(EnvError { id: spec.id.into(), which, found, allowed: allowed.into() })
+        };
+        let lengths = [self.rewards.len(), self.terminated.len(), self.truncated.len()];
+        if let Some(found) = lengths.iter().find(|&&length| length != count) {
+            let found = format!("is one of {count}, but a list of their outcomes has {found}");
+            return wrong(0, found, "give a reward, and whether it ended, of each");
+        }
+        for shown in [&self.reached, &self.next] {
+            let (fits, lines) = match spec.shown {
+                Shown::Dense(values) => (
+                    shown.values.len() == count * values
+                        && shown.ends.is_empty()
+                        && shown.active.is_empty(),
+                    0,
+                ),
+                Shown::Sparse { lines, .. } => {
+                    let ends = shown.ends.len() == count
+                        && shown.ends.is_sorted()
+                        && shown.ends.last().copied().unwrap_or(0) == shown.active.len();
+                    (ends && shown.values.is_empty(), lines)
+                }
+            };
+            if !fits {
+                let found = "shows more or less than it has".into();
+                return wrong(0, found, "give what the environment says that it shows, of each");
+            }
+            if let Some(line) = shown.active.iter().find(|&&line| line as usize >= lines) {
+                let found = format!("shows line {line}");
+                return wrong(0, found, &format!("there are {lines}, from 0"));
+            }
+        }
+        let both = |(&over, &stopped): (&bool, &bool)| over && stopped;
+        match self.terminated.iter().zip(&self.truncated).position(both) {
+            Some(which) => {
+                let found = "is terminated and truncated at once".into();
+                wrong(which, found, "a task that is over is terminated alone")
+            }
+            None => Ok(()),
+        }
+    }
 }
 
 /// An environment that cannot go on.
@@ -171,13 +254,14 @@ pub trait VecEnv: State + fmt::Debug + Send {
 pub type MakeEnv = fn(seed: u64, count: usize) -> Box<dyn VecEnv>;
 
 /// Every environment, by what it is called.
-pub const ENVIRONMENTS: [(&str, MakeEnv); 4] = [
+pub const ENVIRONMENTS: [(&str, MakeEnv); 5] = [
     ("CartPole-v1", |seed, count| Box::new(SideBySide::<cart_pole::CartPole>::new(seed, count))),
     ("Acrobot-v1", |seed, count| Box::new(SideBySide::<acrobot::Acrobot>::new(seed, count))),
     ("Pendulum-v1", |seed, count| Box::new(SideBySide::<pendulum::Pendulum>::new(seed, count))),
     ("MountainCarContinuous-v0", |seed, count| {
         Box::new(SideBySide::<mountain_car::MountainCar>::new(seed, count))
     }),
+    ("Foray-v0", |seed, count| Box::new(SideBySide::<foray::Foray>::new(seed, count))),
 ];
 
 /// An environment that there is not.

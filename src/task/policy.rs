@@ -11,7 +11,11 @@
 //! See docs/MODEL.md, 5.
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
+mod actor;
 pub mod advantage;
+mod agent;
+mod critic;
+mod evolution;
 mod experiment;
 pub mod function;
 pub mod head;
@@ -19,12 +23,40 @@ pub mod moments;
 pub mod number;
 pub mod observe;
 mod outcome;
+mod player;
+mod prefixed;
 pub mod rank;
 pub mod ratio;
+mod rollout;
 pub mod sample;
 mod trainer;
 pub mod value;
 
+#[cfg(test)]
+mod tests;
+
+use crate::chip::engine::Engine;
+use crate::num::fixed::rsh;
+use number::{Logit, saturated};
+
 pub use experiment::{Evaluating, Evolution, InputCoding, Method, PolicyExperiment, Ppo, Share};
-pub use outcome::{PolicyEpoch, PolicyEvaluation, PolicyProgress, SumOf};
-pub use trainer::{PolicyError, PolicyTrainer, WatchedStep};
+pub use outcome::{PolicyEpoch, PolicyEvaluation, PolicyProgress, SumOf, WatchedStep};
+pub use trainer::{PolicyError, PolicyTrainer};
+
+/// What the last layer put out, `[sample][output]`: `floor(readout unit 2^20 + 1/2)`, saturating.
+fn outputs(engine: &Engine, put_out: &mut Vec<Logit>) {
+    let mut sums = Vec::new();
+    engine.readouts(&mut sums);
+    let [above, below] = engine.readout_unit().ratio();
+    put_out.clear();
+    if above == 1 && below.is_power_of_two() && below >= 1 << 20 {
+        let shift = below.trailing_zeros() - 20;
+        put_out.extend(sums.iter().map(|&sum| saturated(rsh(sum, shift))));
+    } else {
+        let (above, below) = (i128::from(above), i128::from(below));
+        put_out.extend(sums.iter().map(|&sum| {
+            let number = ((i128::from(sum) * above << 21) + below).div_euclid(2 * below);
+            saturated(i64::try_from(number).unwrap_or(if sum < 0 { i64::MIN } else { i64::MAX }))
+        }));
+    }
+}

@@ -19,7 +19,7 @@ use dalean::chip::crossbar::kernel::Backend;
 use dalean::chip::engine::tick::{Command, More, Network, TileAdc, TileConfig};
 use dalean::chip::engine::{Engine, Operation, Phase, Side, Write};
 use dalean::chip::hardware::{Hardware, PulseCode, Timing};
-use dalean::chip::layer::{DrivenBy, Layer, LayerSpec, Taps};
+use dalean::chip::layer::{DrivenBy, InitialLevels, Layer, LayerSpec, Taps};
 use dalean::chip::population::Wiring;
 use dalean::num::draw::{Place, Site};
 use dalean::num::fixed::*;
@@ -75,7 +75,7 @@ fn layer(hardware: &Hardware) -> Layer {
         driven_by: DrivenBy::Shared,
         activation: Activation::Identity,
         weight_max_log2: 2,
-        gain_64ths: [64, 64],
+        initial: InitialLevels::Uniform { gain_64ths: [64, 64] },
         constant_row: false,
     };
     let words = (0..SIDE).map(|unit| u16::try_from(unit % WORDS).unwrap()).collect();

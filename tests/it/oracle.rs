@@ -8,7 +8,7 @@ use dalean::chip::engine::Phase;
 use dalean::chip::hardware::{
     Adc, AdcRange, DitherBits, DitherPattern, FloorKind, Hardware, Subtract, Window,
 };
-use dalean::chip::layer::{DrivenBy, LayerSpec, Optimiser};
+use dalean::chip::layer::{DrivenBy, InitialLevels, LayerSpec, Optimiser};
 use dalean::chip::ledger::{During, Event};
 use dalean::chip::population::Wiring;
 use dalean::learn::error::Centre;
@@ -128,7 +128,9 @@ fn experiment(s: &Value) -> Experiment {
                 driven_by: if l == 0 { DrivenBy::Shared } else { DrivenBy::Streams },
                 activation: activation(&s["act"][l], &s["alpha"][l]),
                 weight_max_log2: int(&s["weight_max"][l]).ilog2() as i32,
-                gain_64ths: if last { [64, 64] } else { [96, 32] },
+                initial: InitialLevels::Uniform {
+                    gain_64ths: if last { [64, 64] } else { [96, 32] },
+                },
                 constant_row: false,
             }
         })
@@ -291,6 +293,7 @@ fn tables_equal_the_oracle() {
             weight_max_log2: int(&want["weight_max_log2"]) as i32,
             level_bits: LevelBits::new(int(&want["level_bits"])).unwrap(),
             drive_bits: DriveBits::new(int(&want["drive_bits"])).unwrap(),
+            full_drive: dalean::num::tables::FullDrive::One,
         };
         let bits = LutBits::new(int(&want["lut_bits"])).unwrap();
         let lut = Lut::new(activation(&want["activation"], &want["alpha"]), bits, unit);

@@ -39,6 +39,7 @@ mod lanes;
 mod levels;
 #[cfg(target_arch = "aarch64")]
 mod neon;
+mod normalise;
 mod ops;
 mod optimise;
 #[cfg(target_arch = "x86_64")]
@@ -66,6 +67,7 @@ pub use self::{
         Banks, Cells, Conversion, Dither, Drives, Ends, Extremes, Greatest, Half, LookUp,
         OneSample, Peaks, Pulsed, Rails, Scratch, TOGETHER, WriteCounts, WriteLaw, is_driven,
     },
+    normalise::{HandOn, SQUARED_MAX},
     optimise::{MEAN_BITS, SignLaw, Squares, joined},
     sums::Sums,
     team::Team,
@@ -232,6 +234,39 @@ impl Kernel {
     pub fn difference(&self, currents: [&[i32]; 2], sums: &mut [i32]) {
         assert!(currents.iter().all(|bank| bank.len() == sums.len()), "both banks have every sum");
         call!(self, difference(currents, sums));
+    }
+
+    /// Adds to each sample's sum the squares of what is above 0 in a panel of 32 units, `[sample][32]`. The plan proves that
+    /// sums lie below [`SQUARED_MAX`].
+    ///
+    /// # Panics
+    /// When the sizes do not match.
+    pub fn stream_squares(&self, sums: &[i32], squares: &mut [u64]) {
+        assert_eq!(sums.len(), squares.len() * PANEL_COLUMNS, "32 units a sample");
+        call!(self, stream_squares(sums, squares));
+    }
+
+    /// Normalises a panel of 32 units, `[sample][32]`, by the reciprocal of each sample: what they hand on, and how steep
+    /// they are, both `[sample][64]` from this panel's first column on. Returns the codes that their bound changed.
+    ///
+    /// # Panics
+    /// When the sizes do not match.
+    pub fn scale(
+        &self,
+        sums: &[i32],
+        reciprocals: &[u64],
+        hand_on: HandOn,
+        values: &mut [u8],
+        derivatives: &mut [u8],
+    ) -> u64 {
+        let samples = reciprocals.len();
+        assert_eq!(sums.len(), samples * PANEL_COLUMNS, "32 units a sample");
+        if samples == 0 {
+            return 0;
+        }
+        let least = (samples - 1) * BLOCK_ROWS + PANEL_COLUMNS;
+        assert!(values.len() >= least && derivatives.len() >= least, "every unit has its place");
+        call!(self, scale(sums, reciprocals, hand_on, values, derivatives))
     }
 
     /// Latches one word a unit: `errors[b][j] = words[b][taps[j]]`, `width` words and 64 units a sample; units beyond

@@ -4,6 +4,7 @@
 //! ideal      acc = v_E - v_I                                  over all rows
 //! finite     acc += d << (ash + s dac_bits)                    over slices s and row tiles
 //! a, a'      table at index(acc);  next drive from a
+//! readout    acc kept;  a' = 255;  y = acc_p - acc_n, or acc_p where there is no n
 //! ```
 //!
 //! With ideal converters slices and tiles cannot change a sum, so the whole column is read at once. The
@@ -15,18 +16,48 @@ use std::ops::Range;
 use super::Engine;
 use super::each::each;
 use super::read::{Histogram, Mode, PanelPart, Reader, Seen};
-use crate::chip::crossbar::kernel::{Kernel, LookUp, Scratch, TOGETHER};
+use crate::chip::crossbar::kernel::{HandOn, Kernel, LookUp, Scratch, TOGETHER};
 use crate::chip::crossbar::layout::{BLOCK_ROWS, PANEL_COLUMNS};
 use crate::chip::hardware::{Adc, Hardware, Subtract};
+use crate::chip::layer::Layer;
 use crate::chip::ledger::{During, Event};
 use crate::chip::periphery;
 use crate::chip::population::{Pathway, Polarity, Stream};
+use crate::num::fixed::DriveBits;
+use crate::num::tables::Activation;
+
+/// What the units of a layer do with their accumulators.
+#[derive(Debug, Clone)]
+pub(super) enum Units {
+    /// They look them up.
+    Table(LookUp),
+    /// They are normalised, stream by stream.
+    Normalised(HandOn),
+    /// They keep them, with slope 1: a readout.
+    Kept,
+}
+
+impl Units {
+    /// Those of a layer, which hand on activities or, with `drive_bits`, drive codes of the next layer.
+    ///
+    /// # Panics
+    /// When units hand on what is no activity, or nothing is driven by what is normalised: the plan checks that.
+    pub(super) fn new(layer: &Layer, drive_bits: Option<DriveBits>) -> Self {
+        match (layer.spec.activation, drive_bits) {
+            (Activation::Rms, Some(bits)) => Self::Normalised(HandOn::new(bits)),
+            (Activation::Rms, None) => panic!("what is normalised drives a layer"),
+            (Activation::Accumulator, None) => Self::Kept,
+            (Activation::Accumulator, Some(_)) => panic!("what is read out drives no layer"),
+            _ => Self::Table(layer.look_up(drive_bits)),
+        }
+    }
+}
 
 /// What one block of 64 units of a stream puts out.
 struct Out<'a> {
     target: Stream,
     block: usize,
-    /// What the units hand on, `[sample][64]`.
+    /// What the units hand on, `[sample][64]`; empty where they hand on nothing.
     values: &'a mut [u8],
     derivatives: &'a mut [u8],
     /// Where they are kept.
@@ -41,79 +72,99 @@ impl Engine {
     /// Reads a layer and loads the next one's drives. Returns histograms by target when probing.
     pub(super) fn forward_in(&mut self, layer: usize, mode: Mode) -> Vec<Histogram> {
         let samples = self.samples;
-        let wiring = self.layers[layer].spec.wiring;
+        if samples == 0 {
+            let wiring = self.layers[layer].spec.wiring;
+            return vec![Histogram::new(); wiring.targets().len()];
+        }
+        self.make_room(layer);
+        let seen = match self.units[layer] {
+            Units::Normalised(hand_on) => self.normalised(layer, mode, hand_on),
+            Units::Table(_) | Units::Kept => self.put_out(layer, mode),
+        };
+        self.load_constant(layer + 1);
+        self.note_currents(layer);
+        self.note_said(layer);
+        self.charge_forward(layer);
+        self.time(|schedule, cycles| schedule.read(cycles, layer, samples));
+        self.charge_seen(layer, seen)
+    }
+
+    /// Gives registers the sizes of what a read of the loaded samples puts out.
+    fn make_room(&mut self, layer: usize) {
+        let samples = self.samples;
+        let this = &self.layers[layer];
+        let size = this.layout.columns.div_ceil(BLOCK_ROWS) * samples * BLOCK_ROWS;
         let (head, tail) = self.registers.split_at_mut(layer + 1);
-        let (own, next) = (&mut head[layer], tail.first_mut());
-        if samples > 0 {
-            let this = &self.layers[layer];
-            let units = this.layout.columns;
-            let size = units.div_ceil(BLOCK_ROWS) * samples * BLOCK_ROWS;
-            let drives = |source: Stream| &own.drives[this.spec.drives_of(source).index()][..];
-            let readers: Vec<_> = wiring
-                .targets()
-                .iter()
-                .map(|&target| Reader::new(this, &self.hardware, target, samples, mode, drives))
-                .collect();
-            let mut values: [&mut [u8]; 2] = match next {
+        let own = &mut head[layer];
+        for &target in this.spec.wiring.targets() {
+            let at = target.index();
+            own.derivatives[at].resize(size, 0);
+            match tail.first_mut() {
                 Some(next) => {
                     assert!(next.pending == 0, "sums wait to be programmed");
                     let rows = self.layers[layer + 1].layout.rows_padded();
-                    for &target in wiring.targets() {
-                        next.drives[target.index()].resize(samples * rows, 0);
-                    }
-                    let [p, n] = &mut next.drives;
-                    [&mut p[..], &mut n[..]]
+                    next.drives[at].resize(samples * rows, 0);
                 }
                 None => {
-                    for &target in wiring.targets() {
-                        own.accumulators[target.index()].resize(size, 0);
-                        own.activities[target.index()].resize(size, 0);
-                    }
-                    let [p, n] = &mut own.activities;
-                    [&mut p[..], &mut n[..]]
-                }
-            };
-            // empty where a layer only hands on
-            let mut accumulators =
-                own.accumulators.each_mut().map(|kept| kept.chunks_mut(samples * BLOCK_ROWS));
-            let mut outs: Vec<Vec<Out<'_>>> = Vec::new();
-            let together = blocks_together(&self.hardware);
-            let [p, n] = &mut own.derivatives;
-            for (&target, derivatives) in wiring.targets().iter().zip([p, n]) {
-                derivatives.resize(size, 0);
-                let values = std::mem::take(&mut values[target.index()]);
-                let chunks = values.chunks_mut(samples * BLOCK_ROWS);
-                let chunks = chunks.zip(derivatives.chunks_mut(samples * BLOCK_ROWS));
-                for (block, (values, derivatives)) in chunks.enumerate() {
-                    let accumulators = accumulators[target.index()].next();
-                    let out = Out { target, block, values, derivatives, accumulators };
-                    match outs.last_mut() {
-                        Some(last) if block % together > 0 => Vec::push(last, out),
-                        _ => outs.push(vec![out]),
+                    own.accumulators[at].resize(size, 0);
+                    if !matches!(self.units[layer], Units::Kept) {
+                        own.activities[at].resize(size, 0);
                     }
                 }
             }
-            let table = &self.tables[layer];
-            let work = samples * this.layout.cells() * wiring.pathways().len();
-            let blocks = units.div_ceil(BLOCK_ROWS);
-            let parts = outs.into_iter().map(|outs| (outs[0].block, outs)).collect();
-            let seen = each(&mut self.team, work, blocks, parts, |kernel, outs| {
-                let target = outs[0].target.index();
-                (target, put_out(kernel, &readers[target], table, samples, outs))
-            });
-            drop(readers);
-            let mut total = vec![Seen::default(); wiring.targets().len()];
-            for (target, seen) in seen {
-                total[target].merge(seen);
+            if matches!(self.units[layer], Units::Normalised(_)) {
+                own.unscaled[at].resize(size, 0);
             }
-            self.load_constant(layer + 1);
-            self.note_currents(layer);
-            self.note_said(layer);
-            self.charge_forward(layer);
-            self.time(|schedule, cycles| schedule.read(cycles, layer, samples));
-            return self.charge_seen(layer, total);
         }
-        vec![Histogram::new(); wiring.targets().len()]
+    }
+
+    /// Reads a layer whose units need nothing but their own accumulators. What was seen, by target.
+    fn put_out(&mut self, layer: usize, mode: Mode) -> Vec<Seen> {
+        let samples = self.samples;
+        let (head, tail) = self.registers.split_at_mut(layer + 1);
+        let own = &mut head[layer];
+        let this = &self.layers[layer];
+        let wiring = this.spec.wiring;
+        let drives = |source: Stream| &own.drives[this.spec.drives_of(source).index()][..];
+        let readers: Vec<_> = wiring
+            .targets()
+            .iter()
+            .map(|&target| Reader::new(this, &self.hardware, target, samples, mode, drives))
+            .collect();
+        let mut values: [&mut [u8]; 2] = match tail.first_mut() {
+            Some(next) => next.drives.each_mut().map(|drives| &mut drives[..]),
+            None => own.activities.each_mut().map(|activities| &mut activities[..]),
+        };
+        // empty where a layer only hands on
+        let mut accumulators =
+            own.accumulators.each_mut().map(|kept| kept.chunks_mut(samples * BLOCK_ROWS));
+        let mut outs: Vec<Vec<Out<'_>>> = Vec::new();
+        let together = blocks_together(&self.hardware);
+        let [p, n] = &mut own.derivatives;
+        for (&target, derivatives) in wiring.targets().iter().zip([p, n]) {
+            // empty where a layer is only read out
+            let values = std::mem::take(&mut values[target.index()]);
+            let mut values = values.chunks_mut(samples * BLOCK_ROWS);
+            let chunks = derivatives.chunks_mut(samples * BLOCK_ROWS);
+            for (block, derivatives) in chunks.enumerate() {
+                let values = values.next().unwrap_or_default();
+                let accumulators = accumulators[target.index()].next();
+                let out = Out { target, block, values, derivatives, accumulators };
+                match outs.last_mut() {
+                    Some(last) if block % together > 0 => Vec::push(last, out),
+                    _ => outs.push(vec![out]),
+                }
+            }
+        }
+        let units = &self.units[layer];
+        let work = samples * this.layout.cells() * wiring.pathways().len();
+        let blocks = this.layout.columns.div_ceil(BLOCK_ROWS);
+        let parts = outs.into_iter().map(|outs| (outs[0].block, outs)).collect();
+        let seen = each(&mut self.team, work, blocks, parts, |kernel, outs| {
+            let target = outs[0].target.index();
+            (target, put_out(kernel, &readers[target], units, samples, outs))
+        });
+        Seen::by_target(wiring, seen)
     }
 
     /// Charges what depended on the numbers read.
@@ -133,7 +184,7 @@ impl Engine {
         histograms
     }
 
-    fn charge_read(&mut self, layer: usize, pathway: u8, event: Event, count: u64) {
+    pub(super) fn charge_read(&mut self, layer: usize, pathway: u8, event: Event, count: u64) {
         self.charge(layer, pathway, During::ForwardRows, event, count);
     }
 
@@ -163,9 +214,15 @@ impl Engine {
                 self.charge_read(layer, code, Event::ShiftAdds, converted);
             }
             let code = Self::code_of(wiring, target);
-            self.charge_read(layer, code, Event::LookUps, samples * columns);
-            // an entry of the table, then activity and derivative
-            self.charge_read(layer, code, Event::SramBits, samples * columns * 32);
+            match self.units[layer] {
+                Units::Table(_) => {
+                    self.charge_read(layer, code, Event::LookUps, samples * columns);
+                    // an entry of the table, then activity and derivative
+                    self.charge_read(layer, code, Event::SramBits, samples * columns * 32);
+                }
+                Units::Normalised(_) => self.charge_normalised(layer, code, samples, columns),
+                Units::Kept => {}
+            }
         }
     }
 }
@@ -181,7 +238,7 @@ fn blocks_together(hardware: &Hardware) -> usize {
 fn put_out(
     kernel: &Kernel,
     reader: &Reader<'_>,
-    table: &LookUp,
+    units: &Units,
     samples: usize,
     mut outs: Vec<Out<'_>>,
 ) -> Seen {
@@ -191,7 +248,7 @@ fn put_out(
     for start in (0..samples).step_by(TOGETHER) {
         let group = start..(start + TOGETHER).min(samples);
         for out in &mut outs {
-            put_out_group(kernel, reader, table, out, &group, (&mut scratch, &mut sums), &mut seen);
+            put_out_group(kernel, reader, units, out, &group, (&mut scratch, &mut sums), &mut seen);
         }
     }
     seen
@@ -201,7 +258,7 @@ fn put_out(
 fn put_out_group(
     kernel: &Kernel,
     reader: &Reader<'_>,
-    table: &LookUp,
+    units: &Units,
     out: &mut Out<'_>,
     group: &Range<usize>,
     (scratch, sums): (&mut Scratch, &mut [i32; Scratch::SUMS]),
@@ -212,7 +269,8 @@ fn put_out_group(
         let (panel, from) = (2 * out.block + half, half * PANEL_COLUMNS);
         let live = reader.columns.saturating_sub(panel * PANEL_COLUMNS).min(PANEL_COLUMNS);
         let at = group.start * BLOCK_ROWS + from;
-        let (values, derivatives) = (&mut out.values[at..], &mut out.derivatives[at..]);
+        let derivatives = &mut out.derivatives[at..];
+        let values = out.values.get_mut(at..).unwrap_or_default();
         if live == 0 {
             for rows in [values, derivatives] {
                 let rows = rows.chunks_mut(BLOCK_ROWS).take(group.len());
@@ -225,15 +283,33 @@ fn put_out_group(
         if reader.is_narrow() {
             let sums = &mut sums[..cells];
             reader.read_narrow(kernel, &part, scratch, sums, seen);
-            seen.look_ups += kernel.look_up(sums, table, live, values, derivatives);
+            match units {
+                Units::Table(table) => {
+                    seen.look_ups += kernel.look_up(sums, table, live, values, derivatives);
+                }
+                _ => slope_one(derivatives, live, group.len()),
+            }
             keep(kept, sums.iter().map(|&sum| i64::from(sum)));
         } else {
             let mut sums = [0; Scratch::SUMS];
             let sums = &mut sums[..cells];
             reader.read_wide(kernel, &part, sums, seen);
-            look_up_wide(sums, table, live, [values, derivatives], seen);
+            match units {
+                Units::Table(table) => {
+                    look_up_wide(sums, table, live, [values, derivatives], seen);
+                }
+                _ => slope_one(derivatives, live, group.len()),
+            }
             keep(kept, sums.iter().copied());
         }
+    }
+}
+
+/// Slopes of a panel's units that are read out, `[sample][64]`.
+fn slope_one(derivatives: &mut [u8], live: usize, samples: usize) {
+    for row in derivatives.chunks_mut(BLOCK_ROWS).take(samples) {
+        row[..live].fill(255);
+        row[live..PANEL_COLUMNS].fill(0);
     }
 }
 

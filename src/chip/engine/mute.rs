@@ -5,9 +5,12 @@
 //! mute = of all samples of an evaluation, of which there are two at least, no activity of a unit differs
 //! ```
 //!
+//! Of a layer that is read out, no accumulator.
+//!
 //! Looked at until the first difference, which is nearly always in the first two samples.
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
+use super::forward::Units;
 use super::{Engine, Phase};
 use crate::chip::crossbar::layout::BLOCK_ROWS;
 
@@ -15,7 +18,7 @@ use crate::chip::crossbar::layout::BLOCK_ROWS;
 #[derive(Debug, Clone, Default)]
 pub(super) struct Said {
     /// What its units put out for the first sample, by target stream: `[block][64]`.
-    first: [Vec<u8>; 2],
+    first: [Vec<i64>; 2],
     samples: u64,
     differs: bool,
 }
@@ -28,25 +31,15 @@ impl Engine {
         }
         let (samples, units) = (self.samples, self.layers[layer].layout.columns);
         let (head, tail) = self.registers.split_at(layer + 1);
-        let puts_out: [&[u8]; 2] = match tail.first() {
-            Some(next) => next.drives.each_ref().map(|drives| &drives[..]),
-            None => head[layer].activities.each_ref().map(|activities| &activities[..]),
-        };
         for &target in self.layers[layer].spec.wiring.targets() {
-            let (first, all) = (&mut said.first[target.index()], puts_out[target.index()]);
-            let known = !first.is_empty();
-            // units alone: what lies behind them, a constant row, is no activity
-            for (block, from) in (0..units).step_by(BLOCK_ROWS).enumerate() {
-                let live = (units - from).min(BLOCK_ROWS);
-                let rows = all[block * samples * BLOCK_ROWS..].chunks(BLOCK_ROWS).take(samples);
-                for row in rows {
-                    if first.len() == from {
-                        first.extend_from_slice(&row[..live]);
-                    }
-                    said.differs |= row[..live] != first[from..from + live];
+            let (at, first) = (target.index(), &mut said.first[target.index()]);
+            said.differs |= match (tail.first(), &self.units[layer]) {
+                (Some(next), _) => differs(first, &next.drives[at], samples, units),
+                (None, Units::Kept) => {
+                    differs(first, &head[layer].accumulators[at], samples, units)
                 }
-            }
-            debug_assert!(known || first.len() == units, "one activity a unit");
+                (None, _) => differs(first, &head[layer].activities[at], samples, units),
+            };
         }
         said.samples += samples as u64;
     }
@@ -57,4 +50,29 @@ impl Engine {
         let said = std::mem::replace(&mut self.said, fresh);
         said.iter().map(|said| said.samples > 1 && !said.differs).collect()
     }
+}
+
+/// Whether a sample differs from the first one, which is noted where there is none yet: `[block][sample][64]`.
+fn differs<T: Copy + Into<i64>>(
+    first: &mut Vec<i64>,
+    all: &[T],
+    samples: usize,
+    units: usize,
+) -> bool {
+    let known = !first.is_empty();
+    let mut differs = false;
+    // units alone: what lies behind them, a constant row, is no activity
+    for (block, from) in (0..units).step_by(BLOCK_ROWS).enumerate() {
+        let live = (units - from).min(BLOCK_ROWS);
+        let rows = all[block * samples * BLOCK_ROWS..].chunks(BLOCK_ROWS).take(samples);
+        for row in rows {
+            let row = row[..live].iter().map(|&value| value.into());
+            if first.len() == from {
+                first.extend(row.clone());
+            }
+            differs |= !row.eq(first[from..from + live].iter().copied());
+        }
+    }
+    debug_assert!(known || first.len() == units, "one activity a unit");
+    differs
 }

@@ -5,7 +5,7 @@ use super::{Engine, Operation, Phase, Side, Write};
 use crate::chip::crossbar::kernel::Backend;
 use crate::chip::hardware::timing::{PulseCode, Timing};
 use crate::chip::hardware::{Adc, AdcRange, Hardware, Subtract};
-use crate::chip::layer::{Delivery, DrivenBy, Layer, LayerSpec, Taps};
+use crate::chip::layer::{Delivery, DrivenBy, InitialLevels, Layer, LayerSpec, Taps};
 use crate::chip::population::{Stream, Wiring};
 use crate::num::fixed::AdcBits;
 use crate::num::tables::Activation;
@@ -53,7 +53,7 @@ fn engine(adc: Adc, backend: Backend) -> Engine {
         driven_by,
         activation: Activation::Identity,
         weight_max_log2: 2,
-        gain_64ths: [64, 64],
+        initial: InitialLevels::Uniform { gain_64ths: [64, 64] },
         constant_row: false,
     };
     let words = (0..UNITS).map(|unit| (unit % 5) as u16).collect();

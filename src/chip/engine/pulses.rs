@@ -103,7 +103,7 @@ mod tests {
     use crate::chip::crossbar::kernel::Backend;
     use crate::chip::engine::{Operation, Side, Write};
     use crate::chip::hardware::Hardware;
-    use crate::chip::layer::{DrivenBy, LayerSpec, Taps};
+    use crate::chip::layer::{DrivenBy, InitialLevels, LayerSpec, Taps};
 
     use crate::chip::population::Wiring;
     use crate::num::tables::Activation;
@@ -132,7 +132,7 @@ mod tests {
             driven_by: DrivenBy::Shared,
             activation: Activation::Identity,
             weight_max_log2: 2,
-            gain_64ths: [64, 64],
+            initial: InitialLevels::Uniform { gain_64ths: [64, 64] },
             constant_row: false,
         };
         let words = (0..150).map(|unit| unit % 10).collect();

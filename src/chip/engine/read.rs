@@ -19,7 +19,7 @@ use crate::chip::crossbar::layout::{BLOCK_ROWS, PANEL_COLUMNS};
 use crate::chip::hardware::{Adc, Hardware, Subtract};
 use crate::chip::layer::{CHUNK_BLOCKS, Layer};
 use crate::chip::periphery::{self, Converter};
-use crate::chip::population::{BANKS_MAX, Stream};
+use crate::chip::population::{BANKS_MAX, Stream, Wiring};
 
 /// Histogram of the least shifts at which conversions stay off the rail, and the greatest current, by slice.
 pub(super) type Histogram = Vec<([u64; 64], i64)>;
@@ -68,7 +68,16 @@ impl Seen {
         Self { histogram, reached, ..Self::default() }
     }
 
-    pub(super) fn merge(&mut self, other: Self) {
+    /// What parts saw, by target of a wiring.
+    pub(super) fn by_target(wiring: Wiring, parts: Vec<(usize, Self)>) -> Vec<Self> {
+        let mut total = vec![Self::default(); wiring.targets().len()];
+        for (target, seen) in parts {
+            total[target].merge(seen);
+        }
+        total
+    }
+
+    fn merge(&mut self, other: Self) {
         self.saturated.iter_mut().zip(other.saturated).for_each(|(sum, more)| *sum += more);
         self.look_ups += other.look_ups;
         self.reached.resize(other.reached.len(), 0);
@@ -110,6 +119,8 @@ pub(super) struct Reader<'a> {
     slices: usize,
     greatest: Greatest,
     narrow: bool,
+    /// Sums lie below this.
+    bound: u128,
     pub(super) columns: usize,
 }
 
@@ -139,8 +150,8 @@ impl<'a> Reader<'a> {
             _ => None,
         };
         let pairs = wiring.pairs(target);
-        let fits = is_narrow(layer, hardware, pairs.len(), converters.as_ref());
-        let narrow = fits && !mode.shows_currents();
+        let bound = bound(layer, hardware, pairs.len(), converters.as_ref());
+        let narrow = bound.is_some() && !mode.shows_currents();
         let tiles = match (&converters, narrow) {
             (None, _) => Tiles::Whole,
             (Some(_), true) => Tiles::Together,
@@ -172,6 +183,7 @@ impl<'a> Reader<'a> {
                 },
             },
             narrow,
+            bound: bound.unwrap_or(u128::MAX),
             columns: layer.layout.columns,
         }
     }
@@ -184,6 +196,11 @@ impl<'a> Reader<'a> {
     /// Whether every sum fits 31 bits.
     pub(super) const fn is_narrow(&self) -> bool {
         self.narrow
+    }
+
+    /// Whether every sum lies below `bound`.
+    pub(super) const fn is_below(&self, bound: u32) -> bool {
+        self.narrow && self.bound <= bound as u128
     }
 
     /// Accumulators of a panel, `[sample][32]`, where they fit 31 bits.
@@ -388,22 +405,23 @@ fn slice_max(hardware: &Hardware) -> u8 {
 /// Sums stay below this: then rounding constants fit beside them.
 const NARROW: u128 = 1 << 30;
 
-/// Whether every number of a read keeps to the widths of the kernels, whatever the levels and drives.
-fn is_narrow(
+/// What every sum of a read lies below, whatever the levels and drives; `None` where not every number keeps to the widths
+/// of the kernels.
+fn bound(
     layer: &Layer,
     hardware: &Hardware,
     pairs: usize,
     converters: Option<&(Vec<Converter>, Subtract)>,
-) -> bool {
+) -> Option<u128> {
     let ceiling = u128::from(hardware.cell.window.ceiling());
     let (rows, pairs) = (layer.layout.rows, pairs as u128);
     let current = |rows: usize, code: u32| rows as u128 * ceiling * u128::from(code);
     match converters {
         None => {
-            layer.layout.blocks() <= CHUNK_BLOCKS
-                && pairs * current(rows, hardware.drive.bits.code_max().into()) < NARROW
+            let most = pairs * current(rows, hardware.drive.bits.code_max().into());
+            (layer.layout.blocks() <= CHUNK_BLOCKS && most < NARROW).then_some(most + 1)
         }
-        Some((_, Subtract::Current)) => false,
+        Some((_, Subtract::Current)) => None,
         Some((converters, Subtract::Digital)) => {
             let tiles = rows.div_ceil(hardware.tile.rows) as u128;
             let slice_max = (1 << hardware.drive.dac_bits.min(hardware.drive.bits.get())) - 1;
@@ -411,12 +429,14 @@ fn is_narrow(
                 let codes = tiles * adc.max.unsigned_abs() as u128;
                 let total = codes << (adc.shift.min(64) + slice * hardware.drive.dac_bits);
                 let inside = adc.shift <= Conversion::SHIFT_MAX && codes < 1 << 15;
-                (inside && pairs * total < NARROW / 8).then_some(total)
+                (inside && pairs * total < NARROW / 8).then_some(pairs * total)
             };
-            hardware.cell.level_bits.get() <= 8
+            let narrow = hardware.cell.level_bits.get() <= 8
                 && tiles < 1024
-                && current(hardware.tile.rows.min(rows), slice_max) < NARROW
-                && (0..).zip(converters).all(|entry| fits(entry).is_some())
+                && current(hardware.tile.rows.min(rows), slice_max) < NARROW;
+            let slices = || (0..).zip(converters).map(fits);
+            let most = narrow.then(|| slices().sum::<Option<u128>>()).flatten()?;
+            Some(most + 1)
         }
     }
 }

@@ -6,6 +6,7 @@
 //! ```text
 //! reads      FWD(rows) of successive layers, in a pipeline of layers and samples
 //!                sum_l (1 + T_fwd(l)) + (B - 1) max_l (1 + again(l))
+//!            a normalised layer is followed by a digital stage of its own, of 2 NG + 32 beats in both sums
 //! rounds     ERR, FWD(columns), UPD(add), UPD(now), sample by sample in the order of the list; in a round a run of
 //!            ERR with the same words is heard by all their layers at once, and a run of UPD on different layers
 //!            goes side by side:  sum_b ( 1 + T_err + ... + 1 + max_l T_upd(l, b) ); words that the error unit forms for
@@ -27,6 +28,7 @@ use crate::chip::hardware::{Hardware, ReadTime};
 use crate::chip::layer::Layer;
 use crate::chip::ledger::{Cycles, During, Interval, Part};
 use crate::chip::population::Stream;
+use crate::num::tables::Activation;
 
 /// A layer as time sees it.
 #[derive(Debug, Clone, Copy)]
@@ -42,6 +44,8 @@ struct Shape {
     words: u64,
     /// Cycles in which the error unit forms the words of a sample.
     form: u64,
+    /// Cycles of the stage that normalises a sample, which no command begins; 0 where there is none.
+    normalise: u64,
 }
 
 /// Layers whose commands of one kind run at the same time.
@@ -161,14 +165,17 @@ impl Schedule {
             let [down, across] = layer.tiles(hardware).map(|n| n as u64);
             // the pairs of a target are added by the same tree
             let pairs = layer.spec.wiring.pairs(Stream::P).len() as u64;
+            let columns = layer.layout.columns.min(hardware.tile.columns) as u64;
+            let normalised = layer.spec.activation == Activation::Rms;
             let planes = layer.spec.wiring.planes().count() as u64;
             Shape {
                 rows: layer.layout.rows.min(hardware.tile.rows) as u64,
-                columns: layer.layout.columns.min(hardware.tile.columns) as u64,
+                columns,
                 levels: [tree_levels(down * pairs), tree_levels(across)],
                 tiles: planes * down * across,
                 words: layer.delivery.taps.width as u64,
                 form: timing.form(layer.delivery.terms() as u64),
+                normalise: if normalised { timing.normalise(columns) } else { 0 },
             }
         };
         Self {
@@ -202,8 +209,8 @@ impl Schedule {
         if let Segment::Reads { next, samples: count, latency, again } = &mut self.segment {
             *next = layer + 1;
             *count = samples as u64;
-            *latency += one;
-            *again = (*again).max(front);
+            *latency += one + shape.normalise;
+            *again = (*again).max(front).max(shape.normalise);
         }
         let count = samples as u64;
         cycles.occupy(layer, During::ForwardRows, count * front);

@@ -10,5 +10,5 @@ mod tile;
 
 pub use network::{Network, PartSpan, Span, TileAt};
 pub use tile::{
-    BankEvents, Command, Launch, More, Tile, TileAdc, TileConfig, TileEvents, TileSize,
+    BankEvents, Command, Launch, More, Tile, TileAdc, TileConfig, TileEvents, TileSize, TileUnits,
 };

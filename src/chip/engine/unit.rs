@@ -4,9 +4,11 @@
 //! none      S = sat_eb( rsh(e, 9 - error_bits) )
 //! batch     c = B' e - sum_b' e;  S = sat_eb( floor((2 c + m) / (2 m)) ),  m = B' 2^(9 - error_bits)
 //! running   S = sat_eb( rsh((e << 8) - mu, 17 - error_bits) ),  then mu += rsh((e << 8) - mu, 8)
+//! handed    S = sat_eb( rsh(e, 23 - error_bits) )             e with 20 fractional bits; no centre
 //! ```
 //!
-//! `e` is the error of an output, B' the size of the batch. A mean over the batch takes `B' CE + CE` beats. See
+//! `e` is the error of an output in activity codes or, where a task hands it itself, a number whose 4 is just beyond the
+//! greatest word: `floor(e 2^(error_bits - 3) + 1/2)`. B' is the size of the batch. A mean over the batch takes `B' CE + CE` beats. See
 //! docs/MODEL.md, 3.1.
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
@@ -33,6 +35,8 @@ pub enum Centre {
 pub struct ErrorUnit {
     centre: Centre,
     bits: ErrorBits,
+    /// Bits that are rounded off an error without a centre.
+    shift: u32,
     /// `mu`, 8 fractional bits, by output; empty unless the centre runs.
     means: Vec<i64>,
 }
@@ -42,7 +46,23 @@ impl ErrorUnit {
     #[must_use]
     pub fn new(centre: Centre, bits: ErrorBits, outputs: usize) -> Self {
         let means = if centre == Centre::Running { vec![0; outputs] } else { vec![] };
-        Self { centre, bits, means }
+        Self { centre, bits, shift: 9 - bits.get(), means }
+    }
+
+    /// Fractional bits of errors that a task hands itself.
+    pub const POINT: u32 = 20;
+
+    /// A unit for errors that a task hands itself, with [`ErrorUnit::POINT`] fractional bits. Nothing is subtracted.
+    #[must_use]
+    pub const fn handed(bits: ErrorBits) -> Self {
+        let shift = Self::POINT + 3 - bits.get();
+        Self { centre: Centre::None, bits, shift, means: vec![] }
+    }
+
+    /// Bits that are rounded off an error without a centre.
+    #[must_use]
+    pub const fn shift(&self) -> u32 {
+        self.shift
     }
 
     /// What is subtracted from errors.
@@ -73,7 +93,7 @@ impl ErrorUnit {
             word as i16
         };
         let words = match self.centre {
-            Centre::None => errors.iter().map(|&e| bounded(rsh(i64::from(e), 9 - bits))).collect(),
+            Centre::None => errors.iter().map(|&e| bounded(rsh(e.into(), self.shift))).collect(),
             Centre::Batch => {
                 let samples = (errors.len() / outputs) as i64;
                 let mut sums = vec![0i64; outputs];
@@ -210,5 +230,18 @@ mod tests {
                 prop_assert!(word.abs() <= rail);
             }
         }
+    }
+
+    #[test]
+    fn errors_that_are_handed_saturate_at_4() {
+        let of = |bits: i64, errors: &[i32]| {
+            ErrorUnit::handed(ErrorBits::new(bits).unwrap()).words(errors, 1)
+        };
+        let one = 1 << ErrorUnit::POINT;
+        assert_eq!(of(8, &[one, -one, 3 * one, 0]), (vec![32, -32, 96, 0], 0));
+        // 4 is word 128, which 127 bounds; halves round up
+        assert_eq!(of(8, &[4 * one, -4 * one, i32::MAX]), (vec![127, -127, 127], 3));
+        assert_eq!(of(8, &[one >> 6, -(one >> 6), (one >> 6) - 1]), (vec![1, 0, 0], 0));
+        assert_eq!(of(2, &[one, -one, 4 * one]), (vec![1, 0, 1], 1));
     }
 }

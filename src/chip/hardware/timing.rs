@@ -84,6 +84,9 @@ pub struct Timing {
     pub slices: Option<SliceTimes>,
 }
 
+/// Beats between the last square of a sample and its first scaling: division, root and reciprocal.
+const ROOT_BEATS: u64 = 32;
+
 /// Most cycles of one action: 0.1 s at 1 GHz.
 pub const CYCLES_MAX: u64 = 100_000_000;
 
@@ -162,6 +165,12 @@ impl Timing {
         self.beat * terms.div_ceil(self.lanes)
     }
 
+    /// Cycles of the stage that normalises a sample, of so many columns a tile: squares, root, scalings.
+    #[must_use]
+    pub(crate) const fn normalise(&self, columns: u64) -> u64 {
+        self.beat * (2 * self.groups(columns) + ROOT_BEATS)
+    }
+
     /// Cycles of one pass of a pulse.
     #[must_use]
     pub(crate) const fn pass(&self) -> u64 {
@@ -217,6 +226,12 @@ mod tests {
     fn a_verified_pulse_is_read() {
         let verified = Timing { verify: true, ..TIMING };
         assert_eq!((TIMING.rows(1, 3), verified.rows(2, 3)), (2 + 15, 4 + 3 * (5 + 26)));
+    }
+
+    #[test]
+    fn the_lanes_see_a_normalised_sample_twice() {
+        let slow = Timing { beat: 3, ..TIMING };
+        assert_eq!((TIMING.normalise(17), slow.normalise(64)), (2 * 5 + 32, 3 * (2 * 16 + 32)));
     }
 
     #[test]

@@ -3,18 +3,20 @@
 
 use super::{NetworkError, NetworkSpec};
 use crate::chip::hardware::{Adc, Hardware, WriteScheme};
-use crate::chip::layer::{self, DrivenBy, LayerSpec, Optimiser};
+use crate::chip::layer::{self, DrivenBy, InitialLevels, LayerSpec, Optimiser};
 use crate::chip::population::Wiring;
 use crate::learn::error::Centre;
 use crate::learn::route::Route;
-use crate::learn::rule::{Rule, UpdateMode};
+use crate::learn::rule::{Readout, Rule, UpdateMode};
 use crate::num::fixed::OutOfRange;
-use crate::num::tables::{Lut, SHIFT_MAX, STEP_SHIFT_MAX};
+use crate::num::tables::{Activation, Lut, SHIFT_MAX, STEP_SHIFT_MAX};
 
 /// `log2` of the least and the greatest `weight_max`.
 pub const WEIGHT_MAX_LOG2: std::ops::RangeInclusive<i32> = -8..=8;
 /// Initial gains, in 64ths: up to 16.
 pub const GAIN_64THS: std::ops::RangeInclusive<u32> = 1..=1024;
+/// Parts of a gain that is a fraction.
+const GAIN_PART: std::ops::RangeInclusive<u32> = 1..=1024;
 /// Greatest shift of the chance of a pulse: words have as many bits.
 const CHANCE_SHIFT_MAX: u32 = 16;
 /// Words a unit adds, at most.
@@ -34,6 +36,7 @@ pub(super) fn check(network: &NetworkSpec, hardware: &Hardware) -> Checked {
     numbers(network)?;
     tables(network, hardware)?;
     rule(network, hardware)?;
+    activations(network)?;
     wiring(network)?;
     batches(network, hardware)?;
     routes(network)?;
@@ -67,16 +70,28 @@ fn sizes(network: &NetworkSpec) -> Checked {
 /// Weights and gains that levels can stand for.
 fn numbers(network: &NetworkSpec) -> Checked {
     let last = network.layers.len() - 1;
-    for (at, LayerSpec { weight_max_log2, gain_64ths, .. }) in network.layers.iter().enumerate() {
+    for (at, LayerSpec { weight_max_log2, initial, .. }) in network.layers.iter().enumerate() {
         if !WEIGHT_MAX_LOG2.contains(weight_max_log2) {
             let found = format!("of layer {at} is 2^{weight_max_log2}");
             let allowed = "it must be a power of two from 1/256 to 256";
             return misfit("network.weight_max", found, allowed);
         }
-        if let Some(gain) = gain_64ths.iter().find(|&&gain| !GAIN_64THS.contains(&gain)) {
-            let key = if at == last { "network.init_gain_output" } else { "network.init_gain" };
-            let found = format!("of layer {at} holds {gain}/64");
-            return misfit(key, found, "gains are multiples of 1/64, up to 16");
+        let key = if at == last { "network.init_gain_output" } else { "network.init_gain" };
+        match initial {
+            InitialLevels::Uniform { gain_64ths } => {
+                if let Some(gain) = gain_64ths.iter().find(|&&gain| !GAIN_64THS.contains(&gain)) {
+                    let found = format!("of layer {at} holds {gain}/64");
+                    return misfit(key, found, "gains are multiples of 1/64, up to 16");
+                }
+            }
+            InitialLevels::AbsGaussian { gain: [n, d] } => {
+                let fits = GAIN_PART.contains(n) && GAIN_PART.contains(d);
+                if !fits || *n > 16 * *d {
+                    let found = format!("of layer {at} is {n}/{d}");
+                    let allowed = "both parts are 1 to 1024, and a gain is at most 16";
+                    return misfit(key, found, allowed);
+                }
+            }
         }
     }
     Ok(())
@@ -103,7 +118,7 @@ fn tables(network: &NetworkSpec, hardware: &Hardware) -> Checked {
 /// What a rule asks of outputs and chip.
 fn rule(network: &NetworkSpec, hardware: &Hardware) -> Checked {
     match network.rule {
-        Rule::Ed | Rule::Dfa => Ok(()),
+        Rule::Ed | Rule::EdNonDalean | Rule::Dfa => Ok(()),
         Rule::Kaneko if network.outputs() == 1 => Ok(()),
         Rule::Kaneko => {
             let allowed = format!(
@@ -122,15 +137,38 @@ fn rule(network: &NetworkSpec, hardware: &Hardware) -> Checked {
     }
 }
 
-/// Two populations under Dale's law, one stream of differential pairs for the baselines that break it.
+/// Units that are normalised drive others, units that keep their accumulators drive none; what is then read out has errors
+/// that a task hands, from which nothing is subtracted.
+fn activations(network: &NetworkSpec) -> Checked {
+    let last = network.layers.len() - 1;
+    for (at, layer) in network.layers.iter().enumerate() {
+        match layer.activation {
+            Activation::Rms if at == last => {
+                let allowed = "outputs are read one by one, by a table or as accumulators; only hidden layers are normalised";
+                return misfit("network.activation", format!("normalises layer {at}"), allowed);
+            }
+            Activation::Accumulator if at < last => {
+                let allowed =
+                    "units that drive others have activities: give them a table, or normalise them";
+                let found = format!("keeps the accumulators of layer {at}");
+                return misfit("network.activation", found, allowed);
+            }
+            Activation::Accumulator if network.centre != Centre::None => {
+                let allowed = "where accumulators are read out, the task hands the errors and nothing is subtracted: use \
+                               learning.centre = \"none\"";
+                return misfit("learning.centre", "is not \"none\"", allowed);
+            }
+            _ => {}
+        }
+    }
+    Ok(())
+}
+
+/// Two populations under Dale's law; for what breaks it, differential pairs, in two populations or one stream.
 fn wiring(network: &NetworkSpec) -> Checked {
     let last = network.layers.len() - 1;
     for (at, layer) in network.layers.iter().enumerate() {
-        let wanted = match (network.rule.is_dalean(), at == last) {
-            (true, false) => Wiring::Dual,
-            (true, true) => Wiring::DualReadout,
-            (false, _) => Wiring::Single,
-        };
+        let wanted = network.rule.wiring((at == last).then(|| Readout::of(layer.activation)));
         if layer.wiring != wanted {
             let found =
                 format!("does not fit the arrays of layer {at}, which {}", wired(layer.wiring));
@@ -140,11 +178,17 @@ fn wiring(network: &NetworkSpec) -> Checked {
             );
             return misfit("learning.rule", found, allowed);
         }
-        let drives = if at == 0 { DrivenBy::Shared } else { DrivenBy::Streams };
+        let below = at.checked_sub(1).map(|below| network.layers[below].activation);
+        let drives = match below {
+            None => DrivenBy::Shared,
+            Some(Activation::Rms) => DrivenBy::Normalised,
+            Some(_) => DrivenBy::Streams,
+        };
         if layer.driven_by != drives {
             let shared = |drives: DrivenBy| match drives {
                 DrivenBy::Shared => "one set of drives",
                 DrivenBy::Streams => "a set of drives for each stream",
+                DrivenBy::Normalised => "a set of normalised drives for each stream",
             };
             let found = format!("gives layer {at} {}", shared(layer.driven_by));
             let allowed = format!(
@@ -163,8 +207,8 @@ const fn wired(wiring: Wiring) -> &'static str {
         Wiring::Dual => "have two populations above and below",
         Wiring::DualReadout => "read one of two populations out",
         Wiring::Single => "are differential pairs",
-        #[cfg(test)]
         Wiring::DualPairs => "have two populations of differential pairs",
+        Wiring::DualReadoutPairs => "read one of two populations out by differential pairs",
     }
 }
 
@@ -194,7 +238,7 @@ fn routes(network: &NetworkSpec) -> Checked {
     let Some(route) = network.route else {
         return match network.rule {
             Rule::Bp => Ok(()),
-            Rule::Ed | Rule::Kaneko | Rule::Dfa => {
+            Rule::Ed | Rule::EdNonDalean | Rule::Kaneko | Rule::Dfa => {
                 let allowed = "every other rule than \"bp\" has one, such as \"modulo\"";
                 misfit("learning.route", "is missing", allowed)
             }
@@ -209,7 +253,7 @@ fn routes(network: &NetworkSpec) -> Checked {
             let allowed = "direct feedback alignment has random dense feedback; leave the key out";
             return misfit("learning.route", "is not \"random_dense\"", allowed);
         }
-        Rule::Ed | Rule::Kaneko | Rule::Dfa => {}
+        Rule::Ed | Rule::EdNonDalean | Rule::Kaneko | Rule::Dfa => {}
     }
     let most = TAPS_MAX.min(network.outputs());
     let shift = match route {

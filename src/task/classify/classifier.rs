@@ -12,8 +12,8 @@ use crate::learn::network::NetworkError;
 /// A network on a chip, and the examples it learns from.
 ///
 /// ```
-/// use dalean::network::{Activation, Centre, Decay, DrivenBy, LayerSpec, Route, Rule, UpdateMode, Wiring};
-/// use dalean::network::{Batch, Optimiser, Positive, RateMantissa};
+/// use dalean::network::{Activation, Centre, Decay, DrivenBy, InitialLevels, LayerSpec, Wiring};
+/// use dalean::network::{Batch, Optimiser, Positive, RateMantissa, Route, Rule, UpdateMode};
 /// use dalean::{Backend, Classifier, Examples, Experiment, Hardware, NetworkSpec};
 ///
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -27,7 +27,7 @@ use crate::learn::network::NetworkError;
 ///     driven_by,
 ///     activation: Activation::Sigmoid(alpha),
 ///     weight_max_log2: 2,
-///     gain_64ths: [96, 32],
+///     initial: InitialLevels::Uniform { gain_64ths: [96, 32] },
 ///     constant_row: true,
 /// };
 /// let network = NetworkSpec {

@@ -14,10 +14,11 @@
 //! Angle `a` of the upper link is from straight down, `b` of the lower from the upper, in radians; `v` and `w` are their
 //! speeds. Masses, lengths and moments are 1, centres of mass at half a length, g = 9.8. Between the four stages speeds
 //! are held to 2048 in size, so that nothing overflows: from two million states drawn from the whole box none went beyond
-//! 900. As Gymnasium 1.4 has it, to 2^-20 of the range in a step; see docs/MODEL.md, 5.
+//! 900. As Gymnasium 1.4 has it, to 2^-24 of a range in a step; see docs/MODEL.md, 5.4.
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
-use super::fine::{Fine, cos, reciprocal, shown, sin, sin_cos, uniform};
+use super::canvas::Canvas;
+use super::fine::{Fine, cos, reciprocal, shown, sin_cos, turned, uniform};
 use super::one::{Action, Came, Environment, StatePart};
 use super::{EnvSpec, Observations, Real, Shown, Taken};
 
@@ -42,12 +43,12 @@ pub struct Acrobot([Fine; 4]);
 /// What changes in a second.
 #[inline]
 fn change([a, b, v, w]: [Fine; 4], torque: Fine) -> [Fine; 4] {
-    let (sin_b, cos_b) = sin_cos(b);
+    let ((sin_a, cos_a), (sin_b, cos_b)) = (sin_cos(a), sin_cos(b));
     let d1 = Fine::lit("3.5") + cos_b;
     let d2 = Fine::lit("1.25") + HALF * cos_b;
     let d1_inverse = reciprocal(d1);
-    let p2 = LOWER * sin(a + b);
-    let p1 = UPPER * sin(a) + p2 - (HALF * w + v) * (w * sin_b);
+    let p2 = LOWER * (sin_a * cos_b + cos_a * sin_b);
+    let p1 = UPPER * sin_a + p2 - (HALF * w + v) * (w * sin_b);
     let share = d2 * d1_inverse;
     let pull = torque + share * p1 - HALF * (v * v) * sin_b - p2;
     let w_change = pull * reciprocal(Fine::lit("1.25") - d2 * share);
@@ -61,15 +62,6 @@ fn moved(from: [Fine; 4], time: Fine, change: [Fine; 4]) -> [Fine; 4] {
     let held = |speed: Fine| speed.clamp(-STAGE_SPEED_MAX, STAGE_SPEED_MAX);
     let [a, b, v, w] = std::array::from_fn(|i| from[i] + time * change[i]);
     [a, b, held(v), held(w)]
-}
-
-/// The same direction, from -pi to pi.
-#[inline]
-fn turned(angle: Fine) -> Fine {
-    if angle.abs() <= Fine::PI {
-        return angle;
-    }
-    (angle + Fine::PI).rem_euclid(Fine::TAU) - Fine::PI
 }
 
 impl Environment for Acrobot {
@@ -142,6 +134,18 @@ impl Environment for Acrobot {
     }
 
     fn picture(&self) -> String {
-        String::new()
+        let mut canvas = Canvas::new(33, 17);
+        let [a, b, ..] = self.0;
+        let hinge = [16, 8].map(Fine::from_num);
+        let hang = |[column, row]: [Fine; 2], angle: Fine| {
+            let (sin, cos) = sin_cos(angle);
+            [column + sin * 8, row + cos * 4]
+        };
+        let joint = hang(hinge, a);
+        canvas.line([0, 4].map(Fine::from_num), [32, 4].map(Fine::from_num), '-');
+        canvas.line(hinge, joint, 'o');
+        canvas.line(joint, hang(joint, a + b), 'o');
+        canvas.put(hinge, '+');
+        canvas.to_string()
     }
 }

@@ -10,9 +10,10 @@
 //! ```
 //!
 //! `x` is in metres, `a` in radians, upwards 0. Speeds `v` and `w` are held to 256 in size, twenty times what an episode
-//! reaches, so that nothing overflows. As Gymnasium 1.4 has it, to 2^-25 in a step; see docs/MODEL.md, 5.
+//! reaches, so that nothing overflows. As Gymnasium 1.4 has it, to 2^-28 of a range in a step; see docs/MODEL.md, 5.4.
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
+use super::canvas::Canvas;
 use super::fine::{Fine, reciprocal, shown, sin_cos, uniform};
 use super::one::{Action, Came, Environment, StatePart};
 use super::{EnvSpec, Observations, Real, Shown, Taken};
@@ -114,6 +115,14 @@ impl Environment for CartPole {
     }
 
     fn picture(&self) -> String {
-        String::new()
+        let mut canvas = Canvas::new(53, 7);
+        let fine = |number: i32| Fine::from_num(number);
+        let middle = fine(26) + self.position * 10;
+        let (sin, cos) = sin_cos(self.angle);
+        let tip = [middle + sin * 10, fine(5) - cos * 5];
+        canvas.line([fine(2), fine(6)], [fine(50), fine(6)], '-');
+        canvas.line([middle, fine(5)], tip, 'o');
+        canvas.line([middle - fine(2), fine(5)], [middle + fine(2), fine(5)], '=');
+        canvas.to_string()
     }
 }

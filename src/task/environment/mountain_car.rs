@@ -7,10 +7,11 @@
 //! begins with x uniform in -0.6 .. -0.4, v = 0
 //! ```
 //!
-//! As Gymnasium 1.4 has it, which keeps `x` and `v` in 32 bits: to 2^-22 in a step; see docs/MODEL.md, 5.
+//! As Gymnasium 1.4 has it, which keeps `x` and `v` in 32 bits: to 2^-22 of a range in a step; see docs/MODEL.md, 5.4.
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
-use super::fine::{Fine, cos, shown, taken, uniform};
+use super::canvas::Canvas;
+use super::fine::{Fine, cos, shown, sin, taken, uniform};
 use super::one::{Action, Came, Environment, StatePart};
 use super::{EnvSpec, Observations, Shown, Taken};
 
@@ -82,6 +83,15 @@ impl Environment for MountainCar {
     }
 
     fn picture(&self) -> String {
-        String::new()
+        let mut canvas = Canvas::new(55, 10);
+        let column = |position: Fine| (position - POSITION_MIN) * 30;
+        let row = |position: Fine| Fine::from_num(5) - sin(position * 3) * 4;
+        for part in 0..55 {
+            let position = POSITION_MIN + Fine::from_num(part) / 30;
+            canvas.put([column(position), row(position)], '.');
+        }
+        canvas.put([column(GOAL), row(GOAL) - Fine::ONE], 'F');
+        canvas.put([column(self.position), row(self.position)], 'o');
+        canvas.to_string()
     }
 }

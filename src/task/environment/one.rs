@@ -6,7 +6,7 @@
 //! ```
 //!
 //! An environment here is its rules alone: how it begins, what an action does, what it shows. What all have in common is
-//! said once, in [`SideBySide`]. See docs/MODEL.md, 5.
+//! said once, in [`SideBySide`]. See docs/MODEL.md, 5.4.
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
 use std::fmt;
@@ -238,12 +238,6 @@ fn add<E: Environment>(one: &E, kind: Shown, shown: &mut Observations) {
     }
 }
 
-fn clear(shown: &mut Observations) {
-    shown.values.clear();
-    shown.active.clear();
-    shown.ends.clear();
-}
-
 impl<E: Environment> VecEnv for SideBySide<E> {
     fn spec(&self) -> &EnvSpec {
         &self.spec
@@ -259,14 +253,14 @@ impl<E: Environment> VecEnv for SideBySide<E> {
     }
 
     fn show(&self, shown: &mut Observations) {
-        clear(shown);
+        shown.clear();
         self.all.iter().for_each(|one| add(one, self.spec.shown, shown));
     }
 
     fn step(&mut self, actions: Actions<'_>, outcomes: &mut Outcomes) -> Result<(), EnvError> {
         self.check(actions)?;
-        clear(&mut outcomes.reached);
-        clear(&mut outcomes.next);
+        outcomes.reached.clear();
+        outcomes.next.clear();
         outcomes.rewards.clear();
         outcomes.terminated.clear();
         outcomes.truncated.clear();
@@ -325,3 +319,6 @@ impl<E: Environment> State for SideBySide<E> {
         Ok(())
     }
 }
+
+#[cfg(test)]
+mod tests;

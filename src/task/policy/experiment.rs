@@ -4,7 +4,10 @@
 use fixed::types::U1F31;
 
 use crate::chip::hardware::Hardware;
-use crate::learn::network::NetworkSpec;
+use crate::learn::network::{NetworkError, NetworkSpec};
+use crate::num::fixed::narrow;
+use crate::num::tables::Activation;
+use crate::task::environment::{EnvSpec, Shown, Taken};
 
 /// A number from 0 to 1, or a little more: a discount, a probability, a coefficient.
 pub type Share = U1F31;
@@ -46,6 +49,101 @@ pub struct PolicyExperiment {
     pub rollouts: u32,
     /// What is read without learning.
     pub evaluation: Evaluating,
+}
+
+impl PolicyExperiment {
+    /// Steps of all environments in an epoch.
+    #[must_use]
+    pub fn steps_per_epoch(&self) -> u64 {
+        u64::from(self.environments) * u64::from(self.horizon) * u64::from(self.rollouts)
+    }
+
+    /// Epochs: so many that no step is missing.
+    ///
+    /// # Panics
+    /// When they are more than 2^32, or an epoch has no steps: [`PolicyExperiment::check`] refuses that.
+    #[must_use]
+    pub fn epochs(&self) -> u32 {
+        narrow(self.steps.div_ceil(self.steps_per_epoch()), "checked")
+    }
+
+    /// Updates of each network.
+    #[must_use]
+    pub fn updates(&self) -> u64 {
+        let rollouts = u64::from(self.epochs()) * u64::from(self.rollouts);
+        match self.method {
+            Method::Ppo(ppo) => {
+                let steps = u64::from(self.environments) * u64::from(self.horizon);
+                let each = steps.div_ceil(self.actor.batch.get().into());
+                rollouts * u64::from(ppo.passes) * each
+            }
+            Method::Evolution(_) => rollouts,
+        }
+    }
+
+    /// Rows that observations take, without the constant one.
+    #[must_use]
+    pub const fn rows(&self, spec: &EnvSpec) -> usize {
+        match (spec.shown, self.input) {
+            (Shown::Dense(values), InputCoding::Split) => 2 * values,
+            (Shown::Dense(values), InputCoding::Offset) => values,
+            (Shown::Sparse { lines, .. }, _) => lines,
+        }
+    }
+
+    /// Numbers that the actor puts out.
+    #[must_use]
+    pub const fn outputs(spec: &EnvSpec) -> usize {
+        match spec.taken {
+            Taken::Discrete(actions) => actions,
+            Taken::Continuous(values) => values,
+        }
+    }
+
+    /// Checks that everything fits together, on the chip, and with the environment.
+    ///
+    /// # Errors
+    /// When something does not, with the key that says it.
+    pub fn check(&self, spec: &EnvSpec) -> Result<(), NetworkError> {
+        if !(1..=1024).contains(&self.environments) {
+            let found = format!("is {}", self.environments);
+            return Err(NetworkError::misfit(
+                "environment.count",
+                found,
+                "it must lie in 1..=1024",
+            ));
+        }
+        let sizes =
+            [("environment.horizon", self.horizon), ("environment.rollouts", self.rollouts)];
+        if let Some((key, _)) = sizes.into_iter().find(|(_, size)| *size == 0) {
+            return Err(NetworkError::misfit(key, "is 0", "give at least 1"));
+        }
+        let epoch = self.steps_per_epoch();
+        if self.steps == 0 || self.steps.div_ceil(epoch) > u64::from(u32::MAX) || epoch > 1 << 24 {
+            let found = format!("is {}, in epochs of {epoch}", self.steps);
+            let allowed = "give 1 step or more, in 2^32 epochs at most of 2^24 steps at most";
+            return Err(NetworkError::misfit("environment.steps", found, allowed));
+        }
+        let networks = [(&self.actor, Self::outputs(spec)), (&self.critic, 1)];
+        for (network, outputs) in networks {
+            network.check(&self.hardware)?;
+            let (first, last) = (&network.layers[0], &network.layers[network.layers.len() - 1]);
+            if first.inputs != self.rows(spec) || last.units != outputs {
+                let found = format!("has {} inputs and {} outputs", first.inputs, last.units);
+                let allowed = format!("{} takes {} and {outputs}", spec.id, self.rows(spec));
+                return Err(NetworkError::misfit("network.hidden", found, allowed));
+            }
+            if last.activation != Activation::Accumulator {
+                let allowed = "a policy reads the accumulators of both streams: use \"p-n\"";
+                return Err(NetworkError::misfit("network.readout", "is not \"p-n\"", allowed));
+            }
+        }
+        if self.actor.batch != self.critic.batch {
+            let allowed = "actor and critic learn from the same minibatches";
+            return Err(NetworkError::misfit("learning.batch", "is not one", allowed));
+        }
+        Ok(())
+    }
 }
 
 /// How a policy learns.

@@ -65,3 +65,30 @@ pub struct PolicyEvaluation {
     /// Layers whose units put out the same whatever was shown, through both networks.
     pub mute: Vec<bool>,
 }
+
+/// One step of an episode that is watched.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct WatchedStep {
+    /// Step, from 0.
+    pub step: u32,
+    /// Picture in characters, before the step.
+    pub picture: String,
+    /// What was shown, 16 fractional bits, or lines that were on.
+    pub shown: Vec<i64>,
+    /// The action: its number, or its values with 16 fractional bits.
+    pub action: Vec<i64>,
+    /// What the actor put out, 20 fractional bits: logits, or means before `tanh`.
+    pub actor: Vec<i64>,
+    /// What the state is worth, in units of reward, 20 fractional bits.
+    pub value: i64,
+    /// The reward, 16 fractional bits.
+    pub reward: i64,
+}
+
+impl SumOf {
+    /// One more.
+    pub(super) fn add(&mut self, number: i64) {
+        self.sum += number;
+        self.count += 1;
+    }
+}

@@ -2,7 +2,7 @@
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
 use super::experiment::InputCoding;
-use super::number::{Advantage, Observed, Value};
+use super::number::{Advantage, LogProbability, Logit, Observed, Value};
 use super::observe::{self, Standard};
 use crate::num::fixed::DriveBits;
 use crate::task::environment::{EnvSpec, Observations, Real, Shown};
@@ -20,7 +20,7 @@ pub(super) struct Coding {
 }
 
 impl Coding {
-    pub(super) fn new(input: InputCoding, bits: DriveBits, spec: &EnvSpec) -> Self {
+    pub(super) const fn new(input: InputCoding, bits: DriveBits, spec: &EnvSpec) -> Self {
         let (lines, values) = match spec.shown {
             Shown::Dense(values) => (0, values),
             Shown::Sparse { lines, .. } => (lines, 0),
@@ -36,6 +36,11 @@ impl Coding {
         }
     }
 
+    /// Numbers of an observation; 0 of sparse ones.
+    pub(super) const fn values(&self) -> usize {
+        self.values
+    }
+
     /// Appends the drives of observation number `which`.
     pub(super) fn code(
         &mut self,
@@ -45,11 +50,7 @@ impl Coding {
         codes: &mut Vec<u8>,
     ) {
         if self.lines > 0 {
-            let from = codes.len();
-            codes.resize(from + self.lines, 0);
-            for &line in shown.lines_of(which) {
-                codes[from + line as usize] = self.bits.code_max();
-            }
+            observe::sparse(shown.lines_of(which), self.lines, self.bits, codes);
         } else {
             self.observed.clear();
             standard.apply(shown.values_of(which, self.values), &mut self.observed);
@@ -69,9 +70,9 @@ pub(super) struct Rollout {
     /// Discrete actions.
     pub(super) choices: Vec<u16>,
     /// Continuous actions before they are squashed, `[step][environment][value]`.
-    pub(super) raw: Vec<Value>,
+    pub(super) tried: Vec<Logit>,
     /// Logarithm of the probability, or density, of the action.
-    pub(super) log_probabilities: Vec<Value>,
+    pub(super) logs: Vec<LogProbability>,
     /// What the observations are: their numbers, for the statistics.
     pub(super) shown: Vec<Real>,
     pub(super) rewards: Vec<Real>,
@@ -79,6 +80,8 @@ pub(super) struct Rollout {
     pub(super) truncated: Vec<bool>,
     /// Drives of what was reached where an episode was truncated, in order.
     pub(super) reached: Vec<u8>,
+    /// Which steps those are.
+    pub(super) stopped: Vec<usize>,
     pub(super) advantages: Vec<Advantage>,
     /// Value targets, standardised.
     pub(super) targets: Vec<Value>,
@@ -89,13 +92,14 @@ impl Rollout {
     pub(super) fn clear(&mut self) {
         self.codes.clear();
         self.choices.clear();
-        self.raw.clear();
-        self.log_probabilities.clear();
+        self.tried.clear();
+        self.logs.clear();
         self.shown.clear();
         self.rewards.clear();
         self.terminated.clear();
         self.truncated.clear();
         self.reached.clear();
+        self.stopped.clear();
         self.advantages.clear();
         self.targets.clear();
     }

@@ -1,14 +1,42 @@
-//! Rollouts and updates.
+//! A training in native environments: rollouts, updates, and episodes without learning.
+//!
+//! ```text
+//! calibration   256 steps in all under uniform actions; both networks' converters look at them; then all begin anew
+//! epoch         `rollouts` rollouts with their updates, or so many generations
+//! evaluation    environments of their own, whose seed has its highest bit turned: the same episodes at every look
+//! ```
+//!
+//! Draws beside those of a policy that learns: uniform actions at site 7, pathway 1, sub = environment, count = step; drawn
+//! actions of episodes without learning at pathway 2. See docs/MODEL.md, 5.
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
-use super::experiment::PolicyExperiment;
-use super::outcome::{PolicyEpoch, PolicyEvaluation, PolicyProgress};
+use super::actor::{Actor, ActorLaw, Chosen};
+use super::agent::Agent;
+use super::critic::Critic;
+use super::evolution::Evolver;
+use super::experiment::{Method, PolicyExperiment};
+use super::observe::Statistics;
+use super::outcome::{PolicyEpoch, PolicyEvaluation, PolicyProgress, WatchedStep};
+use super::player::{Manner, Player};
+use super::rollout::Coding;
 use crate::chip::crossbar::kernel::Backend;
-use crate::chip::state::{State, StateError, Visitor};
+use crate::chip::engine::Phase;
+use crate::chip::state::{Piece, Section, State, StateError, Visitor};
 use crate::learn::driver::Driver;
-use crate::learn::network::NetworkError;
-use crate::learn::statistics::PathwayRecord;
-use crate::task::environment::{EnvError, EnvSpec};
+use crate::learn::network::{NetworkError, NetworkPlace, NetworkSpec};
+use crate::learn::statistics::{self, FloorMap, PathwayRecord};
+use crate::num::draw::{Place, Site, below};
+use crate::num::fixed::narrow;
+use crate::num::tables::PolicyTables;
+use crate::task::environment::{
+    self, EnvError, EnvSource, EnvSpec, Observations, Outcomes, Purpose, Real, Record, Taken,
+    UnknownEnvironment, VecEnv,
+};
+
+/// Steps whose observations are looked at before anything is learnt.
+const CALIBRATION: usize = 256;
+/// What distinguishes the environments of evaluation.
+const ELSEWHERE: u64 = 1 << 63;
 
 /// Why a policy cannot be trained, or not further.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -17,6 +45,9 @@ pub enum PolicyError {
     /// A network that does not fit.
     #[error(transparent)]
     Network(#[from] NetworkError),
+    /// An environment that nobody knows.
+    #[error(transparent)]
+    Unknown(#[from] UnknownEnvironment),
     /// An environment that cannot go on. The state is that before the step.
     #[error(transparent)]
     Environment(#[from] EnvError),
@@ -29,7 +60,49 @@ pub enum PolicyError {
 #[derive(Debug)]
 pub struct PolicyTrainer {
     experiment: PolicyExperiment,
-    drivers: Vec<Driver>,
+    source: EnvSource,
+    learner: Learner,
+    environments: Box<dyn VecEnv>,
+    outcomes: Outcomes,
+    start: Vec<FloorMap>,
+    epoch: u32,
+}
+
+/// Who learns.
+#[derive(Debug)]
+enum Learner {
+    Ppo(Box<Agent>),
+    Evolution(Box<Evolver>),
+}
+
+impl Learner {
+    fn player(&mut self) -> &mut Player {
+        match self {
+            Self::Ppo(agent) => &mut agent.player,
+            Self::Evolution(evolver) => &mut evolver.player,
+        }
+    }
+
+    const fn spec(&self) -> &EnvSpec {
+        match self {
+            Self::Ppo(agent) => &agent.player.spec,
+            Self::Evolution(evolver) => &evolver.player.spec,
+        }
+    }
+
+    fn networks(&self) -> Vec<&Driver> {
+        match self {
+            Self::Ppo(agent) => vec![&agent.player.actor.driver, &agent.critic.driver],
+            Self::Evolution(evolver) => vec![&evolver.player.actor.driver],
+        }
+    }
+
+    fn networks_mut(&mut self) -> Vec<&mut Driver> {
+        match self {
+            Self::Ppo(agent) => vec![&mut agent.player.actor.driver, &mut agent.critic.driver],
+            Self::Evolution(evolver) => vec![&mut evolver.player.actor.driver],
+        }
+    }
 }
 
 impl PolicyTrainer {
@@ -37,8 +110,79 @@ impl PolicyTrainer {
     ///
     /// # Errors
     /// When something does not fit.
-    pub fn new(_experiment: PolicyExperiment, _backend: Backend) -> Result<Self, PolicyError> {
-        unimplemented!("being written")
+    pub fn new(
+        experiment: PolicyExperiment,
+        backend: Backend,
+        source: EnvSource,
+    ) -> Result<Self, PolicyError> {
+        let (id, count) = (&experiment.environment, experiment.environments as usize);
+        let environments = source.make(id, experiment.seed, count, Purpose::Training)?;
+        let spec = environments.spec().clone();
+        experiment.check(&spec)?;
+        let first_layer = narrow(experiment.actor.layers.len(), "at most 64 layers");
+        let build = |network: &NetworkSpec, first_layer| {
+            let updates = experiment.updates();
+            let place = NetworkPlace { seed: experiment.seed, first_layer, updates };
+            network.build(&experiment.hardware, backend, place)
+        };
+        let law = match experiment.method {
+            Method::Ppo(ppo) => ppo.into(),
+            Method::Evolution(_) => ActorLaw::default(),
+        };
+        let statistics = Statistics::new(spec.values());
+        let player = Player {
+            actor: Actor::new(build(&experiment.actor, 0)?, spec.taken, law),
+            coding: Coding::new(experiment.input, experiment.hardware.drive.bits, &spec),
+            tables: PolicyTables::build(),
+            standard: statistics.freeze(),
+            statistics,
+            spec,
+        };
+        let learner = match experiment.method {
+            Method::Ppo(ppo) => {
+                let critic = Critic::new(build(&experiment.critic, first_layer)?);
+                Learner::Ppo(Box::new(Agent::new(&experiment, ppo, player, critic)))
+            }
+            Method::Evolution(law) => {
+                let evolver = Evolver::new(&experiment, law, player, source.clone());
+                Learner::Evolution(Box::new(evolver))
+            }
+        };
+        let start = learner.networks().into_iter();
+        let start = start.map(|driver| statistics::floor_map(driver.engine())).collect();
+        let outcomes = Outcomes::default();
+        let mut this =
+            Self { experiment, source, learner, environments, outcomes, start, epoch: 0 };
+        this.calibrate()?;
+        Ok(this)
+    }
+
+    /// Looks at what uniform actions lead to, and begins anew.
+    fn calibrate(&mut self) -> Result<(), PolicyError> {
+        let Self { experiment, learner, environments, outcomes, .. } = self;
+        let count = environments.count();
+        let mut seen = Observations::default();
+        let mut shown = Observations::default();
+        environments.reset(&mut shown);
+        for step in 0..CALIBRATION.div_ceil(count) as u64 {
+            seen.append(&shown);
+            let place = Place::global(experiment.seed, Site::Exploration, step);
+            let actions = uniform(learner.spec().taken, count, place);
+            environments.step(actions.actions(), outcomes)?;
+            std::mem::swap(&mut shown, &mut outcomes.next);
+        }
+        let player = learner.player();
+        player.look(&seen);
+        let mut codes = Vec::new();
+        player.codes(&seen, &Vec::from_iter(0..CALIBRATION), &mut codes);
+        for driver in learner.networks_mut() {
+            let _ = driver.engine_mut().calibrate(&codes);
+        }
+        environments.reset(&mut shown);
+        if let Learner::Ppo(agent) = learner {
+            agent.begin(&shown);
+        }
+        Ok(())
     }
 
     /// What decides the result.
@@ -49,99 +193,237 @@ impl PolicyTrainer {
 
     /// What is acted on.
     #[must_use]
-    pub fn environment(&self) -> &EnvSpec {
-        unimplemented!("being written")
+    pub const fn environment(&self) -> &EnvSpec {
+        self.learner.spec()
     }
 
     /// Epochs in all.
     #[must_use]
     pub fn epochs(&self) -> u32 {
-        unimplemented!("being written")
+        self.experiment.epochs()
     }
 
     /// Epochs finished.
     #[must_use]
-    pub fn epoch(&self) -> u32 {
-        unimplemented!("being written")
+    pub const fn epoch(&self) -> u32 {
+        self.epoch
     }
 
-    /// Steps and updates (of each network) of an epoch.
+    /// Steps (at most, of evolution) and updates (of each network) of an epoch.
     #[must_use]
     pub fn epoch_size(&self) -> (u64, u64) {
-        unimplemented!("being written")
+        let epochs = u64::from(self.epochs());
+        (self.experiment.steps_per_epoch(), self.experiment.updates() / epochs)
     }
 
     /// One epoch.
     ///
     /// # Errors
-    /// When `go_on` says to stop (asked after every update), no epoch is left, or the environment cannot go on.
+    /// When `go_on` says to stop (asked after every update, or pair of candidates), no epoch is left, or the environment
+    /// cannot go on.
     pub fn learn(
         &mut self,
-        _go_on: &mut dyn FnMut(PolicyProgress) -> bool,
+        go_on: &mut dyn FnMut(PolicyProgress) -> bool,
     ) -> Result<PolicyEpoch, PolicyError> {
-        unimplemented!("being written")
+        let (epoch, epochs) = (self.epoch, self.epochs());
+        if epoch >= epochs {
+            return Err(PolicyError::Stopped);
+        }
+        let steps_total = self.experiment.steps_per_epoch();
+        let Self { experiment, learner, environments, outcomes, .. } = self;
+        let mut told = PolicyEpoch::default();
+        let progress = |steps, told: &PolicyEpoch| {
+            let returns = [told.returns.count as i64, told.returns.sum];
+            PolicyProgress { epoch, epochs, steps, steps_total, returns }
+        };
+        for rollout in 1..=experiment.rollouts {
+            let steps = steps_total / u64::from(experiment.rollouts) * u64::from(rollout);
+            let went_on = match &mut *learner {
+                Learner::Ppo(agent) => {
+                    while !agent.is_full() {
+                        let chosen = agent.act();
+                        environments.step(chosen.actions(), outcomes)?;
+                        agent.take(outcomes, &mut told)?;
+                    }
+                    let progress = progress(steps, &told);
+                    agent.learn(&mut told, &mut || go_on(progress))
+                }
+                Learner::Evolution(evolver) => {
+                    let progress = progress(steps, &told);
+                    evolver.evolve(&mut told, &mut || go_on(progress))?
+                }
+            };
+            if !went_on {
+                return Err(PolicyError::Stopped);
+            }
+        }
+        self.epoch += 1;
+        told.steps = match learner {
+            Learner::Ppo(_) => u64::from(self.epoch) * steps_total,
+            Learner::Evolution(evolver) => evolver.steps,
+        };
+        told.log_sigma = learner.player().actor.log_sigma().to_vec();
+        Ok(told)
     }
 
-    /// Episodes without learning, from fresh environments whose draws are their own; charged to evaluation.
+    /// Episodes without learning, from environments of their own; charged to evaluation.
     ///
     /// # Errors
     /// When the environment cannot go on.
-    pub fn evaluate(&mut self, _episodes: u32) -> Result<PolicyEvaluation, PolicyError> {
-        unimplemented!("being written")
+    pub fn evaluate(&mut self, episodes: u32) -> Result<PolicyEvaluation, PolicyError> {
+        let Self { experiment, source, learner, .. } = self;
+        let phases: Vec<Phase> = learner
+            .networks_mut()
+            .into_iter()
+            .map(|driver| {
+                let (phase, engine) = (driver.engine().phase(), driver.engine_mut());
+                let _ = (engine.take_currents(), engine.take_mute());
+                engine.set_phase(Phase::Evaluation);
+                phase
+            })
+            .collect();
+        let mut told = PolicyEvaluation::default();
+        if episodes > 0 {
+            let seed = experiment.seed ^ ELSEWHERE;
+            let count = episodes as usize;
+            let id = &experiment.environment;
+            let mut environments = source.make(id, seed, count, Purpose::Evaluation)?;
+            let drawn = (!experiment.evaluation.deterministic).then_some(drawn_at(seed));
+            let manner = Manner { drawn, steps_max: u32::MAX };
+            let played = learner.player().play(&mut *environments, manner, &mut |_, _| {})?;
+            (told.returns, told.lengths) = (played.returns, played.lengths);
+        }
+        for (driver, phase) in learner.networks_mut().into_iter().zip(phases) {
+            let engine = driver.engine_mut();
+            told.currents.extend(engine.take_currents());
+            told.mute.extend(engine.take_mute());
+            engine.set_phase(phase);
+        }
+        Ok(told)
     }
 
-    /// Watches one episode: after each step the picture of the environment, the reward (16 fractional bits), the action and
-    /// what the actor and the critic put out. False stops.
+    /// Watches an episode of the evaluation. False stops.
     ///
     /// # Errors
     /// When the environment cannot go on.
     pub fn watch(
         &mut self,
-        _episode: u32,
-        _look: &mut dyn FnMut(&WatchedStep) -> bool,
+        episode: u32,
+        look: &mut dyn FnMut(&WatchedStep) -> bool,
     ) -> Result<(), PolicyError> {
-        unimplemented!("being written")
+        let Self { experiment, learner, .. } = self;
+        let (which, seed) = (episode as usize, experiment.seed ^ ELSEWHERE);
+        let mut environments = environment::make(&experiment.environment, seed, which + 1)?;
+        let (mut shown, mut outcomes) = (Observations::default(), Outcomes::default());
+        environments.reset(&mut shown);
+        let mut codes = Vec::new();
+        for step in 0.. {
+            codes.clear();
+            let player = learner.player();
+            player.codes(&shown, &[which], &mut codes);
+            let actor = player.actor.read(&codes).iter().map(|out| out.to_bits().into()).collect();
+            let drawn = Place { count: step.into(), ..drawn_at(seed) };
+            let drawn = (!experiment.evaluation.deterministic).then_some(drawn);
+            let chosen = player.choose(&[which], drawn);
+            let value = match learner {
+                Learner::Ppo(agent) => agent.critic.values(&codes)[0].to_bits().into(),
+                Learner::Evolution(_) => 0,
+            };
+            let picture = environments.picture(which);
+            let all = chosen.spread_to(&[which], which + 1);
+            environments.step(all.actions(), &mut outcomes)?;
+            let watched = WatchedStep {
+                step,
+                picture,
+                shown: shown.numbers_of(which, learner.spec()),
+                action: chosen.numbers(),
+                actor,
+                value,
+                reward: outcomes.rewards[which].to_bits().into(),
+            };
+            let ended = outcomes.terminated[which] || outcomes.truncated[which];
+            if !look(&watched) || ended {
+                break;
+            }
+            std::mem::swap(&mut shown, &mut outcomes.next);
+        }
+        Ok(())
+    }
+
+    /// What environments showed since the last call, or the beginning; nothing unless it is recorded.
+    pub fn take_record(&mut self) -> Option<Record> {
+        match &self.source {
+            EnvSource::Recorded(record) => Some(Record::take(record, &mut *self.environments)),
+            EnvSource::Native | EnvSource::Replayed(_) => None,
+        }
     }
 
     /// Actor, then critic.
     #[must_use]
     pub fn networks(&self) -> Vec<&Driver> {
-        self.drivers.iter().collect()
+        self.learner.networks()
     }
 
     /// The same, to set what changes no result, or to restore.
     pub fn networks_mut(&mut self) -> Vec<&mut Driver> {
-        self.drivers.iter_mut().collect()
+        self.learner.networks_mut()
     }
 
     /// Statistics of every pathway of both networks.
     #[must_use]
     pub fn pathways(&self) -> Vec<PathwayRecord> {
-        unimplemented!("being written")
+        let networks = self.networks().into_iter().zip(&self.start);
+        networks.flat_map(|(driver, start)| statistics::pathways(driver.engine(), start)).collect()
     }
 }
 
-/// One step of an episode that is watched.
-#[derive(Debug, Clone, Default, PartialEq, Eq)]
-pub struct WatchedStep {
-    /// Step, from 0.
-    pub step: u32,
-    /// Picture in characters, before the step.
-    pub picture: String,
-    /// What was shown, 16 fractional bits, or lines that were on.
-    pub shown: Vec<i64>,
-    /// The action: its number, or its values with 16 fractional bits.
-    pub action: Vec<i64>,
-    /// What the actor put out: probabilities with 31 fractional bits, or means with 20.
-    pub actor: Vec<i64>,
-    /// What the state is worth, in units of reward, 20 fractional bits.
-    pub value: i64,
-    /// The reward, 16 fractional bits.
-    pub reward: i64,
+/// Where the actions of an episode are drawn that is not learnt from.
+const fn drawn_at(seed: u64) -> Place {
+    Place { pathway: 2, ..Place::global(seed, Site::Exploration, 0) }
+}
+
+/// Any action, each as likely as another: from the first word, or words, of the environment.
+fn uniform(taken: Taken, count: usize, place: Place) -> Chosen {
+    let words = |environment: u32| Place { pathway: 1, sub: environment, ..place }.words();
+    let environments = 0..narrow(count, "at most 1024");
+    match taken {
+        Taken::Discrete(actions) => {
+            let bound = narrow(actions, "an action has 16 bits");
+            let one = |environment| {
+                let word = words(environment).next().expect("the stream has no end");
+                narrow(below(word, bound), "an action has 16 bits")
+            };
+            Chosen::Discrete(environments.map(one).collect())
+        }
+        Taken::Continuous(values) => {
+            // from -1 to 1 in steps of 2^-16
+            let one = |word: u32| {
+                Real::from_bits(narrow(
+                    i64::from(below(word, (2 << 16) + 1)) - (1 << 16),
+                    "17 bits",
+                ))
+            };
+            Chosen::Continuous(environments.flat_map(|e| words(e).take(values).map(one)).collect())
+        }
+    }
 }
 
 impl State for PolicyTrainer {
-    fn visit(&mut self, _visitor: &mut dyn Visitor) -> Result<(), StateError> {
-        unimplemented!("being written")
+    fn visit(&mut self, visitor: &mut dyn Visitor) -> Result<(), StateError> {
+        let within = 0..=i64::from(self.epochs());
+        let piece = Piece { name: "epoch", section: Some(Section::Progress), within };
+        if let Some(epoch) = visitor.numbers(&piece, &[i64::from(self.epoch)])? {
+            self.epoch = u32::try_from(epoch[0]).expect("a visitor keeps to the range");
+        }
+        match &mut self.learner {
+            Learner::Ppo(agent) => agent.visit(visitor)?,
+            Learner::Evolution(evolver) => evolver.visit(visitor)?,
+        }
+        self.environments.visit(visitor)?;
+        self.environments.show(&mut self.outcomes.next);
+        if let Learner::Ppo(agent) = &mut self.learner {
+            agent.begin(&self.outcomes.next);
+        }
+        Ok(())
     }
 }

@@ -11,8 +11,8 @@ use dalean::hardware::{
     SliceTimes, Subtract, TileSpec, Timing, Window, WriteScheme, WriteSpec,
 };
 use dalean::network::{
-    Activation, Augment, Batch, Centre, Decay, DrivenBy, LayerSpec, Optimiser, Positive,
-    RateMantissa, Route, Rule, UpdateMode, Wiring,
+    Activation, Augment, Batch, Centre, Decay, DrivenBy, InitialLevels, LayerSpec, Optimiser,
+    Positive, RateMantissa, Route, Rule, UpdateMode, Wiring,
 };
 use dalean::{
     Backend, Classifier, Config, Data, DataRoot, Examples, Experiment, Hardware, HardwareSpec,
@@ -211,7 +211,9 @@ fn network(c: &mut Choices<'_>, inputs: usize, outputs: usize) -> NetworkSpec {
             _ => Activation::Sigmoid(positive(c)),
         },
         weight_max_log2: c.near(-8, 8) as i32,
-        gain_64ths: [c.near(1, 1024) as u32, c.near(1, 1024) as u32],
+        initial: InitialLevels::Uniform {
+            gain_64ths: [c.near(1, 1024) as u32, c.near(1, 1024) as u32],
+        },
         constant_row: c.one_in(2),
     });
     let layers: Vec<_> = layers.collect();
@@ -401,8 +403,9 @@ fn run(c: &mut Choices<'_>) {
     for _ in 0..c.byte() % 8 {
         match c.byte() % 8 {
             0 => {
-                let record = session.start();
-                let _ = session.note(&record);
+                if let Ok(record) = session.start() {
+                    let _ = session.note(&record);
+                }
             }
             1 | 2 => {
                 let mut updates = if c.one_in(2) { usize::MAX } else { c.size(0, 3) };
@@ -410,7 +413,7 @@ fn run(c: &mut Choices<'_>) {
                     updates = updates.saturating_sub(1);
                     updates > 0
                 });
-                if let Some((record, _)) = learnt {
+                if let Ok(Some((record, _))) = learnt {
                     let _ = session.note(&record);
                 }
             }

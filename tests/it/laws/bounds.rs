@@ -6,7 +6,9 @@ use std::ops::Range;
 use dalean::chip::crossbar::kernel::Backend;
 use dalean::chip::engine::{Engine, Operation, Side, Write, WritesDone};
 use dalean::chip::hardware::{Adc, AdcRange, DitherBits, Hardware, Subtract, Window};
-use dalean::chip::layer::{CHUNK_BLOCKS, DrivenBy, Layer, LayerSpec, SIDE_MAX, Taps};
+use dalean::chip::layer::{
+    CHUNK_BLOCKS, DrivenBy, InitialLevels, Layer, LayerSpec, SIDE_MAX, Taps,
+};
 use dalean::chip::population::Wiring;
 use dalean::num::fixed::*;
 use dalean::num::tables::Activation;
@@ -33,7 +35,7 @@ fn engine(hardware: Hardware, backend: Backend, inputs: usize, units: usize) -> 
         driven_by: DrivenBy::Shared,
         activation: Activation::Identity,
         weight_max_log2: 2,
-        gain_64ths: [64, 64],
+        initial: InitialLevels::Uniform { gain_64ths: [64, 64] },
         constant_row: false,
     };
     let taps = Taps { width: 1, per_unit: 1, words: vec![0; units], shift: 0 };

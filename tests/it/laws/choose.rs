@@ -4,7 +4,7 @@ use dalean::chip::hardware::{
     Adc, AdcRange, ConverterKind, DitherBits, DitherPattern, FloorKind, Hardware, HardwareSpec,
     PulseCode, SliceTime, SliceTimes, Subtract, Timing, Window, WriteScheme, converter,
 };
-use dalean::chip::layer::{Delivery, DrivenBy, LayerSpec, Taps, WordSource};
+use dalean::chip::layer::{Delivery, DrivenBy, InitialLevels, LayerSpec, Taps, WordSource};
 use dalean::chip::population::Wiring;
 use dalean::learn::error::Centre;
 use dalean::num::fixed::*;
@@ -167,6 +167,8 @@ pub(crate) fn wiring() -> impl Strategy<Value = (Wiring, Wiring)> {
         (Wiring::Dual, Wiring::DualReadout),
         (Wiring::Dual, Wiring::Dual),
         (Wiring::Single, Wiring::Single),
+        (Wiring::DualPairs, Wiring::DualReadoutPairs),
+        (Wiring::DualPairs, Wiring::DualPairs),
     ])
 }
 
@@ -229,11 +231,24 @@ pub(crate) fn net(sides: impl Strategy<Value = Vec<usize>>) -> impl Strategy<Val
                     },
                     activation,
                     weight_max_log2,
-                    gain_64ths: [96, 32],
+                    initial: InitialLevels::Uniform { gain_64ths: [96, 32] },
                     constant_row,
                 });
                 let above = reads_backwards && last == Wiring::Single && at + 1 < count;
                 deliveries.push(delivery(&mut numbers, sides[at + 1], above));
+            }
+            for at in 0..count {
+                if numbers.within(0, 2) > 0 {
+                    continue;
+                }
+                if at + 1 == count {
+                    specs[at].activation = Activation::Accumulator;
+                } else {
+                    specs[at].activation = Activation::Rms;
+                    if specs[at + 1].driven_by == DrivenBy::Streams {
+                        specs[at + 1].driven_by = DrivenBy::Normalised;
+                    }
+                }
             }
             Net {
                 seed,

@@ -2,7 +2,7 @@
 
 use dalean::chip::crossbar::kernel::Backend;
 use dalean::chip::hardware::{Adc, AdcRange, HardwareSpec};
-use dalean::chip::layer::{DrivenBy, LayerSpec, Optimiser};
+use dalean::chip::layer::{DrivenBy, InitialLevels, LayerSpec, Optimiser};
 use dalean::chip::population::Wiring;
 use dalean::lab::store::checkpoint::{self, Identity};
 use dalean::lab::store::hash;
@@ -114,7 +114,7 @@ fn run() -> impl Strategy<Value = Run> {
                     driven_by: if at == 0 { DrivenBy::Shared } else { DrivenBy::Streams },
                     activation,
                     weight_max_log2: weight,
-                    gain_64ths: [96, 32],
+                    initial: InitialLevels::Uniform { gain_64ths: [96, 32] },
                     constant_row: row,
                 }
             });

@@ -69,6 +69,8 @@ pub(super) const OPS: Ops = Ops {
     may_move: fused::may_move,
     pulses,
     levels,
+    stream_squares,
+    scale,
     centre,
     gate_totals,
     drive_totals,

@@ -80,6 +80,8 @@ const fn table<M: Multiply>() -> Ops {
         may_move: pulses::may_move_twin,
         pulses: pulses::twin,
         levels: levels::twin,
+        stream_squares: normalise::stream_squares,
+        scale: normalise::scale,
         peaks,
         ..scalar::OPS
     }

@@ -13,7 +13,7 @@
 use std::ops::Range;
 
 use super::{
-    Banks, Cells, Conversion, Dither, Draws, Drives, Ends, Extremes, Half, Image, LookUp,
+    Banks, Cells, Conversion, Dither, Draws, Drives, Ends, Extremes, Half, HandOn, Image, LookUp,
     OneSample, Peaks, Rails, Scratch, SignLaw, Squares, Sums, WriteCounts, WriteLaw,
 };
 use crate::chip::crossbar::layout::{BLOCK_ROWS, HALF_COLUMNS, Layout};
@@ -35,6 +35,8 @@ pub(super) struct Ops {
     pub(super) convert: unsafe fn([&[i32]; 2], Conversion, usize, &mut [i16]) -> Rails,
     pub(super) look_up: unsafe fn(&[i32], &LookUp, usize, &mut [u8], &mut [u8]) -> u64,
     pub(super) difference: unsafe fn([&[i32]; 2], &mut [i32]),
+    pub(super) stream_squares: unsafe fn(&[i32], &mut [u64]),
+    pub(super) scale: unsafe fn(&[i32], &[u64], HandOn, &mut [u8], &mut [u8]) -> u64,
     pub(super) latch: unsafe fn(&[i16], usize, &[u16], &mut [i16]),
     pub(super) gate: unsafe fn(&[i16], &[u8], bool, ErrorBits, usize, &mut [i8]) -> u64,
     pub(super) turn: unsafe fn(&[u8], usize, &mut [u8]),
@@ -78,7 +80,7 @@ pub(super) struct Ops {
     pub(super) peak: unsafe fn(usize) -> u64,
 }
 
-/// Compiles the twins of a write's steps for features of the processor. Where the whole program is compiled for them,
+/// Compiles twins, of a write's steps and of normalised activities, for features of the processor. Where the whole program is compiled for them,
 /// tables have the twins themselves.
 #[cfg(target_arch = "x86_64")]
 macro_rules! twins {
@@ -102,6 +104,23 @@ macro_rules! twins {
         #[target_feature(enable = $features)]
         fn levels(cells: &mut Cells<'_>, pulses: &Half<i8>, ends: Ends, groups: u16) -> u64 {
             crate::chip::crossbar::kernel::levels::twin(cells, pulses, ends, groups)
+        }
+
+        #[target_feature(enable = $features)]
+        fn stream_squares(sums: &[i32], squares: &mut [u64]) {
+            crate::chip::crossbar::kernel::normalise::stream_squares(sums, squares);
+        }
+
+        #[target_feature(enable = $features)]
+        fn scale(
+            sums: &[i32],
+            reciprocals: &[u64],
+            hand_on: crate::chip::crossbar::kernel::HandOn,
+            values: &mut [u8],
+            derivatives: &mut [u8],
+        ) -> u64 {
+            use crate::chip::crossbar::kernel::normalise;
+            normalise::scale(sums, reciprocals, hand_on, values, derivatives)
         }
 
         #[target_feature(enable = $features)]

@@ -1,5 +1,5 @@
 //! The law of reads, units and words: what every kernel computes, one cell after the other. That of a write stands with
-//! its steps: `sums`, `requests`, `pulses`, `levels`.
+//! its steps: `sums`, `requests`, `pulses`, `levels`; that of normalised activities in `normalise`.
 //!
 //! ```text
 //! read        v[c]   = sum_r level[r][c] * x[r]
@@ -16,8 +16,8 @@ use std::ops::Range;
 
 use super::ops::Ops;
 use super::{
-    Conversion, Draws, Drives, Extremes, Half, LookUp, Peaks, Rails, conv, levels, optimise,
-    pulses, sums,
+    Conversion, Draws, Drives, Extremes, Half, LookUp, Peaks, Rails, conv, levels, normalise,
+    optimise, pulses, sums,
 };
 use crate::chip::crossbar::layout::{
     BLOCK_CELLS, BLOCK_ROWS, HALF_CELLS, HALF_COLUMNS, Layout, PANEL_COLUMNS, in_half,
@@ -32,6 +32,8 @@ pub(super) const OPS: Ops = Ops {
     convert,
     look_up,
     difference,
+    stream_squares: normalise::law_squares,
+    scale: normalise::law_scale,
     latch,
     gate,
     turn,

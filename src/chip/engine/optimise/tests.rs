@@ -11,7 +11,7 @@ use crate::chip::engine::{Operation, Phase, Side, Write};
 use crate::chip::hardware::{
     DitherBits, DitherPattern, FloorKind, Hardware, PulseCode, Timing, Window,
 };
-use crate::chip::layer::{Delivery, DrivenBy, Layer, LayerSpec, Taps};
+use crate::chip::layer::{Delivery, DrivenBy, InitialLevels, Layer, LayerSpec, Taps};
 use crate::chip::population::{Polarity, Stream, Wiring};
 use crate::num::draw::{Place, Site};
 use crate::num::fixed::{ErrorBits, LevelBits};
@@ -119,7 +119,7 @@ impl Case {
             driven_by: [DrivenBy::Shared, DrivenBy::Streams][at],
             activation: Activation::Relu,
             weight_max_log2: 0,
-            gain_64ths: [64, 64],
+            initial: InitialLevels::Uniform { gain_64ths: [64, 64] },
             constant_row: self.seed.is_multiple_of(2),
         };
         let words = (0..hidden).map(|unit| (unit % outputs) as u16).collect();

@@ -16,6 +16,7 @@ use crate::chip::ledger::{Cycles, During, Event, Interval, Ledger, Part};
 use crate::chip::population::Stream;
 
 mod layer;
+mod normalise;
 mod segment;
 mod unit;
 mod watch;
@@ -288,7 +289,8 @@ impl Network {
     /// `FWD(rows)` of layers in a pipeline.
     fn reads(&mut self, layers: Range<usize>, samples: usize) {
         let count = self.layers.len();
-        let (mut issued, mut done) = (vec![0; count], vec![0; count]);
+        // samples that commands were given for, that lanes have seen, and that were handed on
+        let (mut issued, mut seen, mut done) = (vec![0; count], vec![0; count], vec![0; count]);
         // cycles for which the next command has been offered
         let mut offered = vec![0; count];
         let mut started = vec![vec![]; count];
@@ -313,13 +315,22 @@ impl Network {
             }
             self.end();
             for layer in layers.clone() {
-                if self.layers[layer].looked_up() {
-                    let sample = done[layer];
-                    self.hand_on(layer, sample);
+                if self.leave_stage(layer, done[layer]) {
                     done[layer] += 1;
+                }
+                if self.layers[layer].looked_up() {
+                    let sample = seen[layer];
+                    seen[layer] += 1;
+                    if !self.layers[layer].normalise() {
+                        self.hand_on(layer, sample);
+                        done[layer] += 1;
+                    }
                     let (start, end) = (started[layer][sample], self.clock);
                     let (layer, sample) = (Some(layer), Some(sample));
                     self.watch.span(Span { layer, name: "FWD(rows)", sample, start, end });
+                }
+                if let Some(stage) = &mut self.layers[layer].normaliser {
+                    stage.start();
                 }
             }
         }
@@ -328,6 +339,30 @@ impl Network {
             self.take_events(layer, During::ForwardRows, false);
             self.layers[layer].take_rails(training);
         }
+    }
+
+    /// A cycle of the stage behind a layer, if it has one; true when a sample leaves it and is handed on.
+    fn leave_stage(&mut self, layer: usize, sample: usize) -> bool {
+        let stage = self.layers[layer].normaliser.as_mut();
+        let Some(streams) = stage.and_then(|stage| stage.cycle()) else { return false };
+        for (target, normal) in streams {
+            self.layers[layer].set_units(target, sample, &normal);
+            let code = self.layers[layer].unit_code(target);
+            let [squares, roots, scalings, bounded] = normal.counts;
+            // an accumulator is stored and fetched twice, activity and derivative are stored
+            let bits = squares * (32 + 32) + scalings * (32 + 16);
+            for (event, count) in [
+                (Event::Squares, squares),
+                (Event::Roots, roots),
+                (Event::Scalings, scalings),
+                (Event::SaturatedLookUps, bounded),
+                (Event::SramBits, bits),
+            ] {
+                self.charge(layer, code, During::ForwardRows, event, count);
+            }
+        }
+        self.hand_on(layer, sample);
+        true
     }
 
     /// A sample's activities become drives of the next layer, or outputs.

@@ -19,7 +19,7 @@ mod trains;
 mod write;
 
 pub use command::Command;
-pub use config::{More, TileAdc, TileConfig, TileSize};
+pub use config::{More, TileAdc, TileConfig, TileSize, TileUnits};
 pub use events::{BankEvents, TileEvents};
 use optimise::Kept;
 pub use optimise::Said;
@@ -140,7 +140,7 @@ pub struct Launch {
 pub struct Tile {
     size: TileSize,
     config: TileConfig,
-    /// `[activity, derivative]` by index.
+    /// `[activity, derivative]` by index; empty where nothing is looked up.
     table: Vec<[u8; 2]>,
     /// `[row][column]`.
     level: [Vec<u16>; 2],
@@ -194,7 +194,8 @@ impl Tile {
         assert!((1..=size.rows).contains(&config.rows), "rows in use are rows");
         assert!((1..=size.columns).contains(&config.columns), "columns in use are columns");
         assert!(config.tree <= size.tree_max, "the tree has its stages");
-        assert_eq!(table.len(), 1 << config.lut_bits, "a table entry an index");
+        let looked_up = config.more.units == TileUnits::Table;
+        assert!(!looked_up || table.len() == 1 << config.lut_bits, "a table entry an index");
         let positive = [config.settle, config.convert, config.pulse, config.more.beat];
         assert!(positive.iter().all(|&cycles| cycles > 0), "what takes time takes a cycle");
         assert!(config.share > 0 && config.lanes > 0 && config.words > 0, "counts are positive");

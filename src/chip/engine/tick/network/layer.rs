@@ -10,6 +10,7 @@
 use std::ops::Range;
 
 use super::super::tile::{BankEvents, Command, Launch, Tile, TileEvents, TileSize};
+use super::normalise::{Normal, Normaliser};
 use crate::chip::hardware::timing::tree_levels;
 use crate::chip::hardware::{DitherPattern, Hardware, Timing, WriteScheme};
 use crate::chip::layer::{Delivery, DrivenBy, Layer, Optimiser};
@@ -17,6 +18,7 @@ use crate::chip::ledger::{During, Part};
 use crate::chip::periphery;
 use crate::chip::population::{Stream, Wiring};
 use crate::num::fixed::DriveBits;
+use crate::num::tables::Activation;
 
 mod build;
 mod draws;
@@ -43,6 +45,8 @@ pub(super) struct TickLayer {
     pub(super) memory: Memory,
     /// Accumulator and activity by target stream and sample, of what was read last.
     pub(super) outputs: [Vec<(i64, u8)>; 2],
+    /// The stage behind it, where its units are normalised.
+    pub(super) normaliser: Option<Normaliser>,
     pub(super) backward: Vec<i64>,
     /// Converter shifts, and codes on the rail and all codes since they were looked at, by target stream and slice.
     pub(super) adc_shifts: Vec<Vec<u32>>,
@@ -101,6 +105,10 @@ impl TickLayer {
                 },
             },
             outputs: [vec![(0, 0); slots * columns], vec![(0, 0); slots * columns]],
+            normaliser: (layer.spec.activation == Activation::Rms).then(|| {
+                let lanes = usize::try_from(timing.lanes).expect("few");
+                Normaliser::new(timing.beat, lanes, hardware.tile.columns)
+            }),
             backward: vec![],
             adc_shifts: layer.adc_shifts.clone(),
             rails: layer.rails.clone(),
@@ -344,6 +352,29 @@ impl TickLayer {
             head.value(slot, column % self.tile[1])
         };
         (0..self.columns).map(value).collect()
+    }
+
+    /// Accumulators that lanes have just seen.
+    fn sums(&self, target: Stream) -> Vec<i64> {
+        let sum = |column| {
+            let head = &self.tiles[self.at(self.heads(target), 0, column / self.tile[1])];
+            head.out(column % self.tile[1])
+        };
+        (0..self.columns).map(sum).collect()
+    }
+
+    /// Hands the accumulators that lanes have just seen to the stage behind, if there is one.
+    pub(super) fn normalise(&mut self) -> bool {
+        let sums = self.targets().into_iter().map(|target| (target, self.sums(target))).collect();
+        self.normaliser.as_mut().map(|stage| stage.take(sums)).is_some()
+    }
+
+    /// What the stage behind made of a stream of a sample.
+    pub(super) fn set_units(&mut self, target: Stream, slot: usize, normal: &Normal) {
+        for (column, &unit) in normal.units.iter().enumerate() {
+            let head = self.at(self.heads(target), 0, column / self.tile[1]);
+            self.tiles[head].set_unit(slot, column % self.tile[1], unit);
+        }
     }
 
     pub(super) fn keep_outputs(&mut self, sample: usize) {

@@ -13,6 +13,8 @@ use crate::num::fixed::{rsh, sat};
 #[derive(Debug)]
 pub(super) struct Unit {
     centre: Centre,
+    /// Bits rounded off an error that nothing is subtracted from.
+    shift: u32,
     means: Vec<i64>,
     error_bits: u32,
     level_bits: u32,
@@ -22,6 +24,7 @@ impl Unit {
     pub(super) fn new(hardware: &Hardware) -> Self {
         Self {
             centre: Centre::None,
+            shift: 9 - hardware.digital.error_bits.get(),
             means: vec![],
             error_bits: hardware.digital.error_bits.get(),
             level_bits: hardware.cell.level_bits.get(),
@@ -33,6 +36,7 @@ impl Network {
     /// Puts an error unit in its present state beside the output layer.
     pub fn set_error_unit(&mut self, unit: &ErrorUnit) {
         self.unit.centre = unit.centre();
+        self.unit.shift = unit.shift();
         self.unit.means = unit.means().to_vec();
     }
 
@@ -68,7 +72,7 @@ impl Network {
         for (at, &e) in errors.iter().enumerate() {
             let output = at % outputs;
             let exact = match self.unit.centre {
-                Centre::None => rsh(e, 9 - bits),
+                Centre::None => rsh(e, self.unit.shift),
                 Centre::Batch => {
                     let m = (samples as i64) << (9 - bits);
                     (2 * (samples as i64 * e - sums[output]) + m).div_euclid(2 * m)

@@ -37,6 +37,17 @@ pub enum TileAdc {
     },
 }
 
+/// What becomes of an accumulator in the lanes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum TileUnits {
+    /// It is looked up.
+    Table,
+    /// It is kept, with slope 1.
+    Kept,
+    /// It is kept for a stage outside that normalises the layer.
+    Normalised,
+}
+
 /// Configuration registers. What docs/TILE.md lists comes first.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct TileConfig {
@@ -103,6 +114,8 @@ pub struct More {
     pub slice_times: Vec<SliceTime>,
     /// Whether accumulators leave the tile for a tree outside.
     pub tree_outside: bool,
+    /// What the lanes do.
+    pub units: TileUnits,
     /// Words a column adds; empty: the modulo tap.
     pub taps: Vec<Vec<usize>>,
     /// Shift of the sum of more than one word.
@@ -143,6 +156,7 @@ impl Default for More {
             adc_shifts: vec![],
             slice_times: vec![],
             tree_outside: false,
+            units: TileUnits::Table,
             taps: vec![],
             tap_shift: 0,
             beat: 1,

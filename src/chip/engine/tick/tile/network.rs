@@ -65,6 +65,12 @@ impl Tile {
         self.value[slot * self.size.columns + column]
     }
 
+    /// What a stage outside made of a unit: activity and derivative.
+    pub(in super::super) fn set_unit(&mut self, slot: usize, column: usize, unit: (u8, u8)) {
+        let at = slot * self.size.columns + column;
+        (self.value[at], self.slope[at]) = unit;
+    }
+
     pub(in super::super) fn out(&self, column: usize) -> i64 {
         self.lines[Way::Rows as usize].out[column]
     }

@@ -3,7 +3,7 @@
 
 use std::ops::Range;
 
-use super::{Lane, Launch, Tile, TileAdc, Way};
+use super::{Lane, Launch, Tile, TileAdc, TileUnits, Way};
 use crate::chip::hardware::Subtract;
 use crate::chip::periphery::{self, Converter};
 use crate::num::fixed::AdcBits;
@@ -285,10 +285,15 @@ impl Tile {
     }
 
     fn look_up(&mut self, column: usize) {
+        let at = self.lane.slot * self.size.columns + column;
+        match self.config.more.units {
+            TileUnits::Table => {}
+            TileUnits::Kept => return (self.value[at], self.slope[at]) = (0, 255),
+            TileUnits::Normalised => return,
+        }
         let half = 1 << (self.config.lut_bits - 1);
         let out = self.lines[Way::Rows as usize].out[column];
         let (index, saturated) = periphery::index(out, self.config.lut_shift, half);
-        let at = self.lane.slot * self.size.columns + column;
         [self.value[at], self.slope[at]] = self.table[index];
         self.events.look_ups += 1;
         self.events.saturated_look_ups += u64::from(saturated);

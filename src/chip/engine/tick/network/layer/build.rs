@@ -3,11 +3,12 @@
 
 use std::ops::Range;
 
-use super::super::super::tile::{More, TileAdc, TileConfig};
+use super::super::super::tile::{More, TileAdc, TileConfig, TileUnits};
 use crate::chip::crossbar::kernel::MEAN_BITS;
 use crate::chip::hardware::{Adc, FloorKind, Hardware, Subtract, Timing, WriteScheme};
 use crate::chip::layer::{Layer, Optimiser};
 use crate::chip::population::Stream;
+use crate::num::tables::Activation;
 
 /// Configuration of one tile of a layer.
 pub(super) fn config(
@@ -63,6 +64,11 @@ pub(super) fn config(
             adc_shifts: shifts,
             slice_times: timing.slices.iter().flat_map(|own| own.iter()).collect(),
             tree_outside: true,
+            units: match layer.spec.activation {
+                Activation::Rms => TileUnits::Normalised,
+                Activation::Accumulator => TileUnits::Kept,
+                _ => TileUnits::Table,
+            },
             taps: own.collect(),
             tap_shift: taps.shift,
             beat: timing.beat,

@@ -60,7 +60,7 @@ impl TickLayer {
     fn set(&self, plane: usize, bank: usize) -> usize {
         match self.driven_by {
             DrivenBy::Shared => Stream::P.index(),
-            DrivenBy::Streams => self.source(plane, bank).index(),
+            DrivenBy::Streams | DrivenBy::Normalised => self.source(plane, bank).index(),
         }
     }
 

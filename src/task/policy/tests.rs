@@ -1,0 +1,320 @@
+//! Trainings of a few updates: what must not change them, and what they must not do.
+
+use std::sync::{Arc, Mutex};
+
+use bitvec::prelude::*;
+
+use super::*;
+use crate::chip::crossbar::kernel::Backend;
+use crate::chip::engine::Phase;
+use crate::chip::hardware::Hardware;
+use crate::chip::layer::{DrivenBy, InitialLevels, LayerSpec, Optimiser};
+use crate::chip::ledger::Event;
+use crate::chip::population::Wiring;
+use crate::chip::state::{Piece, Seen, State, Visitor};
+use crate::learn::error::Centre;
+use crate::learn::network::NetworkSpec;
+use crate::learn::route::Route;
+use crate::learn::rule::{Rule, UpdateMode};
+use crate::num::fixed::{Batch, RateMantissa};
+use crate::num::tables::{Activation, Decay, Positive};
+use crate::task::environment::{self, EnvSource, EnvSpec, Replaying};
+
+/// Everything that a state shows, as text; and, where it is told to, what a state is to be replaced by.
+#[derive(Default)]
+struct Book {
+    lines: Vec<String>,
+    numbers: Vec<Vec<i64>>,
+    halves: Vec<Vec<u16>>,
+    give: bool,
+}
+
+impl Visitor for Book {
+    fn halves(
+        &mut self,
+        piece: &Piece<'_>,
+        _: [usize; 2],
+        values: &dyn Fn() -> Vec<u16>,
+    ) -> Seen<Vec<u16>> {
+        if self.give {
+            return Ok(Some(self.halves.remove(0)));
+        }
+        self.lines.push(format!("{} {:?}", piece.name, values()));
+        self.halves.push(values());
+        Ok(None)
+    }
+
+    fn bits(
+        &mut self,
+        _: &Piece<'_>,
+        _: [usize; 2],
+        _: &dyn Fn() -> BitVec<u8, Lsb0>,
+    ) -> Seen<BitVec<u8, Lsb0>> {
+        unreachable!("these floors do not absorb")
+    }
+
+    fn numbers(&mut self, piece: &Piece<'_>, values: &[i64]) -> Seen<Vec<i64>> {
+        if self.give {
+            return Ok(Some(self.numbers.remove(0)));
+        }
+        self.lines.push(format!("{} {values:?}", piece.name));
+        self.numbers.push(values.to_vec());
+        Ok(None)
+    }
+
+    fn rows(
+        &mut self,
+        piece: &Piece<'_>,
+        _: usize,
+        values: &dyn Fn() -> Vec<i64>,
+    ) -> Seen<Vec<i64>> {
+        if self.give {
+            return Ok(Some(self.numbers.remove(0)));
+        }
+        self.lines.push(format!("{} {:?}", piece.name, values()));
+        self.numbers.push(values());
+        Ok(None)
+    }
+}
+
+fn book(trainer: &mut PolicyTrainer) -> Book {
+    let mut book = Book::default();
+    trainer.visit(&mut book).expect("nothing is replaced");
+    book
+}
+
+fn network(inputs: usize, outputs: usize, rule: Rule) -> NetworkSpec {
+    let wiring = if rule == Rule::Ed { Wiring::Dual } else { Wiring::Single };
+    let gain = |last| InitialLevels::AbsGaussian { gain: if last { [1, 10] } else { [1, 1] } };
+    let layer = |inputs, units, first: bool, last: bool| LayerSpec {
+        inputs,
+        units,
+        wiring,
+        driven_by: if first { DrivenBy::Shared } else { DrivenBy::Normalised },
+        activation: if last { Activation::Accumulator } else { Activation::Rms },
+        weight_max_log2: -1,
+        initial: gain(last),
+        constant_row: first,
+    };
+    NetworkSpec {
+        layers: vec![layer(inputs, 10, true, false), layer(10, outputs, false, true)],
+        rule,
+        mode: UpdateMode::Accumulate,
+        centre: Centre::None,
+        route: match rule {
+            Rule::Bp => None,
+            Rule::Dfa => Some(Route::RandomDense { shift: None }),
+            _ => Some(Route::Modulo { taps: 1, shift: None }),
+        },
+        batch: Batch::new(16).unwrap(),
+        mantissas: vec![RateMantissa::new(1).unwrap(); 2],
+        rates: vec![Positive::new(0.25).unwrap(); 2],
+        decay: Decay::Linear,
+        optimisers: vec![Optimiser::Sign { dead_zone: true }; 2],
+        centred: vec![outputs > 1, false],
+    }
+}
+
+fn experiment(id: &str, rule: Rule, method: Option<Method>) -> PolicyExperiment {
+    let spec = environment::make(id, 1, 1).unwrap().spec().clone();
+    let ppo = Ppo {
+        passes: 2,
+        discount: Share::from_num(0.98),
+        lambda: Share::from_num(0.9),
+        clip: Share::from_num(0.2),
+        entropy: Share::from_num(0.01),
+        log_sigma_start: 0,
+        log_sigma_rate: Share::from_num(0.01),
+    };
+    let hardware = Hardware::reference().with(|chip| chip.tile.transposed_read = true).unwrap();
+    let outputs = PolicyExperiment::outputs(&spec);
+    let mut experiment = PolicyExperiment {
+        seed: 3,
+        hardware,
+        environment: id.into(),
+        environments: 3,
+        input: InputCoding::Split,
+        actor: network(1, outputs, rule),
+        critic: network(1, 1, rule),
+        method: method.unwrap_or(Method::Ppo(ppo)),
+        steps: 3 * 20 * 2 * 3,
+        horizon: 20,
+        rollouts: 2,
+        evaluation: Evaluating { episodes: 2, episodes_final: 3, deterministic: true },
+    };
+    let rows = experiment.rows(&spec);
+    experiment.actor.layers[0].inputs = rows;
+    experiment.critic.layers[0].inputs = rows;
+    experiment
+}
+
+fn trainer(experiment: &PolicyExperiment) -> PolicyTrainer {
+    PolicyTrainer::new(experiment.clone(), Backend::best(), EnvSource::Native).unwrap()
+}
+
+fn train(trainer: &mut PolicyTrainer, epochs: u32) -> Vec<PolicyEpoch> {
+    let mut told = vec![];
+    for _ in 0..epochs {
+        told.push(trainer.learn(&mut |_| true).unwrap());
+        let _ = trainer.evaluate(2).unwrap();
+    }
+    told
+}
+
+const IDS: [&str; 2] = ["CartPole-v1", "Pendulum-v1"];
+
+#[test]
+fn back_ends_and_threads_give_one_state() {
+    for id in IDS {
+        let experiment = experiment(id, Rule::Ed, None);
+        let mut wanted = trainer(&experiment);
+        let told = train(&mut wanted, 2);
+        let wanted = book(&mut wanted).lines;
+        for backend in [Backend::Scalar, Backend::best()] {
+            for threads in [1, 2] {
+                let mut other =
+                    PolicyTrainer::new(experiment.clone(), backend, EnvSource::Native).unwrap();
+                for driver in other.networks_mut() {
+                    driver.engine_mut().set_threads(threads).unwrap();
+                }
+                assert_eq!(train(&mut other, 2), told);
+                assert_eq!(book(&mut other).lines, wanted);
+            }
+        }
+    }
+}
+
+#[test]
+fn what_is_continued_is_what_never_stopped() {
+    for id in IDS {
+        for method in [None, Some(EVOLUTION)] {
+            let experiment = experiment(id, Rule::Ed, method);
+            let mut first = trainer(&experiment);
+            let _ = train(&mut first, 1);
+            let mut kept = book(&mut first);
+            kept.give = true;
+            let mut second = trainer(&experiment);
+            second.visit(&mut kept).unwrap();
+            assert_eq!((kept.numbers.len(), kept.halves.len()), (0, 0));
+            assert_eq!(train(&mut second, 2), train(&mut first, 2));
+            assert_eq!(book(&mut second).lines, book(&mut first).lines);
+        }
+    }
+}
+
+#[test]
+fn a_record_gives_the_same_state_without_the_environment() {
+    for (id, method) in [(IDS[0], None), (IDS[1], None), (IDS[0], Some(EVOLUTION))] {
+        let experiment = experiment(id, Rule::Ed, method);
+        let source = EnvSource::Recorded(Arc::default());
+        let mut recorded = PolicyTrainer::new(experiment.clone(), Backend::best(), source).unwrap();
+        let mut records = vec![recorded.take_record().unwrap()];
+        let mut books = vec![book(&mut recorded).lines];
+        for _ in 0..3 {
+            let _ = train(&mut recorded, 1);
+            records.push(recorded.take_record().unwrap());
+            books.push(book(&mut recorded).lines);
+        }
+        assert!(recorded.learn(&mut |_| true).is_err(), "no epoch is left");
+
+        let replaying = Arc::new(Mutex::new(Replaying::default()));
+        let begin = |record: &environment::Record| {
+            replaying.lock().unwrap().begin(record.clone());
+        };
+        begin(&records[0]);
+        let source = EnvSource::Replayed(Arc::clone(&replaying));
+        let mut replayed = PolicyTrainer::new(experiment, Backend::best(), source).unwrap();
+        for (at, (record, wanted)) in records.iter().zip(&books).enumerate() {
+            if at > 0 {
+                begin(record);
+                let _ = train(&mut replayed, 1);
+            }
+            assert_eq!(book(&mut replayed).lines, *wanted, "{id}, epoch {at}");
+        }
+        // what no record has is an error and no made-up step
+        begin(&environment::Record::default());
+        let mut again = trainer_of(&replayed, &replaying);
+        assert!(again.is_err(), "{:?}", again.as_mut().map(|t| t.epoch()));
+    }
+}
+
+fn trainer_of(
+    like: &PolicyTrainer,
+    replaying: &Arc<Mutex<Replaying>>,
+) -> Result<PolicyTrainer, PolicyError> {
+    let source = EnvSource::Replayed(Arc::clone(replaying));
+    PolicyTrainer::new(like.experiment().clone(), Backend::best(), source)
+}
+
+const EVOLUTION: Method = Method::Evolution(Evolution { pairs: 2, step: 4, shift: 3 });
+
+#[test]
+fn evolution_moves_cells_by_loading_them_alone() {
+    let experiment = experiment(IDS[0], Rule::Ed, Some(EVOLUTION));
+    let mut evolved = trainer(&experiment);
+    let cells: u64 = experiment.actor.layers.iter().map(cells_of).sum();
+    let before = book(&mut evolved).halves;
+    let told = train(&mut evolved, 1);
+    let ledger = evolved.networks()[0].engine().ledger(Phase::Training);
+    // initial levels; then in each of two generations four candidates and what is kept
+    assert_eq!(ledger.total(Event::CellLoads), cells * (1 + 2 * (4 + 1)));
+    assert_eq!([Event::BusWords, Event::Accumulates].map(|event| ledger.total(event)), [0, 0]);
+    assert_eq!(told[0].returns.count, 2 * 4 * 3);
+    assert!(told[0].steps > 0 && book(&mut evolved).halves != before);
+}
+
+fn cells_of(layer: &LayerSpec) -> u64 {
+    let rows = layer.inputs + usize::from(layer.constant_row);
+    (rows * layer.units * layer.wiring.pathways().len()) as u64
+}
+
+#[test]
+fn every_rule_learns_something_on_the_same_crossbars() {
+    for rule in [Rule::Ed, Rule::Dfa, Rule::Bp] {
+        let mut other = trainer(&experiment(IDS[0], rule, None));
+        let before = book(&mut other).halves;
+        let _ = train(&mut other, 1);
+        assert_ne!(book(&mut other).halves, before, "{rule:?}");
+    }
+}
+
+#[test]
+fn an_epoch_that_is_stopped_says_so() {
+    let mut stopped = trainer(&experiment(IDS[0], Rule::Ed, None));
+    let mut asked = 0;
+    let end = stopped.learn(&mut |_| {
+        asked += 1;
+        asked < 3
+    });
+    assert_eq!((end, asked), (Err(PolicyError::Stopped), 3));
+    assert_eq!(stopped.networks()[0].updates(), 3);
+}
+
+#[test]
+fn outcomes_that_do_not_fit_are_errors_and_move_nothing() {
+    use crate::task::environment::{Observations, Outcomes, Real};
+    let spec = environment::make(IDS[0], 1, 1).unwrap().spec().clone();
+    let good = Outcomes {
+        reached: Observations { values: vec![Real::ZERO; 8], ..Observations::default() },
+        next: Observations { values: vec![Real::ZERO; 8], ..Observations::default() },
+        rewards: vec![Real::ONE; 2],
+        terminated: vec![false; 2],
+        truncated: vec![false; 2],
+    };
+    let check = |change: &dyn Fn(&mut Outcomes), spec: &EnvSpec| {
+        let mut outcomes = good.clone();
+        change(&mut outcomes);
+        outcomes.check(spec, 2).map_err(|error| error.to_string())
+    };
+    assert_eq!(check(&|_| {}, &spec), Ok(()));
+    let wrong: [(&dyn Fn(&mut Outcomes), &str); 4] = [
+        (&|o| o.rewards.push(Real::ONE), "a list of their outcomes has 3"),
+        (&|o| drop(o.next.values.pop()), "shows more or less than it has"),
+        (&|o| o.next.ends.push(0), "shows more or less than it has"),
+        (&|o| (o.terminated[1], o.truncated[1]) = (true, true), "is terminated and truncated"),
+    ];
+    for (change, found) in wrong {
+        let error = check(change, &spec).unwrap_err();
+        assert!(error.contains(found), "{error}");
+    }
+}
