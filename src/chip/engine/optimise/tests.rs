@@ -1,5 +1,6 @@
 //! Requests of whole batches: against a plain recomputation on every back end, and cycle by cycle.
 
+use bitvec::prelude::*;
 use proptest::prelude::*;
 
 use super::super::error::packed_at;
@@ -13,6 +14,7 @@ use crate::chip::hardware::{
 };
 use crate::chip::layer::{Delivery, DrivenBy, InitialLevels, Layer, LayerSpec, Taps};
 use crate::chip::population::{Polarity, Stream, Wiring};
+use crate::chip::state::{Piece, Seen, State, Visitor};
 use crate::num::draw::{Place, Site};
 use crate::num::fixed::{ErrorBits, LevelBits};
 use crate::num::tables::Activation;
@@ -428,7 +430,7 @@ fn side() -> impl Strategy<Value = usize> + Clone {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(48))]
+    #![proptest_config(ProptestConfig::with_cases(24))]
 
     #[test]
     fn a_write_in_two_passes_is_its_equations_on_every_back_end(case in case(side())) {
@@ -503,5 +505,101 @@ proptest! {
                 }
             }
         }
+    }
+}
+
+/// Everything that a state says, by name, and to be told again.
+#[derive(Default)]
+struct Copy {
+    numbers: std::collections::BTreeMap<String, Vec<i64>>,
+    given: bool,
+}
+
+impl Copy {
+    fn seen(&mut self, piece: &Piece<'_>, now: Vec<i64>) -> Option<Vec<i64>> {
+        if self.given {
+            return Some(self.numbers[piece.name].clone());
+        }
+        assert!(now.iter().all(|number| piece.within.contains(number)), "{}", piece.name);
+        assert!(self.numbers.insert(piece.name.to_owned(), now).is_none(), "{}", piece.name);
+        None
+    }
+}
+
+impl Visitor for Copy {
+    fn halves(
+        &mut self,
+        piece: &Piece<'_>,
+        _shape: [usize; 2],
+        values: &dyn Fn() -> Vec<u16>,
+    ) -> Seen<Vec<u16>> {
+        let seen = self.seen(piece, values().into_iter().map(i64::from).collect());
+        Ok(seen.map(|seen| seen.into_iter().map(|number| number as u16).collect()))
+    }
+
+    fn bits(
+        &mut self,
+        piece: &Piece<'_>,
+        _shape: [usize; 2],
+        values: &dyn Fn() -> BitVec<u8, Lsb0>,
+    ) -> Seen<BitVec<u8, Lsb0>> {
+        let seen = self.seen(piece, values().into_iter().map(i64::from).collect());
+        Ok(seen.map(|seen| seen.into_iter().map(|number| number != 0).collect()))
+    }
+
+    fn numbers(&mut self, piece: &Piece<'_>, values: &[i64]) -> Seen<Vec<i64>> {
+        Ok(self.seen(piece, values.to_vec()))
+    }
+
+    fn rows(
+        &mut self,
+        piece: &Piece<'_>,
+        _width: usize,
+        values: &dyn Fn() -> Vec<i64>,
+    ) -> Seen<Vec<i64>> {
+        Ok(self.seen(piece, values()))
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(24))]
+
+    #[test]
+    fn what_is_kept_goes_on_elsewhere(case in case(1usize..=40), threads in 1usize..=2) {
+        let learn = |engine: &mut Engine, at: usize| {
+            let (codes, words) = case.batch(at);
+            let operations = case.operations(&codes, &words, case.batches[at]);
+            operations.iter().for_each(|operation| engine.execute(operation));
+            (0..2).for_each(|layer| engine.execute(&case.write(layer)));
+        };
+        let mut engine = case.engine(Backend::best(), None);
+        learn(&mut engine, 0);
+        let mut copy = Copy::default();
+        engine.visit(&mut copy).unwrap();
+        copy.given = true;
+        // an engine that was made alike, and has nothing of its own left
+        let mut other = Case { seed: case.seed ^ 2, ..case.clone() }.engine(Backend::Scalar, None);
+        other.seed = case.seed;
+        other.set_threads(threads).unwrap();
+        other.visit(&mut copy).unwrap();
+        for at in 0..case.batches.len() {
+            learn(&mut engine, at);
+            learn(&mut other, at);
+        }
+        let (mut one, mut two) = (Copy::default(), Copy::default());
+        engine.visit(&mut one).unwrap();
+        other.visit(&mut two).unwrap();
+        prop_assert_eq!(&one.numbers, &two.numbers);
+        let kept = |name: &str| one.numbers.keys().filter(|key| key.ends_with(name)).count();
+        let means = |at: usize| {
+            let sets = engine.layers()[at].spec.drive_sets().len();
+            if case.windows[at].is_some() { sets } else { 0 }
+        };
+        let sets = kept(".row_means.p") + kept(".row_means.n");
+        prop_assert_eq!(sets, means(0) + means(1));
+        let words = |at: usize| case.optimisers[at].memory().0 * case.wirings[at].pathways().len();
+        prop_assert_eq!(kept(".moment") + kept(".square"), words(0) + words(1));
+        let rms = case.optimisers.iter().filter(|&&optimiser| optimiser == Optimiser::Rms).count();
+        prop_assert_eq!(kept(".rms"), rms);
     }
 }
