@@ -42,6 +42,7 @@ mod store;
 mod sweep;
 mod table;
 mod trace;
+mod watch;
 
 /// What stops a command.
 #[derive(Debug)]
@@ -71,6 +72,9 @@ Start here:
   dalean sweep examples/sweeps/adc_tiles.toml
                                             75 runs, one page with figures
   dalean verify runs/optdigits-ed-seed1     do a run again and compare every bit
+  dalean train examples/policies/cartpole.toml
+                                            a policy, by what comes of acting
+  dalean watch runs/cartpole-v1-ed-seed1    an episode of it
   dalean hw show isaac                      what a chip model says, with sources
 
 Exit codes: 0 done, 1 refused, 2 bad arguments, 3 stopped and resumable, 4 verify found a difference.";
@@ -117,6 +121,8 @@ enum Command {
     Keys(keys::KeysArgs),
     /// Write one update as waves: registers of a tile (VCD), operations of all tiles (Perfetto)
     Trace(trace::TraceArgs),
+    /// Show episodes of a policy, step by step
+    Watch(watch::WatchArgs),
     /// Measure how fast this machine is: kernels, and whole updates
     Bench(bench::BenchArgs),
     /// Print completions for a shell
@@ -272,6 +278,7 @@ pub fn main() -> ExitCode {
         Command::Data(command) => data::execute(&command),
         Command::Hw(command) => hw::execute(&command),
         Command::Trace(args) => trace::execute(&args),
+        Command::Watch(args) => watch::execute(&args),
         Command::Bench(args) => bench::execute(&args),
         Command::Completions { shell, json } => {
             let mut script = Vec::new();

@@ -7,7 +7,7 @@ use serde_json::json;
 
 use super::{Done, Shared, configuration, known, say};
 use crate::lab::config::{Config, Constants, absent_words};
-use crate::lab::price::{Bill, Convention, EnergySplit, Group, Images, areas, bounds, prefixed};
+use crate::lab::price::{Bill, Convention, EnergySplit, Group, Pieces, areas, bounds, prefixed};
 use crate::lab::run::{self, Act, ModeUse, Profile, Repriced};
 
 mod tables;
@@ -83,7 +83,7 @@ fn price_json(args: &PriceArgs, run: &Repriced) -> serde_json::Value {
         "made_on": run.made_on, "priced_as": run.priced_as,
         "changes": changes.collect::<Vec<_>>(), "cycles": run.ledger.elapsed(),
         "nodes": nodes_json(run.constants()), "not_simulated": run.absent});
-    merge(&mut object, run.bill().to_json(&run.images));
+    merge(&mut object, run.bill().to_json(&run.pieces));
     object
 }
 
@@ -108,7 +108,7 @@ fn show_price(run: &Repriced, quiet: bool) {
         say(&format!("energy   {}", bill.total().words()));
         return;
     }
-    show_energy(&bill, &run.images);
+    show_energy(&bill, &run.pieces);
     for (heading, groups) in [
         ("by phase", bill.by_phase()),
         ("by operation", bill.by_operation()),
@@ -126,7 +126,7 @@ fn merge(object: &mut serde_json::Value, more: serde_json::Value) {
     }
 }
 
-fn show_energy(bill: &Bill<'_>, images: &Images) {
+fn show_energy(bill: &Bill<'_>, pieces: &Pieces) {
     let total = bill.total();
     say(&format!("energy   {}", total.words()));
     show_split(&bill.split(None), total.joules[1]);
@@ -134,10 +134,10 @@ fn show_energy(bill: &Bill<'_>, images: &Images) {
         say(&format!("  {:.0} % is memory of the digital sums: {SUMS}", 100.0 * share));
     }
     // of a single one, the total is said above
-    for one in bill.per_image(images).into_iter().filter(|one| one.images > 1) {
+    for one in bill.per_piece(pieces).into_iter().filter(|one| one.count > 1) {
         let time = one.seconds.map_or_else(String::new, |s| format!(", {}", prefixed(s, "s")));
         let (doing, total) = (one.doing(), one.total.words());
-        say(&format!("to {doing}, the mean of {}: {total}{time}", one.images));
+        say(&format!("to {doing}, the mean of {}: {total}{time}", one.count));
         show_split(&one.split, one.total.joules[1]);
     }
     show_groups("by component", &bill.by_component(), total.joules[1]);
@@ -285,7 +285,7 @@ fn act_json(profile: &Profile, act: &Act) -> serde_json::Value {
         "convention": Convention::PAIRS.to_json(), "macs_read": macs[0], "macs_accumulated": macs[1],
         "operations_per_second": rate, "operations_per_joule": efficiency,
         "cycles": act.cycles(), "stages": stages});
-    merge(&mut object, bill.to_json(&act.images()));
+    merge(&mut object, bill.to_json(&act.pieces()));
     object
 }
 
@@ -316,7 +316,7 @@ fn show_act(profile: &Profile, act: &Act) {
             say(&format!("  layer {layer:<10} {}", used.collect::<Vec<_>>().join(", ")));
         }
     }
-    show_energy(&bill, &act.images());
+    show_energy(&bill, &act.pieces());
     let (rate, efficiency) = rates(act, &bill);
     let [read, added] = act.products.map(|products| Convention::PAIRS.macs(products));
     let mut line = format!("MACs     {read} of reads, {added} of accumulation");

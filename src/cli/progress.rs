@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use indicatif::{ProgressBar, ProgressStyle};
 
 use crate::lab::run::Progress;
-use crate::lab::store::record::EpochRecord;
+use crate::lab::store::record::{EpochRecord, PolicyOutcome, Score, SumRecord};
 
 /// Seconds between plain lines within an epoch.
 const LINE_SECONDS: u64 = 10;
@@ -29,7 +29,7 @@ impl Meter {
         let now = Instant::now();
         let bar = (!quiet && std::io::stderr().is_terminal()).then(|| {
             let bar = ProgressBar::new(0);
-            let template = "{prefix} {bar:30} {pos}/{len} samples  {msg}";
+            let template = "{prefix} {bar:30} {pos}/{len}  {msg}";
             bar.set_style(ProgressStyle::with_template(template).expect("a valid template"));
             bar
         });
@@ -38,7 +38,8 @@ impl Meter {
 
     /// Notes a batch.
     pub(super) fn batch(&mut self, progress: Progress) {
-        let Progress { epoch, epochs, done: samples, total: samples_total, answers } = progress;
+        let Progress { epoch, epochs, done: samples, total: samples_total, answers, returns } =
+            progress;
         self.epochs = epochs;
         let done = u64::from(epoch) * samples_total as u64 + samples as u64;
         if self.samples == 0 {
@@ -55,8 +56,11 @@ impl Meter {
         let left =
             Duration::from_secs_f64(((total - done.min(total)) as f64 / rate.max(1.0)).min(1e9));
         let right = answers.map(|score| format!("train {:.2} %  ", 100.0 * score.fraction()));
-        let right = right.unwrap_or_default();
-        let message = format!("{right}{rate:.0} samples/s  {} to go", clock(left));
+        let mean = returns.and_then(SumRecord::mean);
+        let mean = mean.map(|mean| format!("return {mean:.1}  ")).unwrap_or_default();
+        let right = right.unwrap_or(mean);
+        let what = if returns.is_some() { "steps" } else { "samples" };
+        let message = format!("{right}{rate:.0} {what}/s  {} to go", clock(left));
         if let Some(bar) = &self.bar {
             bar.set_length(samples_total as u64);
             bar.set_prefix(format!("epoch {:>3}/{}", epoch + 1, self.epochs));
@@ -65,7 +69,7 @@ impl Meter {
         } else if self.last_line.elapsed() >= Duration::from_secs(LINE_SECONDS) {
             self.last_line = Instant::now();
             tell!(
-                "epoch {}/{}: {samples}/{samples_total} samples, {message}",
+                "epoch {}/{}: {samples}/{samples_total} {what}, {message}",
                 epoch + 1,
                 self.epochs
             );
@@ -78,19 +82,18 @@ impl Meter {
             return;
         }
         self.last_line = Instant::now();
-        let percent = |score: Option<crate::lab::store::record::Score>| {
-            score.map_or_else(|| "-".into(), |s| format!("{:.2} %", 100.0 * s.fraction()))
+        let what = match record.policy() {
+            Some(policy) => of_policy(policy),
+            None => of_scores(record),
         };
         let (floor, cells) = record
             .pathways
             .iter()
             .fold((0, 0), |(floor, cells), p| (floor + p.floor, cells + p.cells));
         let line = format!(
-            "epoch {:>3}/{}  train {:>8}  validation {:>8}  floor {:>5.1} %  {:>7.2} s  {}",
+            "epoch {:>3}/{}  {what}  floor {:>5.1} %  {:>7.2} s  {}",
             record.epoch,
             self.epochs,
-            percent(record.train()),
-            percent(record.validation()),
             100.0 * floor as f64 / cells.max(1) as f64,
             seconds,
             &record.state_hash[..12],
@@ -112,6 +115,31 @@ impl Meter {
             bar.finish_and_clear();
         }
     }
+}
+
+/// Right answers while learning and of the validation set.
+fn of_scores(record: &EpochRecord) -> String {
+    let percent = |score: Option<Score>| {
+        score.map_or_else(|| "-".into(), |s| format!("{:.2} %", 100.0 * s.fraction()))
+    };
+    format!("train {:>8}  validation {:>8}", percent(record.train()), percent(record.validation()))
+}
+
+/// Returns while learning and without, and what became of the update.
+fn of_policy(policy: &PolicyOutcome) -> String {
+    let number = |number: Option<f64>, digits: usize| {
+        number.map_or_else(|| "-".into(), |n| format!("{n:.digits$}"))
+    };
+    format!(
+        "steps {:>9}  return {:>9}  evaluated {:>9}  entropy {:>6}  kl {:>7}  clipped {:>5}  explained {:>6}",
+        policy.steps,
+        number(policy.episodic_return, 2),
+        number(policy.evaluation.mean(), 2),
+        number(policy.mean_entropy, 3),
+        number(policy.mean_approx_kl, 4),
+        number(policy.clipfrac, 3),
+        number(policy.explained_variance, 3),
+    )
 }
 
 /// Shows how far a sweep is.

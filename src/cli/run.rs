@@ -10,12 +10,12 @@ use serde_json::json;
 use super::progress::Meter;
 use super::{Done, Failure, Moved, Shared, configuration, environment, known, note, say, usage};
 use crate::lab::config::absent_words;
-use crate::lab::price::{EnergySplit, PerImage};
+use crate::lab::price::{EnergySplit, PerPiece};
 use crate::lab::run::{self, Machine, RunError, RunEvent, Trained, Verdict};
 use crate::lab::runs;
 use crate::lab::store::folder::FolderError;
 use crate::lab::store::index::{INDEX, Store};
-use crate::lab::store::record::{TestOutcome, TestRecord};
+use crate::lab::store::record::{EpisodesRecord, EpochRecord, PolicyTest, TestOutcome, TestRecord};
 use crate::lab::sweep::{self, Finding, Sampled};
 
 #[derive(Debug, Args)]
@@ -107,10 +107,10 @@ pub(super) fn stop_flag() -> Arc<AtomicBool> {
 /// Asks whether the user wants to stop. Signals are caught from the first question on: before, while files are read and
 /// networks built, there is nothing to keep, and a signal ends the program as it ends any other.
 #[derive(Debug, Default)]
-struct Stop(OnceLock<Arc<AtomicBool>>);
+pub(super) struct Stop(OnceLock<Arc<AtomicBool>>);
 
 impl Stop {
-    fn asked(&self) -> bool {
+    pub(super) fn asked(&self) -> bool {
         self.0.get_or_init(stop_flag).load(Ordering::SeqCst)
     }
 }
@@ -209,6 +209,9 @@ pub(super) fn train(args: &TrainArgs) -> Done {
 /// The result alone: the score of the test, or of the last validation, and where the run is.
 fn result(folder: &Path, outcome: &Trained) -> String {
     let test = outcome.receipt.classified().map(|test| ("test", test.score));
+    if let Some(test) = outcome.receipt.played() {
+        return format!("return {}  {}", played(&test.episodes), folder.display());
+    }
     let validation = || Some(("validation", outcome.records.last()?.validation()?));
     let score = test.or_else(validation).map_or_else(String::new, |(of, score)| {
         format!("{of} {:.2} % ({} of {})  ", 100.0 * score.fraction(), score.correct, score.total)
@@ -219,18 +222,14 @@ fn result(folder: &Path, outcome: &Trained) -> String {
 fn done(run: &str, outcome: &Trained) -> serde_json::Value {
     let (receipt, seconds) = (&outcome.receipt, outcome.timing.train_seconds());
     let last = outcome.records.last();
-    let images: u64 =
-        outcome.records.iter().filter_map(|r| r.train()).map(|score| score.total).sum();
     let cost = &outcome.cost;
-    let each: Vec<_> = cost.per_image.iter().map(PerImage::to_json).collect();
+    let each: Vec<_> = cost.per_piece.iter().map(PerPiece::to_json).collect();
     let split: Vec<_> = cost.split.iter().map(EnergySplit::to_json).collect();
-    json!({
+    let mut done = json!({
         "event": "done",
         "run": run,
-        "test_accuracy": receipt.classified().map(|test| test.score.fraction()),
         "notes": outcome.notes.iter().map(ToString::to_string).collect::<Vec<_>>(),
         "test_epoch": receipt.test.as_ref().map(TestOutcome::epoch),
-        "validation_accuracy": last.and_then(|r| r.validation()).map(|score| score.fraction()),
         "state_hash": last.map(|record| record.state_hash.clone()),
         "epochs": last.map(|record| record.epoch),
         "cycles": cost.cycles,
@@ -240,39 +239,95 @@ fn done(run: &str, outcome: &Trained) -> serde_json::Value {
         "parts_priced": cost.energy.map(|energy| energy.priced),
         "parts": cost.energy.map(|energy| energy.parts),
         "by_class": split,
-        "per_image": each,
+        PerPiece::list_key(&cost.per_piece): each,
         "not_simulated": outcome.absent,
         "joules_assumed_share": cost.energy.map(|_| cost.assumed_share),
         "train_seconds": seconds,
-        "images_per_second": images as f64 / seconds.max(1e-9),
-    })
+    });
+    merge(&mut done, tested(receipt.test.as_ref(), last));
+    let each = match last.and_then(EpochRecord::policy) {
+        Some(outcome) => ("steps_per_second", outcome.steps),
+        None => {
+            let learnt = outcome.records.iter().filter_map(EpochRecord::train);
+            ("images_per_second", learnt.map(|score| score.total).sum())
+        }
+    };
+    done[each.0] = json!(each.1 as f64 / seconds.max(1e-9));
+    done
+}
+
+/// Results under the names of their task.
+fn tested(test: Option<&TestOutcome>, last: Option<&EpochRecord>) -> serde_json::Value {
+    let policy = last.and_then(EpochRecord::policy);
+    match (test, policy) {
+        (Some(TestOutcome::Policy(test)), _) => json!({
+            "return_mean": test.episodes.mean(),
+            "return_range": test.episodes.return_range,
+            "length_mean": test.episodes.length_mean,
+            "episodes": test.episodes.episodes(),
+            "deterministic": test.episodes.deterministic,
+            "checkpoint": test.select,
+            "steps": test.steps,
+        }),
+        (_, Some(outcome)) => json!({"return_mean": null, "steps": outcome.steps}),
+        (test, None) => {
+            let test = test.and_then(TestOutcome::classify);
+            let mut object = json!({"test_accuracy": test.map(|test| test.score.fraction())});
+            match last {
+                // read again: nothing was learnt
+                None => object["images_per_second"] = serde_json::Value::Null,
+                Some(last) => {
+                    let validation = last.validation().map(|score| score.fraction());
+                    object["validation_accuracy"] = json!(validation);
+                }
+            }
+            object
+        }
+    }
+}
+
+fn merge(object: &mut serde_json::Value, more: serde_json::Value) {
+    if let (Some(object), serde_json::Value::Object(more)) = (object.as_object_mut(), more) {
+        object.extend(more);
+    }
+}
+
+/// `-180.21 (-331.00 to -1.20), 100 deterministic episodes`.
+fn played(episodes: &EpisodesRecord) -> String {
+    let range = episodes.return_range.map_or_else(
+        || "of nothing".to_owned(),
+        |[mean, least, most]| format!("{mean:.2} ({least:.2} to {most:.2})"),
+    );
+    format!("{range}, {} {} episodes", episodes.episodes(), episodes.played())
 }
 
 pub(super) fn eval(args: &EvalArgs) -> Done {
     let shared = &args.shared;
     let (test, state_hash) =
         run::evaluate(&args.run, &args.moved.root(shared.data_root()), shared.machine()?)?;
-    let TestOutcome::Classify(TestRecord { epoch, ref select, score, .. }) = test;
     let absent = run::absent(&args.run)?;
     if shared.json {
-        say(&json!({
+        let mut done = json!({
             "event": "done",
             "run": args.run.display().to_string(),
-            "test_accuracy": score.fraction(),
             "state_hash": state_hash,
-            "epochs": epoch,
+            "epochs": test.epoch(),
             "train_seconds": 0.0,
-            "images_per_second": null,
             "not_simulated": absent,
-        })
-        .to_string());
+        });
+        merge(&mut done, tested(Some(&test), None));
+        say(&done.to_string());
     } else {
-        say(&format!(
-            "test {:.2} % ({} of {}), state after epoch {epoch} ({select}), {state_hash}",
-            100.0 * score.fraction(),
-            score.correct,
-            score.total,
-        ));
+        let (result, why) = match &test {
+            TestOutcome::Classify(TestRecord { select, score, .. }) => {
+                let [right, all] = [score.correct, score.total];
+                (format!("test {:.2} % ({right} of {all})", 100.0 * score.fraction()), select)
+            }
+            TestOutcome::Policy(PolicyTest { select, episodes, .. }) => {
+                (format!("return {}", played(episodes)), select)
+            }
+        };
+        say(&format!("{result}, state after epoch {} ({why}), {state_hash}", test.epoch()));
         if !shared.quiet {
             say(&format!("beside this {}: see the page of the run", absent_words(&absent)));
         }

@@ -51,6 +51,14 @@ fn percent(score: Option<Score>) -> String {
     score.map_or_else(|| "-".into(), |score| format!("{:.2} %", 100.0 * score.fraction()))
 }
 
+/// What a run came to: of its test, and of its validation or evaluation.
+fn result(run: &ListedRun, which: usize) -> String {
+    match run.returns {
+        Some(returns) => returns[which].map_or_else(|| "-".into(), |mean| format!("{mean:.2}")),
+        None => percent([run.test, run.validation][which]),
+    }
+}
+
 pub(super) fn list(args: &RunsArgs) -> Done {
     let places = if args.places.is_empty() { vec![runs_folder(None)] } else { args.places.clone() };
     let mut found = Vec::new();
@@ -78,8 +86,8 @@ pub(super) fn list(args: &RunsArgs) -> Done {
         }
         lines.push(vec![
             run.folder.display().to_string(),
-            percent(run.test),
-            percent(run.validation),
+            result(run, 0),
+            result(run, 1),
             format!("{}/{}", run.epochs[0], run.epochs[1]),
             run.status.name().into(),
             if differs.is_empty() { "-".into() } else { differs.join(", ") },
@@ -106,10 +114,15 @@ fn run_json(run: &ListedRun) -> serde_json::Value {
         _ => None,
     };
     let fraction = |score: Option<Score>| score.map(Score::fraction);
-    json!({"event": "run", "run": run.folder.display().to_string(), "state": run.status.name(),
+    let mut all = json!({"event": "run", "run": run.folder.display().to_string(), "state": run.status.name(),
         "why": why, "data": data, "rule": rule, "hardware": chip, "seed": run.seed,
         "differs": differs, "epochs": run.epochs[0], "epochs_total": run.epochs[1],
-        "test_accuracy": fraction(run.test), "validation_accuracy": fraction(run.validation)})
+        "test_accuracy": fraction(run.test), "validation_accuracy": fraction(run.validation)});
+    if let Some([test, evaluated]) = run.returns {
+        all["return_mean"] = json!(test);
+        all["return_evaluated"] = json!(evaluated);
+    }
+    all
 }
 
 pub(super) fn compare(args: &CompareArgs) -> Done {

@@ -18,19 +18,23 @@ mod hardware;
 pub mod keys;
 mod law;
 mod layers;
+mod policy;
 mod quantity;
 pub mod sweep;
 mod template;
 mod wrong;
 
 pub use absent::{Absent, EFFECTS, Effect, absent_words};
+pub(crate) use check::Bias;
 pub use check::{Config, DataConfig, Select, TrainOn};
+pub use defaults::policy::{POLICY_DEFAULTS, PolicyDefaults};
 pub use defaults::{SET_DEFAULTS, SetDefaults};
 pub use differs::{Difference, flat};
 pub use file::{ExperimentFile, HardwareFile};
 pub use hardware::{Model, builtin_models, load_model, model_names};
 pub use law::{Law, Setting, SettingValue};
 pub use layers::{Overlay, Sources, anchor, load, overlay, setting, setting_table};
+pub(crate) use policy::PolicySettings;
 pub use quantity::{
     Constant, Constants, CostClass, CostTable, Kind, Per, QUANTITIES, Quantity, Standing,
 };

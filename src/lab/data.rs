@@ -6,6 +6,7 @@
 //! [`npy`], [`npz`] and [`csv`] are functions on bytes that allocate no more than they are given; [`numbers`] and [`labels`]
 //! say what numbers and labels become.
 
+mod acting;
 pub mod arrays;
 mod builtin;
 mod catalog;

@@ -13,6 +13,7 @@ mod chart;
 mod colour;
 pub mod compare;
 mod figures;
+mod film;
 mod image;
 mod number;
 mod page;
@@ -23,6 +24,8 @@ mod words;
 
 #[cfg(test)]
 mod sample;
+
+pub use film::{Film, Frame};
 
 use super::config::Absent;
 use super::price::Cost;
@@ -65,6 +68,15 @@ pub struct Picture {
     pub values: Vec<u8>,
 }
 
+/// An input of a policy.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct PolicyInput {
+    /// What it is called.
+    pub name: String,
+    /// Rows of the first layer that it drives.
+    pub rows: usize,
+}
+
 /// Everything a report shows, borrowed from the run.
 #[derive(Debug, Clone)]
 pub struct RunView<'a> {
@@ -90,6 +102,10 @@ pub struct RunView<'a> {
     pub heats: &'a [Heat],
     /// Wrong answers.
     pub pictures: &'a [Picture],
+    /// Inputs of a policy, in the order of the rows of the first layer.
+    pub inputs: &'a [PolicyInput],
+    /// An episode of a policy.
+    pub film: Option<&'a Film>,
     /// Names of the classes; numbers stand in for missing ones.
     pub class_names: &'a [String],
     /// What was counted on the chip; only a finished run has it.

@@ -5,6 +5,7 @@
 
 mod classify;
 mod notes;
+mod policy;
 mod profile;
 mod proof;
 mod report;
@@ -13,6 +14,7 @@ mod session;
 mod task;
 mod train;
 mod verify;
+mod watch;
 mod weigh;
 
 pub use notes::notes;
@@ -26,6 +28,7 @@ pub use train::{
     Keeping, RunEvent, Trained, address_of, carry_on, configuration, evaluate, resume, train,
 };
 pub use verify::{Verdict, verify};
+pub use watch::{Watched, watch};
 pub use weigh::Memory;
 pub(crate) use weigh::weigh;
 
@@ -35,6 +38,8 @@ use crate::lab::data::DataError;
 use crate::lab::store::checkpoint::CheckpointError;
 use crate::lab::store::folder::FolderError;
 use crate::learn::network::NetworkError;
+use crate::task::environment::EnvError;
+use crate::task::policy::PolicyError;
 
 /// What a run is carried out with; none of it changes a result.
 ///
@@ -121,6 +126,19 @@ pub enum RunError {
     /// The network does not fit together, or not on the chip.
     #[error(transparent)]
     Network(#[from] NetworkError),
+    /// An environment that cannot go on.
+    #[error(
+        "{0}; the epochs that are finished are kept, and the run goes on from there with --resume"
+    )]
+    Environment(EnvError),
+    /// What is asked for is not there in this task.
+    #[error(
+        "{path} is a run of examples with labels, which has no episodes; name the run of a policy"
+    )]
+    NoEpisodes {
+        /// Folder of the run.
+        path: String,
+    },
     /// The folder.
     #[error(transparent)]
     Folder(#[from] FolderError),
@@ -213,4 +231,15 @@ pub enum RunError {
         /// What to try.
         hint: &'static str,
     },
+}
+
+impl From<PolicyError> for RunError {
+    fn from(error: PolicyError) -> Self {
+        match error {
+            PolicyError::Network(error) => error.into(),
+            PolicyError::Environment(error) => Self::Environment(error),
+            PolicyError::Unknown(error) => Self::Data(DataError::Keys(error.to_string())),
+            PolicyError::Stopped => unreachable!("who stops a training knows of it"),
+        }
+    }
 }

@@ -10,7 +10,7 @@
 //! episode.
 //!
 //! Which environments there are stands in [`ENVIRONMENTS`]; each is one small file with its law at its head, and becomes
-//! many of it side by side in [`one`]. See docs/MODEL.md, 5.
+//! many of it side by side in [`one`]. See docs/MODEL.md, 5.4.
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
 use std::fmt;

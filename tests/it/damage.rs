@@ -18,6 +18,7 @@ use safetensors::SafeTensors;
 use serde_json::Value;
 
 use super::golden_run::EVERYTHING;
+use super::policies::TINY;
 use super::program::{dalean, only_run, run as run_program};
 
 fn machine() -> Machine {
@@ -47,8 +48,12 @@ fn lay(folder: &Path, files: &Files) {
 
 /// A run, finished or stopped in its last epoch.
 fn made(finished: bool) -> Files {
+    made_of(EVERYTHING, finished)
+}
+
+fn made_of(experiment: &str, finished: bool) -> Files {
     let work = tempfile::tempdir().unwrap();
-    let config = load(&Sources { experiment: Some(("it", EVERYTHING)), ..Sources::default() });
+    let config = load(&Sources { experiment: Some(("it", experiment)), ..Sources::default() });
     let mut go_on = |event: RunEvent<'_>| !matches!(event, RunEvent::Batch(progress) if progress.epoch == 1 && !finished);
     let outcome = run::train(&config.unwrap(), &root(), work.path(), machine(), &mut go_on);
     match outcome {
@@ -296,6 +301,36 @@ fn every_field_of_a_finished_run_is_verified() {
     assert!(!is_found(work.path(), &with(&whole, "timing.json", "{}")), "seconds prove nothing");
     println!("{count} changes, all found");
     assert!(count > 3000, "{count}");
+}
+
+#[test]
+fn every_result_of_a_policy_is_verified() {
+    let work = tempfile::tempdir().unwrap();
+    let whole = made_of(TINY, true);
+    assert!(!is_found(work.path(), &whole) && is_read(work.path(), &whole), "an untouched run");
+    let text = |name: &str| String::from_utf8(whole[name].clone()).unwrap();
+    for (what, receipt) in changed(&text("receipt.json")) {
+        if what.starts_with("/test") || what.starts_with("/data") {
+            let files = with(&whole, "receipt.json", receipt);
+            assert!(is_found(work.path(), &files), "not found: receipt {what}");
+        }
+    }
+    let metrics = text("metrics.jsonl");
+    let last = metrics.lines().last().unwrap();
+    for (what, other) in changed(last).into_iter().filter(|(what, _)| what.starts_with("/outcome"))
+    {
+        let forged = forged(&whole, "metrics.jsonl", "/metrics", metrics.replace(last, &other));
+        assert!(is_found(work.path(), &forged), "not found: record {what}, forged");
+    }
+    let name = "checkpoint.safetensors";
+    let own = |what: &str| ["environment", "policy", "row_means"].iter().any(|w| what.contains(w));
+    let all = changed_checkpoints(&whole[name], false);
+    let own: Vec<_> = all.into_iter().filter(|(what, _)| own(what)).collect();
+    assert!(!own.is_empty(), "a policy has a state of its own");
+    for (what, bytes) in own {
+        let forged = forged(&whole, name, "/checkpoint", bytes);
+        assert!(is_found(work.path(), &forged), "not found: {what}, forged");
+    }
 }
 
 #[test]

@@ -31,10 +31,10 @@ fn session(config: &Config) -> Session {
 /// Test accuracy after so many epochs, in percent.
 fn accuracy(config: &Config) -> f64 {
     let mut session = session(config);
-    session.start();
-    while session.advance(&mut |_| true).is_some() {}
+    session.start().unwrap();
+    while session.advance(&mut |_| true).unwrap().is_some() {}
     assert_eq!(session.epoch(), config.epochs());
-    let test = session.test().unwrap();
+    let test = session.test().unwrap().unwrap();
     let Score { correct, total, .. } = test.classify().unwrap().score;
     100.0 * correct as f64 / total as f64
 }
@@ -214,8 +214,8 @@ fn layers_may_have_mantissas_of_their_own() {
     let of = |setting: &str| {
         let config = config(None, &[setting, "network.hidden=[8]", "learning.epochs=1"], 1);
         let mut session = session(&config);
-        session.start();
-        session.advance(&mut |_| true).unwrap();
+        session.start().unwrap();
+        session.advance(&mut |_| true).unwrap().unwrap();
         (session.run().to_owned(), session.state_hash(), config.to_toml())
     };
     let [all, list, unlike] =
@@ -236,8 +236,8 @@ fn layers_may_have_mantissas_of_their_own() {
 fn a_run_of_four_thousand_million_epochs_begins_at_once() {
     let config = config(None, &["data.set=xor", "learning.epochs=4000000000"], 1);
     let mut session = session(&config);
-    session.start();
-    assert!(session.advance(&mut |_| true).is_some());
+    session.start().unwrap();
+    assert!(session.advance(&mut |_| true).unwrap().is_some());
     assert_eq!(session.epoch(), 1);
 }
 
@@ -246,8 +246,9 @@ fn a_run_of_four_thousand_million_epochs_begins_at_once() {
 fn there_is_no_epoch_after_the_last_one() {
     let config = config(None, &["data.set=xor", "learning.epochs=2"], 1);
     let mut session = session(&config);
-    session.start();
-    let advanced: Vec<bool> = (0..4).map(|_| session.advance(&mut |_| true).is_some()).collect();
+    session.start().unwrap();
+    let advanced: Vec<bool> =
+        (0..4).map(|_| session.advance(&mut |_| true).unwrap().is_some()).collect();
     assert_eq!((advanced, session.epoch()), (vec![true, true, false, false], 2));
     let checkpoint = session.checkpoint();
     session.restore(&checkpoint).unwrap();

@@ -23,6 +23,7 @@ mod oracle;
 mod output;
 mod own_data;
 mod own_runs;
+mod policies;
 mod prices;
 mod program;
 mod report;

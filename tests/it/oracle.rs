@@ -293,6 +293,7 @@ fn tables_equal_the_oracle() {
             weight_max_log2: int(&want["weight_max_log2"]) as i32,
             level_bits: LevelBits::new(int(&want["level_bits"])).unwrap(),
             drive_bits: DriveBits::new(int(&want["drive_bits"])).unwrap(),
+            full_drive: dalean::num::tables::FullDrive::One,
         };
         let bits = LutBits::new(int(&want["lut_bits"])).unwrap();
         let lut = Lut::new(activation(&want["activation"], &want["alpha"]), bits, unit);

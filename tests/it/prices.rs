@@ -50,7 +50,8 @@ fn by_hand(profile: &Profile, act: &Act) -> [(&'static str, [f64; 3]); 4] {
             "cell_read" | "cell_load" | "cell_pulse" | "row_pulse" | "laser" | "heater" => 0,
             "dac_slice" | "hold" | "conversion" | "verify_read" | "receiver" => 1,
             "shift_add" | "look_up" | "multiply" | "bus_word" | "accumulate" | "delta"
-            | "sram_bit" => 2,
+            | "sram_bit" | "square" | "root" | "scaling" | "row_mean" | "sum_square"
+            | "optimiser_step" => 2,
             "static" | "tile_static" => 3,
             other => panic!("no class of {other}"),
         };
@@ -90,7 +91,7 @@ fn every_split_is_its_total_and_an_image_its_part_on_every_chip() {
                 let sum: f64 = split.iter().map(|split| split.total.joules[bound]).sum();
                 assert!(same(sum, total.joules[bound]), "{model}: {sum} {total:?}");
             }
-            let each = bill.per_image(&act.images());
+            let each = bill.per_piece(&act.pieces());
             assert_eq!(each.len(), 1);
             let samples = act.samples as f64;
             assert!(same(each[0].total.joules[1] * samples, total.joules[1]), "{model}");

@@ -63,7 +63,7 @@ pub(super) fn modes(profile: &Profile) {
     let mut lines = Vec::new();
     for mode in &profile.modes {
         let Ok(act) = &mode.act else { continue };
-        let each = profile.bill(act).per_image(&act.images());
+        let each = profile.bill(act).per_piece(&act.pieces());
         let notes = [mode.own.then_some("this experiment"), mode.also];
         lines.extend(each.into_iter().map(|one| Line {
             name: mode.mode,
@@ -104,12 +104,12 @@ pub(super) fn side_by_side(runs: &[Repriced]) {
     show(&lines.collect::<Vec<_>>());
     for phase in [Phase::Training, Phase::Evaluation] {
         let each = runs.iter().filter_map(|run| {
-            let each = run.bill().per_image(&run.images).into_iter();
+            let each = run.bill().per_piece(&run.pieces).into_iter();
             Some((run, each.into_iter().find(|one| one.phase == phase.name())?))
         });
         let each: Vec<_> = each.collect();
         for (_, one) in each.iter().take(1) {
-            say(&format!("to {}, the mean of {}:", one.doing(), one.images));
+            say(&format!("to {}, the mean of {}:", one.doing(), one.count));
         }
         let lines = each.into_iter().map(|(run, one)| Line {
             name: &run.priced_as,

@@ -3,15 +3,18 @@
 
 use std::collections::BTreeMap;
 use std::fmt::Display;
+use std::iter;
 
 use super::changed::{self, UnderModel};
 use super::defaults::SetDefaults;
 use super::file::{ChipFile, DataFile, ExperimentFile, LearningFile, NetworkFile, PerLayer};
 use super::hardware::check_marks;
 use super::law::{kind_of, settings};
+use super::policy::PolicySettings;
 use super::quantity::{Constants, constants_of};
 use super::{ConfigError, Sources, chip, data};
 use crate::chip::hardware::{ConverterKind, Hardware};
+use crate::chip::layer::Optimiser;
 use crate::lab::near;
 use crate::learn::error::Centre;
 use crate::learn::route::Route;
@@ -21,6 +24,7 @@ use crate::num::tables::{Activation, Decay, FullDrive, Positive, Rate, RateOf, U
 
 mod learning;
 mod network;
+mod policy;
 mod route;
 
 use learning::Learning;
@@ -42,6 +46,17 @@ pub enum TrainOn {
     Train,
     /// Training and validation examples, once everything is chosen.
     All,
+}
+
+/// Which arrays have a constant row.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Bias {
+    /// None.
+    None,
+    /// That which reads data.
+    InputRow,
+    /// All.
+    Rows,
 }
 
 /// `[data]`, as it was written.
@@ -73,8 +88,8 @@ pub struct Config {
     pub(crate) activations: Vec<Activation>,
     /// `log2(weight_max)` of each layer.
     pub(crate) weight_max_log2: Vec<i32>,
-    /// Whether a constant row is driven.
-    pub(crate) bias_rows: bool,
+    /// Which arrays have a constant row.
+    pub(crate) bias: Bias,
     /// Initial gains, 64ths, of hidden and of output layers.
     pub(crate) gain_64ths: [[u32; 2]; 2],
     /// The rule.
@@ -93,7 +108,9 @@ pub struct Config {
     pub(crate) rates: Vec<Positive>,
     /// How the rate falls.
     pub(crate) decay: Decay,
-    /// Passes over the training set.
+    /// What makes requests of sums.
+    pub(crate) optimiser: Optimiser,
+    /// Passes over the training set; epochs of a policy.
     pub(crate) epochs: u32,
     /// Random shift of training images.
     pub(crate) shift_pixels: u32,
@@ -101,6 +118,8 @@ pub struct Config {
     pub(crate) train_on: TrainOn,
     /// Which state reads the test set.
     pub(crate) select: Select,
+    /// What a policy has beside; nothing in classification.
+    pub(crate) policy: Option<PolicySettings>,
     /// The chip.
     pub(crate) hardware: Hardware,
     /// What its events, its parts and its idling cost.
@@ -170,9 +189,17 @@ pub(super) fn positive(key: &str, value: f64) -> Result<Positive, ConfigError> {
         .ok_or_else(|| wrong(key, format!("is {value}"), "it must lie above 0, in 1e-6..=1e6"))
 }
 
+/// What is learnt.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum TaskKind {
+    Classify,
+    Policy,
+}
+
 /// Checks a whole configuration.
 pub(super) fn config(mut file: ExperimentFile, model: &UnderModel) -> Result<Config, ConfigError> {
-    word("task", &mut file.task, "classify", &[("classify", ())])?;
+    let tasks = [("classify", TaskKind::Classify), ("policy", TaskKind::Policy)];
+    let task = word("task", &mut file.task, "classify", &tasks)?;
     let seed = *file.seed.get_or_insert(1);
     let ChipFile(hw) = file.hw.get_or_insert_with(ChipFile::default);
     let hardware = chip::resolve(hw, "hw.")?;
@@ -181,52 +208,23 @@ pub(super) fn config(mut file: ExperimentFile, model: &UnderModel) -> Result<Con
     let constants = constants_of(hw, &hardware, "hw.")?;
     let hardware_name = hw.name.get_or_insert_with(|| "unnamed".into()).clone();
     let not_simulated = hw.not_simulated.clone().unwrap_or_default();
-    let data = data::resolve(file.data.get_or_insert_with(DataFile::default))?;
-    let defaults = SetDefaults::of(&data);
-    let network = file.network.get_or_insert_with(NetworkFile::default);
-    let learning = file.learning.get_or_insert_with(LearningFile::default);
-    let hidden = network.hidden.get_or_insert_with(|| defaults.hidden.to_vec()).clone();
-    let Learning {
-        kind,
-        mode,
-        centre,
-        route,
-        batch,
-        rates,
-        decay,
-        epochs,
-        shift_pixels,
-        train_on,
-        select,
-    } = learning::resolve(learning, &hidden, defaults)?;
-    let Network { activations, weight_max_log2, bias_rows, gain_64ths } =
-        network::resolve(network, hidden.len() + 1, kind, defaults)?;
-    let asked = rates.iter().zip(activations.iter().zip(&weight_max_log2));
-    let asked = asked.map(|(&rate, (&activation, &weight_max_log2))| Rate {
-        rate,
-        of: RateOf::Sums,
-        batch,
-        mantissa: RateMantissa::new(1).expect("in range"),
-        error_bits: hardware.digital.error_bits,
-        activation,
-        unit: Unit {
-            weight_max_log2,
-            level_bits: hardware.cell.level_bits,
-            drive_bits: hardware.drive.bits,
-            full_drive: FullDrive::One,
-        },
-    });
-    let mantissas = learning::mantissas(learning, &asked.collect::<Vec<_>>())?;
+    let Learnt { data, hidden, outputs, network, learning, mantissas, policy } = match task {
+        TaskKind::Classify => classify(&mut file, &hardware)?,
+        TaskKind::Policy => policy::resolve(&mut file, &hardware)?,
+    };
+    let Network { activations, weight_max_log2, bias, gain_64ths } = network;
+    let Learning { kind, mode, centre, route, batch, rates, decay, optimiser, .. } = learning;
+    let Learning { epochs, shift_pixels, train_on, select, .. } = learning;
     #[cfg(feature = "grown")]
     file.learning.get_or_insert_default().grown.get_or_insert(0);
     Ok(Config {
         seed,
         data,
         hidden,
-        outputs: network.outputs,
+        outputs,
         activations,
         weight_max_log2,
-        bias_rows,
+        bias,
         gain_64ths,
         rule: kind.rule,
         mode,
@@ -236,10 +234,12 @@ pub(super) fn config(mut file: ExperimentFile, model: &UnderModel) -> Result<Con
         mantissas,
         rates,
         decay,
+        optimiser,
         epochs,
         shift_pixels,
         train_on,
         select,
+        policy,
         hardware,
         constants,
         not_simulated,
@@ -247,6 +247,67 @@ pub(super) fn config(mut file: ExperimentFile, model: &UnderModel) -> Result<Con
         model: None,
         resolved: file,
     })
+}
+
+/// What is learnt and how, whatever the chip.
+struct Learnt {
+    data: DataConfig,
+    hidden: Vec<usize>,
+    outputs: Option<usize>,
+    network: Network,
+    learning: Learning,
+    mantissas: Vec<RateMantissa>,
+    policy: Option<PolicySettings>,
+}
+
+/// Examples with labels.
+fn classify(file: &mut ExperimentFile, hardware: &Hardware) -> Result<Learnt, ConfigError> {
+    policy::refused_in_classification(file)?;
+    let data = data::resolve(file.data.get_or_insert_with(DataFile::default))?;
+    let defaults = SetDefaults::of(&data);
+    let network = file.network.get_or_insert_with(NetworkFile::default);
+    let learning = file.learning.get_or_insert_with(LearningFile::default);
+    let hidden = network.hidden.get_or_insert_with(|| defaults.hidden.to_vec()).clone();
+    let learnt = learning::resolve(learning, &hidden, defaults)?;
+    let made = network::resolve(network, hidden.len() + 1, learnt.kind, defaults)?;
+    let mantissas = mantissas(learning, &learnt, &made, hardware)?;
+    let outputs = network.outputs;
+    Ok(Learnt { data, hidden, outputs, network: made, learning: learnt, mantissas, policy: None })
+}
+
+/// What the greatest code behind a layer of this kind stands for, or of data.
+fn full_drive(below: Option<&Activation>) -> FullDrive {
+    match below {
+        Some(Activation::Rms) => FullDrive::Normalised,
+        _ => FullDrive::One,
+    }
+}
+
+/// The small factor of the rate of each layer.
+fn mantissas(
+    file: &mut LearningFile,
+    learning: &Learning,
+    network: &Network,
+    hardware: &Hardware,
+) -> Result<Vec<RateMantissa>, ConfigError> {
+    let layers = network.activations.iter().zip(&network.weight_max_log2);
+    let below = iter::once(None).chain(network.activations.iter().map(Some));
+    let asked = learning.rates.iter().zip(layers).zip(below.map(full_drive));
+    let asked = asked.map(|((&rate, (&activation, &weight_max_log2)), full_drive)| Rate {
+        rate,
+        of: if learning.optimiser.is_sign() { RateOf::Pulses } else { RateOf::Sums },
+        batch: learning.batch,
+        mantissa: RateMantissa::new(1).expect("in range"),
+        error_bits: hardware.digital.error_bits,
+        activation,
+        unit: Unit {
+            weight_max_log2,
+            level_bits: hardware.cell.level_bits,
+            drive_bits: hardware.drive.bits,
+            full_drive,
+        },
+    });
+    learning::mantissas(file, &asked.collect::<Vec<_>>())
 }
 
 impl Config {

@@ -311,11 +311,14 @@ impl Data {
 }
 
 impl Config {
-    /// Where the examples come from.
+    /// Where the examples come from, or what a policy acts on.
     ///
     /// # Errors
     /// When the set is unknown or a key is missing.
     pub fn source(&self) -> Result<Source, ConfigError> {
+        if let Some(policy) = &self.policy {
+            return Ok(Source::Environment(policy.environment.id.into()));
+        }
         let data = &self.data;
         if data.format.is_some() {
             return Ok(Source::Files(Box::new(own(data)?)));
@@ -341,9 +344,12 @@ impl Config {
         toml::to_string(&resolved).expect("every key has a TOML form")
     }
 
-    /// The data in one word, for folder names and titles.
+    /// The data, or what a policy acts on, in one word, for folder names and titles.
     #[must_use]
     pub fn data_name(&self) -> String {
+        if let Some(policy) = &self.policy {
+            return policy.environment.id.into();
+        }
         let own = || {
             let file = Path::new(self.data.train.as_deref()?).file_name()?.to_string_lossy();
             let stem = file.split('.').find(|part| !part.is_empty())?.to_owned();

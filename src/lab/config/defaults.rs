@@ -7,6 +7,8 @@
 use super::file::{DataFile, PerLayer};
 use crate::num::fixed::Batch;
 
+pub(super) mod policy;
+
 /// Defaults of network and learning for one data set.
 ///
 /// Those of the built-in digits were chosen on their validation examples (docs/results/defaults.md). 318 of them are too
@@ -38,8 +40,13 @@ pub struct SetDefaults {
 }
 
 /// Keys whose default follows from other keys of an experiment than data and rule.
-pub(super) const FOLLOWING: [&str; 3] =
-    ["learning.rate", "learning.rate_multipliers", "learning.centre"];
+pub(super) const FOLLOWING: [&str; 5] = [
+    "learning.rate",
+    "learning.rate_multipliers",
+    "learning.centre",
+    "environment.rollouts",
+    "network.critic_hidden",
+];
 
 /// One entry a data set that has defaults of its own, then the entry of all others.
 pub const SET_DEFAULTS: [SetDefaults; 2] = [

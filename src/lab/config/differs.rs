@@ -1,6 +1,6 @@
 //! What a configuration says that saying nothing would not, and the name that a run gets of it.
 //!
-//! A configuration is compared with the one of the same data, rule and chip that says nothing else. A name is
+//! A configuration is compared with the one of the same data or environment, rule and chip that says nothing else. A name is
 //!
 //! ```text
 //! DATA-RULE[-CHIP][-DIFFERENCES]-seedN        optdigits-ed-reram-level-bits4-hidden64-seed2
@@ -25,6 +25,9 @@ const WORD_MAX: usize = 20;
 /// Keys that say what numbers are of and not what a chip does.
 const PROSE: [&str; 8] =
     ["source", "kind", "summary", "not_simulated", "node_nm", "constants_for", "at", "modes"];
+
+/// Keys that stand in every name and heading, or say nothing.
+const SAID: [&str; 4] = ["seed", "hw.name", "task", "environment.id"];
 
 /// A key whose value is another than by saying nothing.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -72,12 +75,16 @@ fn own_default(key: &str) -> Option<&'static str> {
 }
 
 impl Config {
-    /// What a user gets by saying nothing but data, rule and chip.
+    /// What a user gets by saying nothing but data or environment, rule and chip.
     fn silent(&self) -> Option<ExperimentFile> {
         let resolved = toml::Table::try_from(&self.resolved).ok()?;
         let mut table = toml::Table::new();
-        if let Some(data) = resolved.get("data") {
-            table.insert("data".into(), data.clone());
+        for said in ["data", "task"] {
+            table.extend(resolved.get(said).map(|value| (said.to_owned(), value.clone())));
+        }
+        if let Some(policy) = &self.policy {
+            let id = toml::Value::String(policy.environment.id.into());
+            layers::overlay(&mut table, layers::setting("environment.id", id));
         }
         let rule = toml::Value::String(self.rule_name().to_owned());
         layers::overlay(&mut table, layers::setting("learning.rule", rule));
@@ -102,6 +109,8 @@ impl Config {
         let mut file = self.resolved.clone();
         let learning = file.learning.as_mut()?;
         (learning.rate, learning.rate_multipliers, learning.centre) = (None, None, None);
+        file.environment.iter_mut().for_each(|environment| environment.rollouts = None);
+        file.network.iter_mut().for_each(|network| network.critic_hidden = None);
         check::config(file, &UnderModel::default()).ok().map(|config| config.resolved)
     }
 
@@ -115,8 +124,7 @@ impl Config {
             silent.extend(lines_of(&file).into_iter().filter(|(key, _)| follows(key)));
         }
         let all = lines_of(&self.resolved).into_iter();
-        let others = all
-            .filter(|(key, _)| !["seed", "hw.name"].contains(&&**key) && !key.starts_with("data."));
+        let others = all.filter(|(key, _)| !SAID.contains(&&**key) && !key.starts_with("data."));
         let differ = others.filter_map(|(key, value)| {
             let default = silent.iter().find(|(name, _)| *name == key).map(|(_, text)| text);
             // a table that saying nothing does not have brings its own defaults
@@ -256,6 +264,11 @@ mod tests {
             (&["learning.rate=0.5"], "optdigits-ed-rate0.5-seed1"),
             (&["learning.decay=constant"], "optdigits-ed-decay-constant-seed1"),
             (&["hw.tile.transposed_read=false"], "optdigits-ed-no-transposed-read-seed1"),
+            (&["task=policy"], "cartpole-v1-ed-seed1"),
+            (&["task=policy", "environment.id=Acrobot-v1"], "acrobot-v1-ed-seed1"),
+            (&["task=policy", "environment.steps=100000"], "cartpole-v1-ed-steps100000-seed1"),
+            (&["task=policy", "network.hidden=[32]"], "cartpole-v1-ed-hidden32-seed1"),
+            (&["task=policy", "learning.rule=es"], "cartpole-v1-es-seed1"),
         ] {
             assert_eq!(config(settings).run_name(), name, "{settings:?}");
         }

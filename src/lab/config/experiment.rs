@@ -2,11 +2,12 @@
 
 use std::iter;
 
-use super::check::wrong;
+use super::check::{Bias, wrong};
 use super::{Config, ConfigError};
-use crate::chip::layer::{DrivenBy, InitialLevels, LayerSpec, Optimiser};
+use crate::chip::layer::{DrivenBy, InitialLevels, LayerSpec};
 use crate::learn::network::NetworkSpec;
 use crate::learn::rule::{Readout, Rule};
+use crate::num::tables::Activation;
 use crate::task::classify::{Augment, Experiment};
 
 impl Config {
@@ -20,6 +21,10 @@ impl Config {
         classes: usize,
         image: Option<[usize; 3]>,
     ) -> Result<Experiment, ConfigError> {
+        if self.policy.is_some() {
+            let allowed = "a policy learns from no examples; see `policy_experiment`";
+            return Err(wrong("task", "is \"policy\"", allowed));
+        }
         if classes == 1 {
             let allowed = "there is nothing to tell apart; give it at least 2";
             return Err(wrong("data.classes", "is 1", allowed));
@@ -44,7 +49,7 @@ impl Config {
         let experiment = Experiment {
             seed: self.seed,
             hardware: self.hardware.clone(),
-            network: self.network(features, outputs),
+            network: self.network_of(features, &self.hidden, outputs),
             epochs: self.epochs,
             augment,
         };
@@ -52,14 +57,23 @@ impl Config {
         Ok(experiment)
     }
 
-    /// The network between so many inputs and outputs.
-    fn network(&self, inputs: usize, outputs: usize) -> NetworkSpec {
+    /// The network between so many inputs and outputs, through hidden layers of so many units.
+    pub(super) fn network_of(
+        &self,
+        inputs: usize,
+        hidden: &[usize],
+        outputs: usize,
+    ) -> NetworkSpec {
         let mut sizes = vec![inputs];
-        sizes.extend(&self.hidden);
+        sizes.extend(hidden);
         sizes.push(outputs);
-        let driven = iter::once(DrivenBy::Shared).chain(iter::repeat(DrivenBy::Streams));
-        let layers = (0..self.hidden.len() + 1).zip(driven).map(|(layer, driven_by)| {
-            let last = layer == self.hidden.len();
+        let behind = |activation: &Activation| match activation {
+            Activation::Rms => DrivenBy::Normalised,
+            _ => DrivenBy::Streams,
+        };
+        let driven = iter::once(DrivenBy::Shared).chain(self.activations.iter().map(behind));
+        let layers = (0..hidden.len() + 1).zip(driven).map(|(layer, driven_by)| {
+            let last = layer == hidden.len();
             let activation = self.activations[layer];
             let wiring = self.rule.wiring(last.then(|| Readout::of(activation)));
             LayerSpec {
@@ -70,7 +84,11 @@ impl Config {
                 activation,
                 weight_max_log2: self.weight_max_log2[layer],
                 initial: InitialLevels::Uniform { gain_64ths: self.gain_64ths[usize::from(last)] },
-                constant_row: self.bias_rows,
+                constant_row: match self.bias {
+                    Bias::None => false,
+                    Bias::InputRow => layer == 0,
+                    Bias::Rows => true,
+                },
             }
         });
         NetworkSpec {
@@ -83,8 +101,8 @@ impl Config {
             mantissas: self.mantissas.clone(),
             rates: self.rates.clone(),
             decay: self.decay,
-            optimisers: vec![Optimiser::Plain; self.hidden.len() + 1],
-            centred: vec![false; self.hidden.len() + 1],
+            optimisers: vec![self.optimiser; hidden.len() + 1],
+            centred: vec![false; hidden.len() + 1],
         }
     }
 

@@ -69,6 +69,14 @@ keys! {
         network: NetworkFile,
         /// Rule, rate, batch, epochs.
         learning: LearningFile,
+        /// Policies: what is acted on, and for how long.
+        environment: EnvironmentFile,
+        /// Policies: proximal policy optimisation.
+        ppo: PpoFile,
+        /// Policies: evolution strategies.
+        es: EvolutionFile,
+        /// Policies: episodes that are read without learning.
+        evaluation: EvaluationFile,
         /// The chip: a model and what differs from it.
         hw: ChipFile,
     }
@@ -121,11 +129,15 @@ keys! {
     }
     /// `[network]`.
     NetworkFile {
-        /// Units of each hidden layer.
+        /// Units of each hidden layer; of policies, of the network that acts.
         hidden: Vec<usize>,
+        /// Policies: units of each hidden layer of the network that says what a state is worth.
+        critic_hidden: Vec<usize>,
         /// Output units.
         outputs: usize,
-        /// Function of hidden units; outputs are sigmoid.
+        /// Policies: how numbers become drives, which have no sign.
+        input: String,
+        /// Function of hidden units; outputs are sigmoid, those of policies sums.
         activation: String,
         /// Sigmoid width of each layer.
         alpha: PerLayer<f64>,
@@ -146,11 +158,17 @@ keys! {
         rule: String,
         /// Passes over the training set.
         epochs: u32,
-        /// Samples of an update.
+        /// Samples of an update; of policies, steps of a minibatch.
         batch: i64,
         /// When a batch is written.
         mode: String,
-        /// Rate, before multipliers.
+        /// What is asked of a cell, given its sum.
+        optimiser: String,
+        /// Optimiser `sign`: sums below the root mean square of their layer ask for nothing.
+        dead_zone: bool,
+        /// Policies: whether hidden layers of the network that acts learn from what differs from the mean of each row.
+        centred: bool,
+        /// Rate, before multipliers; of the optimiser `sign`, the probability of a pulse.
         rate: f64,
         /// Factor of the rate of each layer.
         rate_multipliers: PerLayer<f64>,
@@ -175,6 +193,54 @@ keys! {
         /// What a later program reads and no run uses.
         #[cfg(feature = "grown")]
         grown: i64,
+    }
+    /// `[environment]`: policies.
+    EnvironmentFile {
+        /// What it is called.
+        id: String,
+        /// How many run side by side.
+        count: i64,
+        /// Steps of all of them together, at least: whole epochs are done.
+        steps: i64,
+        /// Steps of one in a rollout; with evolution, of an episode at most.
+        horizon: i64,
+        /// Rollouts, or generations of evolution, of an epoch: as often is a record written and the policy evaluated.
+        rollouts: i64,
+    }
+    /// `[ppo]`: policies, every rule but `es`.
+    PpoFile {
+        /// Passes over a rollout.
+        passes: i64,
+        /// Discount of rewards.
+        gamma: f64,
+        /// Decay of advantage estimates: 0 looks one step ahead, 1 to the end.
+        lambda: f64,
+        /// How far a ratio may go before it is clipped.
+        clip: f64,
+        /// What entropy is worth.
+        entropy: f64,
+        /// Continuous actions: logarithm of their spread at the start.
+        log_sigma: f64,
+        /// Continuous actions: how far that logarithm moves in an update for a mean error of 1.
+        log_sigma_rate: f64,
+    }
+    /// `[es]`: policies by evolution.
+    EvolutionFile {
+        /// Pairs of candidates in a generation.
+        pairs: i64,
+        /// Levels by which the cells of a candidate differ, up and down.
+        step: i64,
+        /// A cell moves by a level with a probability of 2^-shift times the sum of ranks that ask for it.
+        shift: i64,
+    }
+    /// `[evaluation]`: policies.
+    EvaluationFile {
+        /// Episodes after every epoch.
+        episodes: i64,
+        /// Episodes of the final test.
+        final_episodes: i64,
+        /// Whether the likeliest action is taken, and not one that is drawn.
+        deterministic: bool,
     }
     /// A hardware model file, or `[hw]` of an experiment.
     HardwareFile {

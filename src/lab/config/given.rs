@@ -17,6 +17,7 @@ use crate::learn::route::Route;
 use crate::learn::rule::{Rule, UpdateMode};
 use crate::num::tables::{Activation, Decay};
 use crate::task::classify::Experiment;
+use crate::task::policy::{Evaluating, Evolution, InputCoding, Method, PolicyExperiment, Ppo};
 
 /// Frozen defaults: of keys of a layer under `layer`, whatever its number.
 const FROZEN: &[(&str, &str)] = &[
@@ -88,6 +89,9 @@ impl Config {
         classes: usize,
         image: Option<[usize; 3]>,
     ) -> Result<Vec<(String, String)>, ConfigError> {
+        if let Some(experiment) = self.policy_experiment()? {
+            return Ok(policy(&experiment));
+        }
         let experiment = self.experiment(features, classes, image)?;
         Ok(classify(&experiment, self.train_on, self.select))
     }
@@ -97,92 +101,10 @@ impl Config {
 fn classify(experiment: &Experiment, train_on: TrainOn, select: Select) -> Vec<Given> {
     // without `..`, here and below: what a run is given is listed or does not compile
     let Experiment { seed, hardware, network, epochs, augment } = experiment;
-    let NetworkSpec {
-        layers,
-        rule,
-        mode,
-        centre,
-        route,
-        batch,
-        mantissas,
-        rates,
-        decay,
-        optimisers,
-        centred,
-    } = network;
     let mut list = List::default();
     list.put("task", "classify");
     list.put("seed", seed);
-    for (number, (layer, rate)) in layers.iter().zip(rates).enumerate() {
-        list.layer(number, layer);
-        list.put(&format!("layer{number}.rate"), rate.get());
-    }
-    for (number, (optimiser, centred)) in optimisers.iter().zip(centred).enumerate() {
-        let optimiser = match optimiser {
-            Optimiser::Plain => "plain",
-            Optimiser::Sign { dead_zone: false } => "sign",
-            Optimiser::Sign { dead_zone: true } => "sign with a dead zone",
-        };
-        list.put(&format!("layer{number}.optimiser"), optimiser);
-        list.put(&format!("layer{number}.centred"), centred);
-    }
-    list.put(
-        "learning.rule",
-        match rule {
-            Rule::Ed => "ed",
-            Rule::Kaneko => "kaneko",
-            Rule::Dfa => "dfa",
-            Rule::EdNonDalean => "ed_non_dalean",
-            Rule::Bp => "bp",
-        },
-    );
-    list.put(
-        "learning.mode",
-        match mode {
-            UpdateMode::Accumulate => "accumulate",
-            UpdateMode::Replay => "replay",
-            UpdateMode::Online => "online",
-        },
-    );
-    list.put(
-        "learning.centre",
-        match centre {
-            Centre::None => "none",
-            Centre::Batch => "batch",
-            Centre::Running => "running",
-        },
-    );
-    let shifted = |shift: &Option<u32>| shift.map_or(String::new(), |shift| format!(" >> {shift}"));
-    list.put(
-        "learning.route",
-        match route {
-            None => "none".into(),
-            Some(Route::Modulo { taps, shift }) => format!("modulo {taps}{}", shifted(shift)),
-            Some(Route::RandomSparse) => "random_sparse".into(),
-            Some(Route::ScalarBroadcast) => "scalar_broadcast".into(),
-            Some(Route::RandomDense { shift }) => format!("random_dense{}", shifted(shift)),
-        },
-    );
-    list.put("learning.batch", batch.get());
-    // one of all layers has the name it had before there was one a layer
-    match mantissas.first() {
-        Some(first) if mantissas.iter().all(|one| one == first) => {
-            list.put("learning.mantissa", first.get());
-        }
-        _ => {
-            for (number, mantissa) in mantissas.iter().enumerate() {
-                list.put(&format!("layer{number}.mantissa"), mantissa.get());
-            }
-        }
-    }
-    list.put(
-        "learning.decay",
-        match decay {
-            Decay::Constant => "constant",
-            Decay::Cosine => "cosine",
-            Decay::Linear => "linear",
-        },
-    );
+    list.network("learning", 0, network);
     list.put("learning.epochs", epochs);
     list.put(
         "learning.shift_pixels",
@@ -208,6 +130,70 @@ fn classify(experiment: &Experiment, train_on: TrainOn, select: Select) -> Vec<G
     list.0
 }
 
+/// Everything a policy was given.
+fn policy(experiment: &PolicyExperiment) -> Vec<Given> {
+    let PolicyExperiment {
+        seed,
+        hardware,
+        environment,
+        environments,
+        input,
+        actor,
+        critic,
+        method,
+        steps,
+        horizon,
+        rollouts,
+        evaluation,
+    } = experiment;
+    let Evaluating { episodes, episodes_final, deterministic } = evaluation;
+    let mut list = List::default();
+    list.put("task", "policy");
+    list.put("seed", seed);
+    list.put("environment.id", environment);
+    list.put("environment.count", environments);
+    list.put("environment.steps", steps);
+    list.put("environment.horizon", horizon);
+    list.put("environment.rollouts", rollouts);
+    list.put(
+        "network.input",
+        match input {
+            InputCoding::Split => "split",
+            InputCoding::Offset => "offset",
+        },
+    );
+    list.network("actor", 0, actor);
+    match method {
+        Method::Ppo(ppo) => {
+            let Ppo { passes, discount, lambda, clip, entropy, log_sigma_start, log_sigma_rate } =
+                ppo;
+            list.network("critic", actor.layers.len(), critic);
+            list.put("ppo.passes", passes);
+            // as the core has them: units of 2^-31
+            for (name, share) in [
+                ("ppo.gamma", discount),
+                ("ppo.lambda", lambda),
+                ("ppo.clip", clip),
+                ("ppo.entropy", entropy),
+                ("ppo.log_sigma_rate", log_sigma_rate),
+            ] {
+                list.put(name, share.to_bits());
+            }
+            list.put("ppo.log_sigma", log_sigma_start);
+        }
+        Method::Evolution(Evolution { pairs, step, shift }) => {
+            list.put("es.pairs", pairs);
+            list.put("es.step", step);
+            list.put("es.shift", shift);
+        }
+    }
+    list.put("evaluation.episodes", episodes);
+    list.put("evaluation.final_episodes", episodes_final);
+    list.put("evaluation.deterministic", deterministic);
+    list.chip(hardware);
+    list.0
+}
+
 #[derive(Default)]
 struct List(Vec<Given>);
 
@@ -224,6 +210,85 @@ impl List {
         if frozen.is_none_or(|(_, default)| *default != word) {
             self.0.push((key.to_owned(), word));
         }
+    }
+
+    /// A network and how it learns, whose layers are numbered from `first`; what is no matter of one layer stands under
+    /// `head`.
+    fn network(&mut self, head: &str, first: usize, network: &NetworkSpec) {
+        let NetworkSpec {
+            layers,
+            rule,
+            mode,
+            centre,
+            route,
+            batch,
+            mantissas,
+            rates,
+            decay,
+            optimisers,
+            centred,
+        } = network;
+        for (number, (layer, rate)) in (first..).zip(layers.iter().zip(rates)) {
+            self.layer(number, layer);
+            self.put(&format!("layer{number}.rate"), rate.get());
+        }
+        for (number, (optimiser, centred)) in (first..).zip(optimisers.iter().zip(centred)) {
+            let optimiser = match optimiser {
+                Optimiser::Plain => "plain",
+                Optimiser::Sign { dead_zone: false } => "sign",
+                Optimiser::Sign { dead_zone: true } => "sign with a dead zone",
+            };
+            self.put(&format!("layer{number}.optimiser"), optimiser);
+            self.put(&format!("layer{number}.centred"), centred);
+        }
+        let rule = match rule {
+            Rule::Ed => "ed",
+            Rule::Kaneko => "kaneko",
+            Rule::Dfa => "dfa",
+            Rule::EdNonDalean => "ed_non_dalean",
+            Rule::Bp => "bp",
+        };
+        let mode = match mode {
+            UpdateMode::Accumulate => "accumulate",
+            UpdateMode::Replay => "replay",
+            UpdateMode::Online => "online",
+        };
+        let centre = match centre {
+            Centre::None => "none",
+            Centre::Batch => "batch",
+            Centre::Running => "running",
+        };
+        let shifted =
+            |shift: &Option<u32>| shift.map_or(String::new(), |shift| format!(" >> {shift}"));
+        let route = match route {
+            None => "none".into(),
+            Some(Route::Modulo { taps, shift }) => format!("modulo {taps}{}", shifted(shift)),
+            Some(Route::RandomSparse) => "random_sparse".into(),
+            Some(Route::ScalarBroadcast) => "scalar_broadcast".into(),
+            Some(Route::RandomDense { shift }) => format!("random_dense{}", shifted(shift)),
+        };
+        self.put(&format!("{head}.rule"), rule);
+        self.put(&format!("{head}.mode"), mode);
+        self.put(&format!("{head}.centre"), centre);
+        self.put(&format!("{head}.route"), route);
+        self.put(&format!("{head}.batch"), batch.get());
+        // one of all layers has the name it had before there was one a layer
+        match mantissas.first() {
+            Some(one) if mantissas.iter().all(|other| other == one) => {
+                self.put(&format!("{head}.mantissa"), one.get());
+            }
+            _ => {
+                for (number, mantissa) in (first..).zip(mantissas) {
+                    self.put(&format!("layer{number}.mantissa"), mantissa.get());
+                }
+            }
+        }
+        let decay = match decay {
+            Decay::Constant => "constant",
+            Decay::Cosine => "cosine",
+            Decay::Linear => "linear",
+        };
+        self.put(&format!("{head}.decay"), decay);
     }
 
     fn layer(&mut self, number: usize, layer: &LayerSpec) {

@@ -151,7 +151,7 @@ impl Quantity {
 
 /// Every quantity a model can give. An event without a line here costs nothing by itself: it says what came of
 /// another one (a saturation, a pulse that was effective).
-pub const QUANTITIES: [Quantity; 24] = [
+pub const QUANTITIES: [Quantity; 30] = [
     energy(
         "dac_slice",
         Event::DacSlices,
@@ -238,6 +238,22 @@ pub const QUANTITIES: [Quantity; 24] = [
         Event::SramBits,
         [1e-17, 1e-11],
         "7 fJ (2 Mb at 7 nm) to 160 fJ (8 KB at 45 nm) a bit",
+    ),
+    energy("square", Event::Squares, [1e-14, 1e-10], "a product of 32 bits and an addition of 64"),
+    energy("root", Event::Roots, [1e-14, 1e-9], "a root and a division, bit by bit"),
+    energy("scaling", Event::Scalings, [1e-14, 1e-10], "a product of 32 and 46 bits, and a shift"),
+    energy("row_mean", Event::RowMeans, [1e-16, 1e-11], "a product, a shift and an addition"),
+    energy(
+        "sum_square",
+        Event::SumSquares,
+        [1e-14, 1e-10],
+        "a product of 32 bits and an addition of more than 64",
+    ),
+    energy(
+        "optimiser_step",
+        Event::OptimiserSteps,
+        [1e-16, 1e-11],
+        "a comparison, a random word and a pulse or none; more with words of its own",
     ),
     power("static", Per::Chip, [1e-9, 1e3], "leakage, clocks and references of a chip"),
     power("tile_static", Per::Tile, [1e-12, 1e2], "leakage and bias of a tile")

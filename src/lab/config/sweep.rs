@@ -105,7 +105,7 @@ keys! {
     ReportFile {
         /// Abscissa; default: the first axis of numbers.
         x: String,
-        /// Ordinate; default: `test_accuracy`.
+        /// Ordinate; default: `test_accuracy`, of policies `return_mean`.
         y: String,
         /// One curve each.
         series: String,

@@ -303,6 +303,14 @@ pub enum DataError {
         /// What was given.
         path: PathBuf,
     },
+    /// A file for what a policy acts on.
+    #[error("`{id}` is an environment, which is made of no files, so {path} cannot stand for them; leave --data out", path = .path.display())]
+    NoFiles {
+        /// The environment.
+        id: String,
+        /// What was given.
+        path: PathBuf,
+    },
     /// Values and labels that make no examples.
     #[error("{path}: {source}", path = .path.display())]
     Examples {

@@ -16,7 +16,7 @@ use std::{
 };
 
 use super::{
-    builtin,
+    acting, builtin,
     catalog::{CIFAR_RECORD, CatalogEntry, CatalogFile},
     error::DataError,
     idx,
@@ -125,6 +125,10 @@ pub fn load(source: &Source, root: &DataRoot) -> Result<Data, DataError> {
         Source::Files(files) => match root.files() {
             None => own::load(files),
             Some(place) => own::load(&files.moved(place)?),
+        },
+        Source::Environment(id) => match root.files() {
+            None => acting::describe(id),
+            Some(place) => Err(DataError::NoFiles { id: id.clone(), path: place.into() }),
         },
     }
 }

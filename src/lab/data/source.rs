@@ -15,6 +15,8 @@ pub enum Source {
     Named(NamedSet),
     /// Files of the user's own.
     Files(Box<FileSet>),
+    /// No examples at all: what a policy acts on, by name.
+    Environment(String),
 }
 
 /// A set this program knows.

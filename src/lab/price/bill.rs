@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 
 use super::changes::Change;
-use super::image::{Images, PerImage};
+use super::piece::{PerPiece, PieceKind, Pieces};
 use super::plan::Footprint;
 use super::total::{EnergySplit, EnergyTotal, Range};
 use crate::chip::hardware::Hardware;
@@ -280,21 +280,22 @@ impl Bill<'_> {
         split.filter(|split| split.total.parts > 0).collect()
     }
 
-    /// What an image takes, phase by phase.
+    /// What an image, an update or a decision takes, phase by phase.
     #[must_use]
-    pub fn per_image(&self, images: &Images) -> Vec<PerImage> {
-        let of = |(phase, images): (&str, u64)| PerImage {
+    pub fn per_piece(&self, pieces: &Pieces) -> Vec<PerPiece> {
+        let of = |(phase, kind, count): (&str, PieceKind, u64)| PerPiece {
             phase: phase.into(),
-            images,
-            total: self.of_phase(phase).each(images),
+            kind,
+            count,
+            total: self.of_phase(phase).each(count),
             split: self
                 .split(Some(phase))
                 .into_iter()
-                .map(|split| EnergySplit { total: split.total.each(images), ..split })
+                .map(|split| EnergySplit { total: split.total.each(count), ..split })
                 .collect(),
-            seconds: self.seconds.as_ref().and_then(|all| Some(all.get(phase)? / images as f64)),
+            seconds: self.seconds.as_ref().and_then(|all| Some(all.get(phase)? / count as f64)),
         };
-        images.phases().map(of).collect()
+        pieces.phases().map(of).collect()
     }
 
     fn sum(&self, class: Option<CostClass>, phase: Option<&str>) -> EnergyTotal {
@@ -438,17 +439,17 @@ impl Bill<'_> {
 
     /// Everything as JSON: joules are `[low, typical, high]`. What is only part of a total is `joules_at_least`.
     #[must_use]
-    pub fn to_json(&self, images: &Images) -> serde_json::Value {
+    pub fn to_json(&self, pieces: &Pieces) -> serde_json::Value {
         let (assumed_share, assumed) = self.assumed();
         let split: Vec<_> = self.split(None).iter().map(EnergySplit::to_json).collect();
-        let each: Vec<_> = self.per_image(images).iter().map(PerImage::to_json).collect();
+        let each: Vec<_> = self.per_piece(pieces).iter().map(PerPiece::to_json).collect();
         let scaled =
             self.scaled.iter().map(|(key, law)| serde_json::json!({"key": key, "law": law}));
         let mut all = serde_json::json!({
             "seconds": self.seconds_total(),
             "seconds_by_phase": self.seconds,
             "by_class": split,
-            "per_image": each,
+            pieces.key(): each,
             "by_component": self.by_component(),
             "by_layer": self.by_layer(),
             "by_pathway": self.by_pathway(),

@@ -1,7 +1,7 @@
 //! What a report shows of a bill: a few totals.
 
 use super::bill::{Bill, Group, Missing, Share};
-use super::image::{Images, PerImage};
+use super::piece::{PerPiece, Pieces};
 use super::total::{EnergySplit, EnergyTotal};
 use crate::chip::engine::Phase;
 use crate::chip::ledger::Event;
@@ -19,8 +19,8 @@ pub struct Cost {
     pub energy: Option<EnergyTotal>,
     /// The same by class: device, converter, digital, static.
     pub split: Vec<EnergySplit>,
-    /// What an image takes, by phase.
-    pub per_image: Vec<PerImage>,
+    /// What an image takes, or an update and a decision, by phase.
+    pub per_piece: Vec<PerPiece>,
     /// Part of the typical total that goes into the memory of digital sums ([`Bill::sums_share`]).
     pub sums_share: Option<f64>,
     /// Constants that a law brought to this setting: key, law.
@@ -46,10 +46,10 @@ pub struct Cost {
 }
 
 impl Cost {
-    /// What an image of a phase takes.
+    /// What an image, an update or a decision of a phase takes.
     #[must_use]
-    pub fn of_image(&self, phase: Phase) -> Option<&PerImage> {
-        self.per_image.iter().find(|one| one.phase == phase.name())
+    pub fn of_piece(&self, phase: Phase) -> Option<&PerPiece> {
+        self.per_piece.iter().find(|one| one.phase == phase.name())
     }
 
     /// Totals of a bill.
@@ -58,7 +58,7 @@ impl Cost {
         bill: &Bill<'_>,
         ledger: &LedgerRecord,
         constants: &Constants,
-        images: &Images,
+        pieces: &Pieces,
     ) -> Self {
         let priced = constants.iter().any(|c| c.quantity.table != CostTable::Area);
         let each = Event::ALL.into_iter().filter_map(|event| {
@@ -70,7 +70,7 @@ impl Cost {
             seconds: bill.seconds_total(),
             energy: priced.then(|| bill.total()),
             split: bill.split(None),
-            per_image: if priced { bill.per_image(images) } else { vec![] },
+            per_piece: if priced { bill.per_piece(pieces) } else { vec![] },
             sums_share: bill.sums_share(),
             scaled: bill.scaled.clone(),
             components: bill.by_component(),

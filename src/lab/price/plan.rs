@@ -24,15 +24,15 @@ pub struct Footprint {
 }
 
 impl Footprint {
-    /// The plan of a network on an engine.
+    /// The plan of networks on a chip, layer by layer.
     #[must_use]
-    pub fn of_layers(layers: &[Layer]) -> Self {
+    pub fn of_layers<'a>(layers: impl Iterator<Item = &'a Layer>) -> Self {
         let layer = |layer: &Layer| LayerFootprint {
             rows: layer.layout.rows as u64,
             columns: layer.layout.columns as u64,
             targets: layer.spec.wiring.targets().len() as u64,
         };
-        Self { layers: layers.iter().map(layer).collect() }
+        Self { layers: layers.map(layer).collect() }
     }
 
     /// The plan of a run, from what it recorded of its pathways.

@@ -45,6 +45,8 @@ pub(super) struct Chart {
     y: Axis,
     /// Whether names along the abscissa are too long to lie flat.
     turned: bool,
+    /// What the pointer calls a place of the abscissa.
+    unit: &'static str,
     body: String,
 }
 
@@ -63,7 +65,8 @@ impl Chart {
     ) -> Self {
         let left = 30.0 + y.ticks.iter().map(|(_, text)| wide(text)).fold(LETTER, f64::max);
         let (bottom, body) = (42.0, String::new());
-        let mut chart = Self { width, height, left, right, top, bottom, x, y, turned: false, body };
+        let (turned, unit) = (false, "epoch");
+        let mut chart = Self { width, height, left, right, top, bottom, x, y, turned, unit, body };
         let near = |pair: &[(f64, String)]| {
             let room = (chart.x(pair[1].0) - chart.x(pair[0].0)).abs();
             0.5 * (wide(&pair[0].1) + wide(&pair[1].1)) > room
@@ -87,6 +90,12 @@ impl Chart {
 
     fn base(&self) -> f64 {
         self.height - self.bottom
+    }
+
+    /// Calls places of the abscissa something else than epochs.
+    pub(super) fn by(&mut self, unit: &'static str) -> &mut Self {
+        self.unit = unit;
+        self
     }
 
     /// Width and height of the frame inside the axes.

@@ -6,7 +6,7 @@ mod page;
 pub use page::html;
 
 use crate::lab::price::Cost;
-use crate::lab::store::record::{EpochRecord, Score};
+use crate::lab::store::record::{EpochRecord, TestOutcome};
 use crate::lab::table::ColumnUnit;
 
 /// One of the runs.
@@ -26,8 +26,8 @@ pub struct ComparedRun {
     pub records: Vec<EpochRecord>,
     /// Epochs that its configuration asks for.
     pub epochs: u32,
-    /// The final test, and after which epoch its state stood.
-    pub test: Option<(Score, u32)>,
+    /// The final test.
+    pub test: Option<TestOutcome>,
     /// What it cost on its chip, when finished.
     pub cost: Option<Cost>,
     /// The first epoch whose state is another than that of the first run; nothing when none is, or for the first itself.

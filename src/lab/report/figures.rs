@@ -6,12 +6,16 @@ mod balance;
 mod configuration;
 mod confusion;
 mod energy;
+mod episode;
 mod fields;
 mod floor;
 mod heat;
 mod histogram;
+mod inputs;
+mod losses;
 mod mistakes;
 mod pathways;
+mod returns;
 mod saturation;
 mod time;
 mod timelines;
@@ -47,14 +51,21 @@ type Of = Option<&'static str>;
 /// Figures of classification.
 const CLASSIFY: Of = Some("classify");
 
+/// Figures of policies.
+const POLICY: Of = Some("policy");
+
 /// All figures, in the order of the page, each with the task that it belongs to.
-pub(super) const ALL: [(Of, Draw); 14] = [
+pub(super) const ALL: [(Of, Draw); 18] = [
     (CLASSIFY, accuracy::draw),
     (CLASSIFY, confusion::draw),
     (CLASSIFY, mistakes::draw),
+    (POLICY, returns::draw),
+    (POLICY, losses::draw),
+    (POLICY, inputs::draw),
+    (POLICY, episode::draw),
     (None, timelines::draw),
     (None, histogram::draw),
-    (None, fields::draw),
+    (CLASSIFY, fields::draw),
     (None, heat::draw),
     (None, writes::draw),
     (None, saturation::draw),

@@ -3,11 +3,12 @@
 use super::figures::Figure;
 use super::number::{
     count, escape, hash_head, percent, percent_of, place, quotient, ratio, seconds, short,
+    significant,
 };
 use super::{RunView, figures, words};
 use crate::lab::config::absent_words;
 use crate::lab::price::{Cost, prefixed};
-use crate::lab::store::record::TestOutcome;
+use crate::lab::store::record::{EpochRecord, TestOutcome};
 
 const STYLE: &str = include_str!("page.css");
 /// In an element of its own, because drawings that are saved take it along.
@@ -136,7 +137,35 @@ fn shape(view: &RunView<'_>) -> Vec<usize> {
     shape
 }
 
+/// The mean return of the final test.
+fn headline_of_policy(view: &RunView<'_>) -> String {
+    let Some(test) = view.receipt.played() else {
+        let status = escape(&view.receipt.status);
+        return format!(
+            "<div class=\"big none\">–</div><div class=\"what\">mean return</div><p>The final test has not been \
+             played: the run is {status}.</p>"
+        );
+    };
+    let episodes = &test.episodes;
+    let [mean, least, most] = match episodes.return_range {
+        Some(range) => range.map(significant),
+        None => ["–"; 3].map(str::to_owned),
+    };
+    let how = if episodes.deterministic { "the likeliest action taken" } else { "actions drawn" };
+    format!(
+        "<div class=\"big\">{mean}</div><div class=\"what\">mean return</div><p>{} episodes from {least} to {most}, \
+         {how}. State after epoch {}, the {} one, and {} steps.</p>",
+        count(episodes.episodes()),
+        test.epoch,
+        escape(&test.select),
+        count(test.steps)
+    )
+}
+
 fn headline(view: &RunView<'_>) -> String {
+    if view.last().is_some_and(|last| last.policy().is_some()) {
+        return headline_of_policy(view);
+    }
     let Some(test) = view.receipt.classified() else {
         let status = escape(&view.receipt.status);
         return format!(
@@ -178,6 +207,7 @@ fn keys(view: &RunView<'_>) -> String {
     let validation =
         read.validation().and_then(|score| Some((quotient(score.correct, score.total)?, score)));
     let mut out = match validation {
+        _ if last.policy().is_some() => key_of_policy(last, &key),
         Some((fraction, score)) => key(
             "validation",
             &percent(fraction, 2),
@@ -213,6 +243,19 @@ fn keys(view: &RunView<'_>) -> String {
         );
     }
     out
+}
+
+/// Returns after the last epoch.
+fn key_of_policy(last: &EpochRecord, key: &dyn Fn(&str, &str, &str) -> String) -> String {
+    let Some(outcome) = last.policy() else { return String::new() };
+    let number = |value: Option<f64>| value.map_or_else(|| "–".into(), significant);
+    let evaluated = format!("{} episodes, epoch {}", outcome.evaluation.episodes(), last.epoch);
+    let learning = format!("{} episodes of the last epoch", count(outcome.returns.count));
+    [
+        key("evaluated", &number(outcome.evaluation.mean()), &evaluated),
+        key("while learning", &number(outcome.episodic_return), &learning),
+    ]
+    .concat()
 }
 
 /// Time and energy of the run on its chip.

@@ -72,6 +72,8 @@ impl Sample {
             level_max: 15,
             heats: &self.heats,
             pictures: &self.pictures,
+            inputs: &[],
+            film: None,
             class_names: &self.class_names,
             ledger: self.ledger.as_ref(),
             cost: self.cost.as_ref(),

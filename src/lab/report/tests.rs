@@ -3,7 +3,9 @@
 use super::sample::Sample;
 use super::{Picture, html, text};
 use crate::lab::config::{CostClass, Kind};
-use crate::lab::price::{Cost, EnergySplit, EnergyTotal, Group, Missing, PerImage, Share};
+use crate::lab::price::{
+    Cost, EnergySplit, EnergyTotal, Group, Missing, PerPiece, PieceKind, Share,
+};
 use crate::lab::store::ledger::{CyclesRecord, LayerCycles, LedgerRecord};
 use crate::lab::store::record::{ClassifyOutcome, Outcome, TestOutcome};
 
@@ -32,9 +34,10 @@ fn cost() -> Cost {
         cycles: Some(1_234_567),
         seconds: Some(0.001_234_567),
         energy: Some(total([1e-9, 2e-9, 8e-9], 2, 3)),
-        per_image: vec![PerImage {
+        per_piece: vec![PerPiece {
             phase: "training".into(),
-            images: 1000,
+            kind: PieceKind::Image,
+            count: 1000,
             total: total([1e-12, 2e-12, 8e-12], 2, 3),
             split: split.clone(),
             seconds: Some(1.2e-6),

@@ -5,8 +5,8 @@ use std::fmt::Write as _;
 use super::RunView;
 use super::number::{quotient, short_with};
 use crate::lab::config::absent_words;
-use crate::lab::price::{Cost, PerImage, prefixed};
-use crate::lab::store::record::{EpochRecord, Score};
+use crate::lab::price::{Cost, PerPiece, prefixed};
+use crate::lab::store::record::{EpisodesRecord, EpochRecord, PolicyOutcome, Score};
 use crate::learn::statistics::PathwayRecord;
 
 /// Heads of the columns and how wide the columns are.
@@ -178,7 +178,7 @@ fn chip(out: &mut String, cost: &Cost) {
             100.0 * share
         ));
     }
-    let images: Vec<_> = cost.per_image.iter().map(image).filter(|one| !one.is_empty()).collect();
+    let images: Vec<_> = cost.per_piece.iter().map(image).filter(|one| !one.is_empty()).collect();
     lines.push(images.join("; "));
     let missing: Vec<_> = cost.missing.iter().map(|missing| &*missing.what).collect();
     if cost.energy.is_some() && !missing.is_empty() {
@@ -191,7 +191,7 @@ fn chip(out: &mut String, cost: &Cost) {
 }
 
 /// `to learn from an image 1.20 uJ, 24.1 us`.
-fn image(one: &PerImage) -> String {
+fn image(one: &PerPiece) -> String {
     let mut parts = Vec::new();
     if one.total.priced > 0 {
         let least = if one.total.whole().is_none() { "at least " } else { "" };
@@ -202,6 +202,34 @@ fn image(one: &PerImage) -> String {
         String::new()
     } else {
         format!("to {} {}", one.doing(), parts.join(", "))
+    }
+}
+
+/// Returns of a policy: while learning, without, and of the final test.
+fn returns(out: &mut String, view: &RunView<'_>, last: &PolicyOutcome) {
+    let mut line = |name: &str, mean: Option<f64>, note: &str| {
+        if let Some(mean) = mean {
+            let _ = writeln!(out, "{name:<11} {mean:>9.2}  {note}");
+        }
+    };
+    let episodes = |all: &EpisodesRecord| {
+        let range = all
+            .return_range
+            .map_or_else(String::new, |[_, least, most]| format!(", {least:.2} to {most:.2}"));
+        format!("mean of {} {} episodes{range}", all.episodes(), all.played())
+    };
+    let note = format!("mean of {} episodes while learning in the last epoch", last.returns.count);
+    line("learning", last.episodic_return, &note);
+    line("evaluated", last.evaluation.mean(), &episodes(&last.evaluation));
+    if let Some(test) = view.receipt.played() {
+        let note = format!(
+            "{}; {} state, after epoch {} and {} steps",
+            episodes(&test.episodes),
+            test.select,
+            test.epoch,
+            test.steps
+        );
+        line("test", test.episodes.mean(), &note);
     }
 }
 
@@ -221,6 +249,10 @@ fn accuracies(out: &mut String, view: &RunView<'_>, last: &EpochRecord) {
             );
         }
     };
+    if let Some(outcome) = last.policy() {
+        returns(out, view, outcome);
+        return;
+    }
     score("train", last.train(), &format!("while learning in epoch {}", last.epoch));
     score("validation", last.validation(), &format!("after epoch {}", last.epoch));
     if let Some(test) = view.receipt.classified() {

@@ -85,13 +85,13 @@ impl Classify {
 }
 
 impl Task for Classify {
-    fn start(&mut self) -> Told {
-        self.told(None, 0.0)
+    fn start(&mut self) -> Result<Told, RunError> {
+        Ok(self.told(None, 0.0))
     }
 
-    fn advance(&mut self, go_on: GoOn<'_>) -> Option<Told> {
+    fn advance(&mut self, go_on: GoOn<'_>) -> Result<Option<Told>, RunError> {
         if self.trainer.epoch() >= self.trainer.experiment().epochs {
-            return None;
+            return Ok(None);
         }
         let started = Instant::now();
         let again = matches!(
@@ -110,20 +110,22 @@ impl Task for Classify {
                                                     correct,
                                                 }| {
             let answers = Some(Score { correct, total: samples as u64 });
-            go_on(Progress { epoch, epochs, done: samples, total: samples_total, answers })
+            let (done, total) = (samples, samples_total);
+            go_on(Progress { epoch, epochs, done, total, answers, returns: None })
         });
-        let (correct, total) = (learnt.ok()?, train.len() as u64);
+        let Ok(correct) = learnt else { return Ok(None) };
+        let total = train.len() as u64;
         let seconds = started.elapsed().as_secs_f64();
-        Some(self.told(Some(Score { correct, total }), seconds))
+        Ok(Some(self.told(Some(Score { correct, total }), seconds)))
     }
 
     fn state(&mut self) -> &mut dyn State {
         &mut self.trainer
     }
 
-    fn test(&mut self) -> Option<TestOutcome> {
+    fn test(&mut self) -> Result<Option<TestOutcome>, RunError> {
         if self.test.is_empty() {
-            return None;
+            return Ok(None);
         }
         let Self { trainer, test, .. } = self;
         let found = trainer.evaluate(test);
@@ -155,7 +157,7 @@ impl Task for Classify {
             let of_pair = |one: &&[u64; 3]| one[1..] == [truth as u64, guess as u64];
             record.confused.extend(wrong.iter().filter(of_pair).take(each));
         }
-        Some(TestOutcome::Classify(record))
+        Ok(Some(TestOutcome::Classify(record)))
     }
 
     fn epoch(&self) -> u32 {
@@ -183,7 +185,7 @@ impl Task for Classify {
         (samples, self.trainer.experiment().updates_per_epoch(samples))
     }
 
-    fn updates(&mut self, updates: u64) -> u64 {
+    fn updates(&mut self, updates: u64) -> Result<u64, RunError> {
         let Self { trainer, train, .. } = self;
         let mut done = 0;
         if updates > 0 {
@@ -192,12 +194,13 @@ impl Task for Classify {
                 done < updates
             });
         }
-        done
+        Ok(done)
     }
 
-    fn infer(&mut self) {
+    fn infer(&mut self) -> Result<(), RunError> {
         let (first, _) = self.train.clone().split_at(1);
         let _ = self.trainer.evaluate(&first);
+        Ok(())
     }
 
     fn examples(&self) -> Option<&Examples> {

@@ -4,10 +4,10 @@
 use super::{Machine, RunError, Session};
 use crate::chip::engine::Phase;
 use crate::chip::hardware::Hardware;
-use crate::chip::ledger::Event;
+use crate::chip::ledger::{Event, Ledger};
 use crate::lab::config::{Config, Constants, Sources, load};
 use crate::lab::data::{self, Data, DataRoot};
-use crate::lab::price::{Bill, Convention, Footprint, Images, StageUse, price, stages};
+use crate::lab::price::{Bill, Convention, Footprint, PieceKind, Pieces, StageUse, price, stages};
 use crate::lab::store::ledger::{CyclesRecord, LedgerRecord};
 
 /// One update or one inference.
@@ -17,6 +17,8 @@ pub struct Act {
     pub name: &'static str,
     /// Samples it takes in.
     pub samples: u64,
+    /// What it is priced as.
+    pub kind: PieceKind,
     /// Which ledger it was charged to.
     pub phase: Phase,
     /// What happened.
@@ -67,13 +69,17 @@ pub struct Profile {
 pub fn profile(config: &Config, root: &DataRoot, machine: Machine) -> Result<Profile, RunError> {
     let data = data::load(&config.source()?, root)?;
     let mut session = Session::new(config, data.clone(), machine)?;
-    let step = step(&mut session, config)?;
-    let plan = Footprint::of_layers(session.engines()[0].layers());
-    let before = session.engines()[0].ledger(Phase::Evaluation).clone();
-    session.infer();
-    let engine = session.engines()[0];
-    let inference = LedgerRecord::since(engine, Phase::Evaluation, &before);
-    let inference = act("inference", 1, Phase::Evaluation, inference, config);
+    let step = step(&mut session, config, &data)?;
+    let layers = session.engines().into_iter().flat_map(|engine| engine.layers().iter());
+    let plan = Footprint::of_layers(layers);
+    let before = ledgers(&session, Phase::Evaluation);
+    session.infer()?;
+    let inference = LedgerRecord::since(&session.engines(), Phase::Evaluation, &before);
+    let (name, kind) = match config.policy {
+        None => ("inference", PieceKind::Image),
+        Some(_) => ("decision", PieceKind::Decision),
+    };
+    let inference = act(name, 1, kind, inference, config);
     Ok(Profile {
         modes: modes(config, &data, machine, &step),
         acts: [step, inference],
@@ -87,22 +93,42 @@ pub fn profile(config: &Config, root: &DataRoot, machine: Machine) -> Result<Pro
 fn act(
     name: &'static str,
     samples: u64,
-    phase: Phase,
+    kind: PieceKind,
     ledger: LedgerRecord,
     config: &Config,
 ) -> Act {
+    let phase = match name {
+        "inference" | "decision" => Phase::Evaluation,
+        _ => Phase::Training,
+    };
     let slices = u64::from(config.hardware.slices());
     let products = [ledger.total(Event::CellReads) / slices, ledger.total(Event::Accumulates)];
-    Act { name, samples, phase, ledger, products }
+    Act { name, samples, kind, phase, ledger, products }
 }
 
-/// Learns the first batch.
-fn step(session: &mut Session, config: &Config) -> Result<Act, RunError> {
-    let before = session.engines()[0].ledger(Phase::Training).clone();
-    session.updates(1)?;
-    let ledger = LedgerRecord::since(session.engines()[0], Phase::Training, &before);
+/// Learns the first batch; of a policy, the second minibatch, before which there is no rollout.
+fn step(session: &mut Session, config: &Config, data: &Data) -> Result<Act, RunError> {
     let samples = (session.epoch_size().0 as u64).min(u64::from(config.batch.get()));
-    Ok(act("training step", samples, Phase::Training, ledger, config))
+    if config.policy.is_none() {
+        let before = ledgers(session, Phase::Training);
+        session.updates(1)?;
+        let ledger = LedgerRecord::since(&session.engines(), Phase::Training, &before);
+        return Ok(act("training step", samples, PieceKind::Image, ledger, config));
+    }
+    let before = {
+        let machine = Machine::new(session.engines()[0].backend(), 1)?;
+        let mut other = Session::new(config, data.clone(), machine)?;
+        other.updates(1)?;
+        ledgers(&other, Phase::Training)
+    };
+    session.updates(2)?;
+    let ledger = LedgerRecord::since(&session.engines(), Phase::Training, &before);
+    Ok(act("update", samples, PieceKind::Update, ledger, config))
+}
+
+/// What the networks of a session have counted in a phase.
+fn ledgers(session: &Session, phase: Phase) -> Vec<Ledger> {
+    session.engines().into_iter().map(|engine| engine.ledger(phase).clone()).collect()
 }
 
 /// The first update in every mode: the experiment is built again with that key alone changed, and centred by running
@@ -112,7 +138,7 @@ fn modes(config: &Config, data: &Data, machine: Machine, own: &Act) -> Vec<ModeU
     let other = |settings: &[String]| -> Result<Act, RunError> {
         let experiment = Some(("this experiment", &*text));
         let config = load(&Sources { experiment, settings, ..Sources::default() })?;
-        step(&mut Session::new(&config, data.clone(), machine)?, &config)
+        step(&mut Session::new(&config, data.clone(), machine)?, &config, data)
     };
     let of = |mode: &'static str| {
         if mode == config.mode_name() {
@@ -147,10 +173,11 @@ impl Act {
         self.ledger.cycles.as_ref()?.get(self.phase.name())
     }
 
-    /// Its samples, as images.
+    /// What it does, as it is priced: images, an update, a decision.
     #[must_use]
-    pub fn images(&self) -> Images {
-        Images::of_phase(self.phase, self.samples)
+    pub fn pieces(&self) -> Pieces {
+        let count = if self.kind == PieceKind::Update { 1 } else { self.samples };
+        Pieces::of_phase(self.phase, self.kind, count)
     }
 
     /// Operations of it, as a convention counts them.

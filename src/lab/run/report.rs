@@ -8,19 +8,22 @@
 
 use std::path::{Path, PathBuf};
 
-use super::RunError;
 use super::notes::notes;
 use super::session::chosen;
 use super::train::read_config;
-use crate::lab::config::Config;
+use super::{Machine, RunError};
+use crate::chip::crossbar::kernel::Backend;
+use crate::lab::config::{Bias, Config, PolicySettings};
 use crate::lab::data::{self, DataRoot, ImageShape};
-use crate::lab::price::{Cost, Footprint, Images, price};
-use crate::lab::report::{self, Heat, Picture, RunView};
+use crate::lab::price::{Cost, Footprint, Pieces, price};
+use crate::lab::report::{self, Film, Heat, Picture, PolicyInput, RunView};
 use crate::lab::store::checkpoint::{self, CheckpointError, Identity};
 use crate::lab::store::folder::{self, FolderError, RunFolder, names};
 use crate::lab::store::ledger::LedgerRecord;
 use crate::lab::store::record::{EpochRecord, Receipt, TimingRecord};
 use crate::task::classify::Examples;
+use crate::task::environment::Shown;
+use crate::task::policy::InputCoding;
 
 /// A report on disk.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -76,6 +79,16 @@ pub fn report(path: &Path, data_root: Option<&DataRoot>) -> Result<ReportMade, R
         }
         None => None,
     };
+    let film = match data_root.filter(|_| config.policy.is_some() && state.is_some()) {
+        None => None,
+        Some(root) => match watched(path, root) {
+            Ok(film) => Some(film),
+            Err(error) => {
+                notes.push(format!("no episode: {error}"));
+                None
+            }
+        },
+    };
     let parts = Parts {
         config: &config,
         text: &text,
@@ -85,6 +98,7 @@ pub fn report(path: &Path, data_root: Option<&DataRoot>) -> Result<ReportMade, R
         counted: ledger.as_ref().zip(cost.as_ref()),
         state: state.as_deref(),
         examples: loaded.as_ref().and_then(|loaded| Some((&loaded.split.test, loaded.image?))),
+        film: film.as_ref(),
     };
     let Page { html, summary, damage } = parts.draw();
     notes.extend(damage.map(|error| format!("no pictures of cells: {error}")));
@@ -92,11 +106,37 @@ pub fn report(path: &Path, data_root: Option<&DataRoot>) -> Result<ReportMade, R
     Ok(ReportMade { path: path.join(names::REPORT), summary, notes })
 }
 
+/// The first episode of the evaluation.
+fn watched(path: &Path, root: &DataRoot) -> Result<Film, RunError> {
+    let machine = Machine::new(Backend::best(), 1)?;
+    let mut steps = Vec::new();
+    let _ = super::watch(path, root, machine, 0, &mut |_, step| {
+        steps.push(step.clone());
+        true
+    })?;
+    Ok(Film::new(0, &steps))
+}
+
+/// What drives the rows of the first layer of a policy: of split numbers, what is above 0 and what is below.
+fn inputs(policy: &PolicySettings) -> Vec<PolicyInput> {
+    let of = |(name, count): &(&'static str, usize)| match (policy.environment.shown, policy.input)
+    {
+        (Shown::Dense(_), InputCoding::Split) => (0..*count)
+            .flat_map(|at| {
+                let name = if *count == 1 { (*name).to_owned() } else { format!("{name} {at}") };
+                ["+", "-"].map(|side| PolicyInput { name: format!("{name} {side}"), rows: 1 })
+            })
+            .collect(),
+        _ => vec![PolicyInput { name: (*name).to_owned(), rows: *count }],
+    };
+    policy.environment.inputs.iter().flat_map(of).collect()
+}
+
 /// What a run cost on its own chip.
 pub(super) fn cost(config: &Config, ledger: &LedgerRecord, records: &[EpochRecord]) -> Cost {
     let plan = Footprint::of_records(records.last().map_or(&[], |record| &record.pathways));
     let bill = price(ledger, &plan, &config.hardware, &config.constants, &[]);
-    Cost::of(&bill, ledger, &config.constants, &Images::of_records(records))
+    Cost::of(&bill, ledger, &config.constants, &Pieces::of_records(records))
 }
 
 /// The file of the state that reads the test set; `None` when it was not kept.
@@ -127,6 +167,8 @@ pub(super) struct Parts<'a> {
     pub state: Option<&'a [u8]>,
     /// The test set and how to draw it.
     pub examples: Option<(&'a Examples, ImageShape)>,
+    /// An episode of a policy.
+    pub film: Option<&'a Film>,
 }
 
 /// A report, drawn.
@@ -153,6 +195,7 @@ impl Parts<'_> {
         let warnings: Vec<_> =
             self.config.warnings().into_iter().chain(notes.iter().cloned()).collect();
         let absent = self.config.absent();
+        let inputs = self.config.policy.as_ref().map_or_else(Vec::new, inputs);
         let view = RunView {
             title: self.title(),
             config: self.text,
@@ -165,6 +208,8 @@ impl Parts<'_> {
             level_max: self.config.hardware.cell.level_bits.level_max(),
             heats: &heats,
             pictures: &pictures,
+            inputs: &inputs,
+            film: self.film,
             class_names: &self.receipt.data.names,
             ledger: self.counted.map(|(ledger, _)| ledger),
             cost: self.counted.map(|(_, cost)| cost),
@@ -177,16 +222,22 @@ impl Parts<'_> {
         let shapes = self.records.first().map(|record| &record.pathways).into_iter().flatten();
         let mut sizes: Vec<(usize, [usize; 2])> = shapes.map(|p| (p.layer, p.shape)).collect();
         sizes.dedup();
-        let bias = usize::from(self.config.bias_rows);
-        let first = sizes.first().map_or(0, |(_, [rows, _])| rows.saturating_sub(bias));
-        let units = sizes.iter().map(|(_, [_, columns])| columns);
-        let sizes: Vec<_> = std::iter::once(&first).chain(units).map(usize::to_string).collect();
+        let bias = usize::from(self.config.bias != Bias::None);
+        let of_network = |sizes: &[(usize, [usize; 2])]| {
+            let first = sizes.first().map_or(0, |(_, [rows, _])| rows.saturating_sub(bias));
+            let units = sizes.iter().map(|(_, [_, columns])| columns);
+            let sizes = std::iter::once(&first).chain(units).map(usize::to_string);
+            sizes.collect::<Vec<_>>().join("-")
+        };
+        // of a policy, the layers of the critic follow those of the actor
+        let networks = sizes.chunks(self.config.hidden.len() + 1).map(of_network);
+        let networks: Vec<String> = networks.collect();
         let differs = self.config.differences_text();
         format!(
             "{} by {}: {} on {}{}{differs}",
             self.config.data_name(),
             self.config.rule_name(),
-            sizes.join("-"),
+            networks.join(" and "),
             self.config.hardware_name,
             if differs.is_empty() { "" } else { "; " }
         )

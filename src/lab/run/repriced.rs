@@ -6,7 +6,7 @@ use super::train::read_config;
 use super::{RunError, records};
 use crate::chip::hardware::Hardware;
 use crate::lab::config::{Absent, Config, Constants, Model, load_model};
-use crate::lab::price::{Bill, Change, Cost, Footprint, Images, areas, changes, price};
+use crate::lab::price::{Bill, Change, Cost, Footprint, Pieces, areas, changes, price};
 use crate::lab::store::folder::{self, FolderError, names};
 use crate::lab::store::hash;
 use crate::lab::store::ledger::LedgerRecord;
@@ -26,8 +26,8 @@ pub struct Repriced {
     pub absent: Vec<Absent>,
     /// [`Prices::fingerprint`] of the chip whose constants are used.
     pub fingerprint: String,
-    /// Images that went through the chip.
-    pub images: Images,
+    /// What went through the chip.
+    pub pieces: Pieces,
     plan: Footprint,
     hardware: Hardware,
     constants: Constants,
@@ -120,7 +120,7 @@ pub fn reprice_as(path: &Path, other: Option<Prices>) -> Result<Repriced, RunErr
         ledger,
         absent,
         fingerprint,
-        images: Images::of_records(&records),
+        pieces: Pieces::of_records(&records),
         plan,
         hardware,
         constants,
@@ -150,6 +150,6 @@ impl Repriced {
     /// Its totals.
     #[must_use]
     pub fn cost(&self) -> Cost {
-        Cost::of(&self.bill(), &self.ledger, &self.constants, &self.images)
+        Cost::of(&self.bill(), &self.ledger, &self.constants, &self.pieces)
     }
 }

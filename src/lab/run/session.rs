@@ -16,6 +16,7 @@ use crate::lab::store::record::{
 use crate::lab::store::{address, hash};
 use crate::learn::driver::Driver;
 use crate::task::classify::Examples;
+use crate::task::policy::WatchedStep;
 
 /// A training in memory.
 ///
@@ -27,10 +28,10 @@ use crate::task::classify::Examples;
 /// let config = Config::load(&Sources { experiment: Some(("mine", text)), ..Sources::default() })?;
 /// let data = Data::load(&config, &DataRoot::new("data"))?;
 /// let mut session = Session::new(&config, data, Machine::new(Backend::best(), 1)?)?;
-/// session.start();
-/// session.advance(&mut |_progress| true);
+/// session.start()?;
+/// session.advance(&mut |_progress| true)?;
 /// let (checkpoint, hash) = (session.checkpoint(), session.state_hash());
-/// session.advance(&mut |_progress| true);
+/// session.advance(&mut |_progress| true)?;
 /// session.restore(&checkpoint)?;
 /// assert_eq!((session.epoch(), session.state_hash()), (1, hash));
 /// # Ok(())
@@ -73,15 +74,24 @@ impl Session {
     /// # Errors
     /// When the epoch has fewer.
     pub fn updates(&mut self, updates: u64) -> Result<(), RunError> {
-        match self.task.updates(updates) {
+        match self.task.updates(updates)? {
             done if done < updates => Err(RunError::NoUpdate { update: updates, updates: done }),
             _ => Ok(()),
         }
     }
 
     /// Reads one sample, as an inference does.
-    pub(crate) fn infer(&mut self) {
-        self.task.infer();
+    pub(crate) fn infer(&mut self) -> Result<(), RunError> {
+        self.task.infer()
+    }
+
+    /// Shows an episode of a policy step by step until `look` says false; false where there are none.
+    pub(crate) fn watch(
+        &mut self,
+        episode: u32,
+        look: &mut dyn FnMut(&WatchedStep) -> bool,
+    ) -> Result<bool, RunError> {
+        self.task.watch(episode, look)
     }
 
     /// Starts recording operations; what was executed before the last update is forgotten.
@@ -221,19 +231,28 @@ impl Session {
     }
 
     /// The record of the state before the first update.
-    pub fn start(&mut self) -> EpochRecord {
-        let told = self.task.start();
-        self.record(told).0
+    ///
+    /// # Errors
+    /// When the environment of a policy cannot go on.
+    pub fn start(&mut self) -> Result<EpochRecord, RunError> {
+        let told = self.task.start()?;
+        Ok(self.record(told).0)
     }
 
     /// One epoch, its record, and the seconds of learning. `None` when `go_on` said to stop, or when no epoch is left.
-    pub fn advance(&mut self, go_on: GoOn<'_>) -> Option<(EpochRecord, f64)> {
+    ///
+    /// # Errors
+    /// When the environment of a policy cannot go on; the state then lies inside an epoch.
+    pub fn advance(&mut self, go_on: GoOn<'_>) -> Result<Option<(EpochRecord, f64)>, RunError> {
         let told = self.task.advance(go_on)?;
-        Some(self.record(told))
+        Ok(told.map(|told| self.record(told)))
     }
 
-    /// Reads the test set with the present state.
-    pub fn test(&mut self) -> Option<TestOutcome> {
+    /// Reads the test set with the present state, or plays the episodes of the final test.
+    ///
+    /// # Errors
+    /// When the environment of a policy cannot go on.
+    pub fn test(&mut self) -> Result<Option<TestOutcome>, RunError> {
         self.task.test()
     }
 
@@ -290,25 +309,28 @@ impl Session {
     }
 }
 
-/// The rates of networks that have learnt nothing yet.
+/// The rates of networks that have learnt nothing yet, whose layers are numbered through.
 fn rates(
     config: &Config,
     data: &DataRecord,
-    networks: &[&Driver],
+    drivers: &[&Driver],
 ) -> Result<Vec<RateRecord>, RunError> {
-    let experiment = config.experiment(data.features, data.classes, data.image)?;
-    let network = &experiment.network;
-    let effective = network.rates_effective(&experiment.hardware)?;
-    let layers = network.rates.iter().zip(effective).zip(&network.mantissas).enumerate();
-    let shift = |layer| networks.first().map_or(0, |driver| driver.shift(layer));
-    let records = layers.map(|(layer, ((asked, effective), mantissa))| RateRecord {
-        layer,
-        asked: asked.get(),
-        effective: effective.get(),
-        shift: shift(layer),
-        mantissa: mantissa.get(),
-    });
-    Ok(records.collect())
+    let networks = config.networks(data.features, data.classes, data.image)?;
+    let mut records = Vec::new();
+    for (network, driver) in networks.iter().zip(drivers) {
+        let effective = network.rates_effective(&config.hardware)?;
+        let layers = network.rates.iter().zip(effective).zip(&network.mantissas).enumerate();
+        for (at, ((asked, effective), mantissa)) in layers {
+            records.push(RateRecord {
+                layer: records.len(),
+                asked: asked.get(),
+                effective: effective.get(),
+                shift: driver.shift(at),
+                mantissa: mantissa.get(),
+            });
+        }
+    }
+    Ok(records)
 }
 
 /// The epoch whose state reads the test set, given the records so far.

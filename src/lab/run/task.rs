@@ -7,15 +7,17 @@
 use std::fmt;
 
 use super::classify::Classify;
+use super::policy::Policy;
 use super::{Machine, RunError};
 use crate::chip::engine::Currents;
 use crate::chip::state::State;
 use crate::lab::config::Config;
 use crate::lab::data::Data;
-use crate::lab::store::record::{DataRecord, Note, Outcome, Score, TestOutcome};
+use crate::lab::store::record::{DataRecord, Note, Outcome, Score, SumRecord, TestOutcome};
 use crate::learn::driver::Driver;
 use crate::learn::statistics::PathwayRecord;
 use crate::task::classify::Examples;
+use crate::task::policy::WatchedStep;
 
 /// How far an epoch is.
 ///
@@ -27,12 +29,14 @@ pub struct Progress {
     pub epoch: u32,
     /// Epochs in all.
     pub epochs: u32,
-    /// Samples learnt from in this epoch.
+    /// Samples learnt from in this epoch; of policies, steps of all environments.
     pub done: usize,
-    /// Samples of an epoch.
+    /// The same of an epoch.
     pub total: usize,
     /// Answers given before learning from them, of tasks that give any.
     pub answers: Option<Score>,
+    /// Returns of episodes that ended in this epoch, of policies.
+    pub returns: Option<SumRecord>,
 }
 
 /// Asked after every update; false stops the run.
@@ -54,17 +58,17 @@ pub(super) struct Told {
 /// One thing that can be learnt.
 pub(super) trait Task: fmt::Debug {
     /// Looks at the state before the first update.
-    fn start(&mut self) -> Told;
+    fn start(&mut self) -> Result<Told, RunError>;
 
     /// Learns for an epoch and looks at what came of it. `None` when `go_on` said to stop, the state then lies inside an
     /// epoch, or when no epoch is left.
-    fn advance(&mut self, go_on: GoOn<'_>) -> Option<Told>;
+    fn advance(&mut self, go_on: GoOn<'_>) -> Result<Option<Told>, RunError>;
 
     /// Everything that decides what comes next.
     fn state(&mut self) -> &mut dyn State;
 
     /// The final test with the present state, if there is anything to test on.
-    fn test(&mut self) -> Option<TestOutcome>;
+    fn test(&mut self) -> Result<Option<TestOutcome>, RunError>;
 
     /// Epochs finished.
     fn epoch(&self) -> u32;
@@ -85,13 +89,25 @@ pub(super) trait Task: fmt::Debug {
     fn epoch_size(&self) -> (usize, u64);
 
     /// Learns so many updates of the first epoch and stops inside it; how many were done.
-    fn updates(&mut self, updates: u64) -> u64;
+    fn updates(&mut self, updates: u64) -> Result<u64, RunError>;
 
-    /// Reads one sample as an inference does.
-    fn infer(&mut self);
+    /// Reads one sample as an inference does, or makes one decision.
+    fn infer(&mut self) -> Result<(), RunError>;
 
     /// Test examples, where mistakes can be shown as pictures.
-    fn examples(&self) -> Option<&Examples>;
+    fn examples(&self) -> Option<&Examples> {
+        None
+    }
+
+    /// Shows an episode step by step until `look` says false; false where there are none.
+    fn watch(
+        &mut self,
+        episode: u32,
+        look: &mut dyn FnMut(&WatchedStep) -> bool,
+    ) -> Result<bool, RunError> {
+        let _ = (episode, look);
+        Ok(false)
+    }
 }
 
 /// Builds what a configuration asks to be learnt.
@@ -100,6 +116,9 @@ pub(super) fn build(
     data: Data,
     machine: Machine,
 ) -> Result<Box<dyn Task>, RunError> {
+    if let Some(experiment) = config.policy_experiment()? {
+        return Ok(Box::new(Policy::new(experiment, machine)?));
+    }
     let record = DataRecord::of(&data);
     Ok(Box::new(Classify::new(config, data.split, &record, machine)?))
 }

@@ -13,12 +13,14 @@ use super::{Machine, Progress, RunError, Session, proof};
 use crate::lab::config::{self, Absent, Config, Select, Sources};
 use crate::lab::data::{self, Data, DataRoot, ImageShape, Told};
 use crate::lab::price::Cost;
+use crate::lab::report::Film;
 use crate::lab::store::folder::{self, FolderError, MetricsLog, RunFolder, names};
 use crate::lab::store::ledger::LedgerRecord;
 use crate::lab::store::record::{
     BestRecord, DataRecord, EpochRecord, Note, RateRecord, Receipt, TestOutcome, TimingRecord,
 };
 use crate::lab::store::{address, hash};
+use crate::task::policy::WatchedStep;
 
 /// What happens while a run is carried out.
 ///
@@ -240,6 +242,23 @@ pub fn evaluate(
     data_root: &DataRoot,
     machine: Machine,
 ) -> Result<(TestOutcome, String), RunError> {
+    let (mut session, receipt) = read_again(path, data_root, machine)?;
+    let hint = "there is nothing to evaluate on";
+    let test = session.test()?.ok_or(RunError::Empty { part: "test", hint })?;
+    if receipt.test.as_ref().is_some_and(|kept| *kept != test) {
+        let found = "has another test result than its own state gives".into();
+        return Err(FolderError::Content { path: path.join(names::RECEIPT), found }.into());
+    }
+    let state = receipt.epoch_hashes[session.epoch() as usize].clone();
+    Ok((test, state))
+}
+
+/// A session with the chosen state of a run, and its receipt, which knows that state.
+pub(super) fn read_again(
+    path: &Path,
+    data_root: &DataRoot,
+    machine: Machine,
+) -> Result<(Session, Receipt), RunError> {
     let (config, text) = read_config(path)?;
     let mut session = Session::new(&config, data::load(&config.source()?, data_root)?, machine)?;
     let receipt = folder::read_receipt(path)?;
@@ -256,13 +275,7 @@ pub fn evaluate(
     let state = session.state_hash();
     let epoch = session.epoch();
     proof::checkpoint(path, name, &receipt, epoch, (&bytes, &state))?;
-    let hint = "there is nothing to evaluate on";
-    let test = session.test().ok_or(RunError::Empty { part: "test", hint })?;
-    if receipt.test.as_ref().is_some_and(|kept| *kept != test) {
-        let found = "has another test result than its own state gives".into();
-        return Err(FolderError::Content { path: path.join(names::RECEIPT), found }.into());
-    }
-    Ok((test, state))
+    Ok((session, receipt))
 }
 
 /// What is told of data beside their examples.
@@ -431,13 +444,14 @@ impl<'a> Run<'a> {
             epochs,
         });
         if self.records.is_empty() {
-            let record = self.session.start();
+            let record = self.session.start()?;
             let _ = self.seen.look(&record);
             self.keep(record, 0.0)?;
         }
         while self.session.epoch() < epochs {
             let epoch = self.session.epoch();
-            let learnt = self.session.advance(&mut |progress| on_event(RunEvent::Batch(progress)));
+            let learnt =
+                self.session.advance(&mut |progress| on_event(RunEvent::Batch(progress)))?;
             let Some((record, seconds)) = learnt else {
                 return Err(RunError::Stopped { epoch, path: path.display().to_string() });
             };
@@ -522,6 +536,17 @@ impl<'a> Run<'a> {
         }
     }
 
+    /// The first episode of the evaluation of a policy, with the present state.
+    fn film(&mut self) -> Result<Option<Film>, RunError> {
+        let mut steps = Vec::new();
+        let mut look = |step: &WatchedStep| {
+            steps.push(step.clone());
+            true
+        };
+        let watched = self.session.watch(0, &mut look)?;
+        Ok(watched.then(|| Film::new(0, &steps)))
+    }
+
     fn finish(mut self) -> Result<Trained, RunError> {
         let state = self.session.checkpoint();
         if self.keeping.states && self.pending {
@@ -557,8 +582,9 @@ impl<'a> Run<'a> {
             _ => {}
         }
         let read = self.session.checkpoint();
-        let test = self.session.test();
+        let test = self.session.test()?;
         let receipt = self.receipt("finished", Some(&ledger_text), [metrics, checkpoint], test);
+        let film = self.film()?;
         let page = super::report::Parts {
             config: self.config,
             text: &self.text,
@@ -568,6 +594,7 @@ impl<'a> Run<'a> {
             counted: Some((&ledger, &cost)),
             state: self.keeping.states.then_some(&read),
             examples: self.session.examples().zip(self.about.image),
+            film: film.as_ref(),
         };
         let page = page.draw();
         self.folder.write(names::REPORT, page.html.as_bytes())?;

@@ -132,11 +132,11 @@ fn compare(
     for (kept, line) in kept[..last].iter().zip(&lines) {
         let epoch = kept.epoch;
         let record = if epoch == 0 {
-            session.start()
+            session.start()?
         } else {
             let path = path.display().to_string();
             let stopped = || RunError::Stopped { epoch: epoch - 1, path };
-            session.advance(&mut on_batch).ok_or_else(stopped)?.0
+            session.advance(&mut on_batch)?.ok_or_else(stopped)?.0
         };
         let _ = session.note(&record);
         let state_differs = record.state_hash != kept.state_hash;
@@ -158,7 +158,7 @@ fn compare(
             files.best(&state, epoch)?;
             // reading the test set charges a ledger, which is part of the state
             let tested = whole && finished && receipt.test.is_some();
-            let test = tested.then(|| session.test()).flatten();
+            let test = if tested { session.test()? } else { None };
             if test.is_some() {
                 session
                     .restore(&state)
@@ -188,7 +188,10 @@ fn compare(
         }
         expected.ledger.clone_from(&receipt.ledger);
         expected.status.clone_from(&receipt.status);
-        expected.test = test.or_else(|| session.test());
+        expected.test = match test {
+            Some(test) => Some(test),
+            None => session.test()?,
+        };
     }
     expected.states = receipt.states;
     same(names::RECEIPT, &written, &expected)?;

@@ -34,7 +34,7 @@ pub fn compare(paths: &[PathBuf]) -> Result<Comparison, SweepError> {
             status: receipt.status.clone(),
             data: receipt.data.hash.clone(),
             epochs: config.epochs(),
-            test: receipt.classified().map(|test| (test.score, test.epoch)),
+            test: receipt.test.clone(),
             cost: if finished { Some(run::reprice_as(path, None)?.cost()) } else { None },
             differs_from,
             notes: run::notes(&receipt, &records).iter().map(ToString::to_string).collect(),

@@ -41,7 +41,7 @@ impl RunStatus {
 }
 
 /// A run in a list.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct ListedRun {
     /// Its folder.
     pub folder: PathBuf,
@@ -59,6 +59,8 @@ pub struct ListedRun {
     pub test: Option<Score>,
     /// Validation score of the epoch that was tested, or of the last one.
     pub validation: Option<Score>,
+    /// Of a policy: mean returns of the final test, and after that epoch.
+    pub returns: Option<[Option<f64>; 2]>,
     written: Option<SystemTime>,
 }
 
@@ -122,6 +124,7 @@ fn listed(path: PathBuf) -> ListedRun {
         epochs: [0; 2],
         test: None,
         validation: None,
+        returns: None,
         written: written(names::RECEIPT).or_else(|| written(names::CONFIG)),
         folder: path,
     };
@@ -148,6 +151,10 @@ fn read(run: &mut ListedRun) -> Result<(), RunError> {
     let tested = receipt.test.as_ref().map(TestOutcome::epoch);
     let read = records.iter().find(|record| Some(record.epoch) == tested).or(records.last());
     run.validation = read.and_then(EpochRecord::validation);
+    run.returns = read.and_then(EpochRecord::policy).map(|outcome| {
+        let test = receipt.played().and_then(|test| test.episodes.mean());
+        [test, outcome.evaluation.mean()]
+    });
     run.epochs[0] = records.last().map_or(0, |record| record.epoch);
     if receipt.status == "finished" {
         run.status = RunStatus::Finished;

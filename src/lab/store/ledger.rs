@@ -92,11 +92,11 @@ impl LedgerRecord {
         record
     }
 
-    /// What came to one ledger of an engine since it stood at `before`.
+    /// What came to one ledger of each engine since they stood at `before`.
     #[must_use]
-    pub fn since(engine: &Engine, phase: Phase, before: &Ledger) -> Self {
+    pub fn since(engines: &[&Engine], phase: Phase, before: &[Ledger]) -> Self {
         let mut record = Self::default();
-        record.add(engine, phase, Some(before));
+        engines.iter().zip(before).for_each(|(engine, b)| record.add(engine, phase, Some(b)));
         record
     }
 

@@ -5,8 +5,10 @@
 //! there, also where it is `null`.
 
 mod note;
+mod policy;
 
 pub use note::Note;
+pub use policy::{EpisodesRecord, LOSS_BITS, PolicyOutcome, PolicyTest, RETURN_BITS, SumRecord};
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -65,6 +67,8 @@ pub struct LayerRecord {
 pub enum Outcome {
     /// Classification.
     Classify(ClassifyOutcome),
+    /// A policy.
+    Policy(Box<PolicyOutcome>),
 }
 
 /// What classification says of an epoch.
@@ -85,6 +89,7 @@ impl Outcome {
     pub const fn task(&self) -> &'static str {
         match self {
             Self::Classify(_) => "classify",
+            Self::Policy(_) => "policy",
         }
     }
 
@@ -93,6 +98,8 @@ impl Outcome {
     pub fn merit(&self) -> u64 {
         match self {
             Self::Classify(outcome) => outcome.validation.map_or(0, |score| score.correct),
+            // the last state of a policy is the one that is tested
+            Self::Policy(_) => 0,
         }
     }
 
@@ -101,6 +108,7 @@ impl Outcome {
     pub fn answers(&self) -> Option<Score> {
         match self {
             Self::Classify(outcome) => outcome.validation.or(outcome.train),
+            Self::Policy(_) => None,
         }
     }
 }
@@ -111,6 +119,16 @@ impl EpochRecord {
     pub const fn classify(&self) -> Option<&ClassifyOutcome> {
         match &self.outcome {
             Outcome::Classify(outcome) => Some(outcome),
+            Outcome::Policy(_) => None,
+        }
+    }
+
+    /// What a policy says of it; nothing of another task.
+    #[must_use]
+    pub fn policy(&self) -> Option<&PolicyOutcome> {
+        match &self.outcome {
+            Outcome::Classify(_) => None,
+            Outcome::Policy(outcome) => Some(outcome),
         }
     }
 
@@ -166,6 +184,8 @@ pub struct EpochRecord {
 pub enum TestOutcome {
     /// Classification.
     Classify(TestRecord),
+    /// A policy.
+    Policy(PolicyTest),
 }
 
 impl TestOutcome {
@@ -174,6 +194,7 @@ impl TestOutcome {
     pub const fn epoch(&self) -> u32 {
         match self {
             Self::Classify(test) => test.epoch,
+            Self::Policy(test) => test.epoch,
         }
     }
 
@@ -182,6 +203,16 @@ impl TestOutcome {
     pub const fn classify(&self) -> Option<&TestRecord> {
         match self {
             Self::Classify(test) => Some(test),
+            Self::Policy(_) => None,
+        }
+    }
+
+    /// What a policy says of it; nothing of another task.
+    #[must_use]
+    pub const fn policy(&self) -> Option<&PolicyTest> {
+        match self {
+            Self::Classify(_) => None,
+            Self::Policy(test) => Some(test),
         }
     }
 }
@@ -218,7 +249,8 @@ impl TestRecord {
     }
 }
 
-/// What was learnt from, as far as numbers tell.
+/// What was learnt from, as far as numbers tell. A policy has no examples: what it is shown has `features` numbers or
+/// lines.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct DataRecord {
@@ -230,7 +262,7 @@ pub struct DataRecord {
     pub features: usize,
     /// Greatest value.
     pub full_scale: u8,
-    /// Classes.
+    /// Classes; of a policy, actions, or numbers of an action.
     pub classes: usize,
     /// Height, width and channels, where examples are pictures.
     #[serde(deserialize_with = "Option::deserialize")]
@@ -260,6 +292,9 @@ impl DataRecord {
 impl fmt::Display for DataRecord {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { examples: [train, validation, test], features, full_scale, classes, .. } = self;
+        if self.examples == [0; 3] {
+            return write!(f, "{features} inputs, {classes} actions");
+        }
         write!(
             f,
             "{train} training, {validation} validation, {test} test examples of {features} values 0 to {full_scale}, \
@@ -355,6 +390,12 @@ impl Receipt {
     #[must_use]
     pub fn classified(&self) -> Option<&TestRecord> {
         self.test.as_ref()?.classify()
+    }
+
+    /// What a policy says of the final test; nothing of another task, or when there was none.
+    #[must_use]
+    pub fn played(&self) -> Option<&PolicyTest> {
+        self.test.as_ref()?.policy()
     }
 }
 

@@ -125,8 +125,9 @@ impl Sweep {
         let mut names: Vec<&str> = axes.iter().map(|axis| &*axis.name).collect();
         names.push("seed");
         let filter = Filter::new(&file.filter.unwrap_or_default(), &names)?;
-        let figures = figures(file.report.unwrap_or_default(), &axes)?;
         let mut base = super::table(&file.base.unwrap_or_default());
+        let result = result(&base, &experiment[1]);
+        let figures = figures(file.report.unwrap_or_default(), &axes, result)?;
         // paths in a file are relative to that file
         let folder = Path::new(place).parent().unwrap_or(Path::new(""));
         anchor(&mut base, folder);
@@ -218,8 +219,15 @@ fn seeds(file: Option<SeedsFile>) -> Result<Vec<u64>, SweepError> {
     Ok(list)
 }
 
+/// What a sweep asks for unless it says so: what comes of the final test of its task.
+fn result(base: &toml::Table, experiment: &str) -> &'static str {
+    let own = toml::from_str::<toml::Table>(experiment).unwrap_or_default();
+    let task = base.get("task").or_else(|| own.get("task")).and_then(toml::Value::as_str);
+    if task == Some("policy") { "return_mean" } else { "test_accuracy" }
+}
+
 /// What the figures show: what the file says, and else the first axes that suit.
-fn figures(file: ReportFile, axes: &[Axis]) -> Result<Figures, SweepError> {
+fn figures(file: ReportFile, axes: &[Axis], result: &str) -> Result<Figures, SweepError> {
     let known = || axes.iter().map(|axis| &*axis.name).collect::<Vec<_>>().join(", ");
     let is_axis = |key: &str, name: &String| {
         if axes.iter().any(|axis| axis.name == *name) {
@@ -257,7 +265,7 @@ fn figures(file: ReportFile, axes: &[Axis]) -> Result<Figures, SweepError> {
     let panel = file.panel.or_else(|| free.pop());
     let other = axes.iter().map(|axis| axis.name.clone()).find(|name| *name != x);
     let heat = file.heat.or_else(|| Some([x.clone(), series.clone().or(other)?]));
-    let y = file.y.unwrap_or_else(|| "test_accuracy".into());
+    let y = file.y.unwrap_or_else(|| result.into());
     Ok(Figures { x, y, series, panel, heat, cost: file.cost })
 }
 

@@ -194,9 +194,9 @@ fn resolve(
 fn check(config: &Config, data: &Data, left: Option<Memory>) -> Result<(String, f64), RunError> {
     let train = &data.split.train;
     let record = DataRecord::of(data);
-    let experiment = config.experiment(record.features, record.classes, record.image)?;
-    experiment.check()?;
-    run::weigh(&experiment.network.layers, &experiment.hardware, left)?;
+    let networks = config.networks(record.features, record.classes, record.image)?;
+    let layers: Vec<_> = networks.into_iter().flat_map(|network| network.layers).collect();
+    run::weigh(&layers, &config.hardware, left)?;
     let key =
         address::key(config.given(record.features, record.classes, record.image)?, &record.hash);
     let cells = |layer: &crate::chip::layer::LayerSpec| {
@@ -204,8 +204,11 @@ fn check(config: &Config, data: &Data, left: Option<Memory>) -> Result<(String, 
     };
     // levels of more than a byte take about twice the time
     let planes = if config.hardware.cell.level_bits.get() > 8 { 2.0 } else { 1.0 };
-    let samples = train.len() as f64 * f64::from(config.epochs);
-    Ok((key, experiment.network.layers.iter().map(cells).sum::<f64>() * planes * samples))
+    let samples = match &config.policy {
+        None => train.len() as f64 * f64::from(config.epochs),
+        Some(policy) => policy.work(),
+    };
+    Ok((key, layers.iter().map(cells).sum::<f64>() * planes * samples))
 }
 
 impl SweepPlan {

@@ -82,12 +82,13 @@ struct Known {
 /// What the runs of some rows knew after each epoch. A run whose records cannot be read is one without: its row says by
 /// itself what came out of it.
 fn learning(store: &Store, found: &Results, rows: &[usize]) -> Learning {
-    let mut learning = Learning { label: String::new(), rows: vec![Vec::new(); found.table.len()] };
+    let rows_of = vec![Vec::new(); found.table.len()];
+    let mut learning = Learning { label: String::new(), shares: true, rows: rows_of };
     let (Some(keys), Some(status)) = (found.table.column("key"), found.table.column("status"))
     else {
         return learning;
     };
-    let mut validated = false;
+    let (mut validated, mut acted) = (false, false);
     for &row in rows {
         let finished = status.values.text(row).as_deref() == Some("finished");
         let Some(key) = keys.values.text(row).filter(|_| finished) else { continue };
@@ -95,15 +96,27 @@ fn learning(store: &Store, found: &Results, rows: &[usize]) -> Learning {
         let known = text.lines().map_while(|line| serde_json::from_str::<Known>(line).ok());
         learning.rows[row] = known
             .filter_map(|known| {
-                let Outcome::Classify(outcome) = &known.outcome;
-                validated |= outcome.validation.is_some_and(|score| score.total > 0);
-                let score = known.outcome.answers().filter(|score| score.total > 0)?;
-                Some((known.epoch, score.fraction()))
+                let of = match &known.outcome {
+                    Outcome::Classify(outcome) => {
+                        validated |= outcome.validation.is_some_and(|score| score.total > 0);
+                        let score = known.outcome.answers().filter(|score| score.total > 0)?;
+                        score.fraction()
+                    }
+                    Outcome::Policy(outcome) => {
+                        acted = true;
+                        outcome.evaluation.mean()?
+                    }
+                };
+                Some((known.epoch, of))
             })
             .collect();
     }
-    let label = if validated { "validation accuracy" } else { "accuracy while learning" };
-    learning.label = label.into();
+    let label = match (acted, validated) {
+        (true, _) => "return without learning",
+        (false, true) => "validation accuracy",
+        (false, false) => "accuracy while learning",
+    };
+    (learning.label, learning.shares) = (label.into(), !acted);
     learning
 }
 

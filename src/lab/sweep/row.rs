@@ -11,7 +11,7 @@ use crate::lab::config::CostClass;
 use crate::lab::price::Cost;
 use crate::lab::run::{self, Prices, RunError, reprice_as};
 use crate::lab::store::folder;
-use crate::lab::store::record::{EpochRecord, Receipt, Score, TestOutcome};
+use crate::lab::store::record::{EpochRecord, PolicyOutcome, Receipt, Score, TestOutcome};
 use crate::lab::table::ColumnUnit;
 
 /// What the numbers of a column are made of.
@@ -58,6 +58,10 @@ impl Facts<'_> {
         self.last.events.get("training").and_then(|events| events.get(name)).copied().unwrap_or(0)
     }
 
+    fn policy(&self) -> Option<&PolicyOutcome> {
+        self.last.policy()
+    }
+
     fn pathways(&self, of: fn(&crate::learn::statistics::PathwayRecord) -> u64) -> u64 {
         self.last.pathways.iter().map(of).sum()
     }
@@ -66,9 +70,9 @@ impl Facts<'_> {
         self.last.layers.iter().map(|layer| layer.levels[bank]).sum()
     }
 
-    /// Typical joules of an image of a phase, if every part of them has a price.
-    fn image(&self, phase: Phase, class: Option<CostClass>) -> Option<Number> {
-        let one = self.cost.of_image(phase)?;
+    /// Typical joules of an image, an update or a decision of a phase, if every part of them has a price.
+    fn piece(&self, phase: Phase, class: Option<CostClass>) -> Option<Number> {
+        let one = self.cost.of_piece(phase)?;
         let total = match class {
             None => one.total,
             Some(class) => one.split.iter().find(|split| split.class == class)?.total,
@@ -76,8 +80,8 @@ impl Facts<'_> {
         Number::from_f64(total.whole()?[1])
     }
 
-    fn image_seconds(&self, phase: Phase) -> Option<Number> {
-        self.cost.of_image(phase)?.seconds.and_then(Number::from_f64)
+    fn piece_seconds(&self, phase: Phase) -> Option<Number> {
+        self.cost.of_piece(phase)?.seconds.and_then(Number::from_f64)
     }
 
     fn joules(&self, bound: usize) -> Option<Number> {
@@ -88,6 +92,10 @@ impl Facts<'_> {
 /// A quotient; nothing when there is nothing to divide by.
 fn over(part: u64, whole: u64) -> Option<Number> {
     if whole == 0 { None } else { Number::from_f64(part as f64 / whole as f64) }
+}
+
+fn real(number: Option<f64>) -> Option<Number> {
+    number.and_then(Number::from_f64)
 }
 
 fn share(score: Option<Score>) -> Option<Number> {
@@ -115,6 +123,14 @@ pub const RESULTS: &[ResultColumn] = results![
     "test_accuracy", "test accuracy", Fraction, Quotient of "classify", |f| share(f.receipt.classified().map(|test| test.score));
     "validation_accuracy", "validation accuracy", Fraction, Quotient of "classify", |f| share(f.read.validation());
     "train_accuracy", "accuracy while learning", Fraction, Quotient of "classify", |f| share(f.last.train());
+    "return_mean", "mean return of the final test", Plain, Quotient of "policy", |f| f.receipt.played().and_then(|test| real(test.episodes.mean()));
+    "return_least", "least return of the final test", Plain, Quotient of "policy", |f| f.receipt.played().and_then(|test| real(test.episodes.return_range.map(|range| range[1])));
+    "return_most", "greatest return of the final test", Plain, Quotient of "policy", |f| f.receipt.played().and_then(|test| real(test.episodes.return_range.map(|range| range[2])));
+    "return_evaluated", "mean return after the last epoch", Plain, Quotient of "policy", |f| f.policy().and_then(|of| real(of.evaluation.mean()));
+    "return_learning", "mean return while learning", Plain, Quotient of "policy", |f| f.policy().and_then(|of| real(of.episodic_return));
+    "steps", "environment steps", Count, Whole of "policy", |f| f.policy().map(|of| of.steps.into());
+    "entropy", "entropy of the policy", Plain, Quotient of "policy", |f| f.policy().and_then(|of| real(of.mean_entropy));
+    "explained_variance", "explained variance of returns", Plain, Quotient of "policy", |f| f.policy().and_then(|of| real(of.explained_variance));
     "test_epoch", "epoch of the state that was tested", Plain, Whole, |f| f.receipt.test.as_ref().map(|test| test.epoch().into());
     "epochs", "epochs", Plain, Whole, |f| Some(f.last.epoch.into());
     "updates", "updates", Count, Whole, |f| Some(f.last.updates.into());
@@ -134,18 +150,26 @@ pub const RESULTS: &[ResultColumn] = results![
     "joules_assumed", "share of energy that leans on assumed constants", Fraction, Priced,
         |f| f.cost.energy.and_then(|_| Number::from_f64(f.cost.assumed_share));
     "parts_priced", "share of the parts that have a price", Fraction, Priced, |f| f.cost.energy.and_then(|e| over(e.priced as u64, e.parts as u64));
-    "learn_joules", "energy to learn from an image", Joules, Priced, |f| f.image(Phase::Training, None);
-    "learn_joules_device", "energy to learn from an image, device", Joules, Priced, |f| f.image(Phase::Training, Some(CostClass::Device));
-    "learn_joules_converter", "energy to learn from an image, converters", Joules, Priced, |f| f.image(Phase::Training, Some(CostClass::Converter));
-    "learn_joules_digital", "energy to learn from an image, digital", Joules, Priced, |f| f.image(Phase::Training, Some(CostClass::Digital));
-    "learn_joules_static", "energy to learn from an image, static", Joules, Priced, |f| f.image(Phase::Training, Some(CostClass::Static));
-    "learn_seconds", "time to learn from an image", Seconds, Priced, |f| f.image_seconds(Phase::Training);
-    "read_joules", "energy to read an image", Joules, Priced, |f| f.image(Phase::Evaluation, None);
-    "read_joules_device", "energy to read an image, device", Joules, Priced, |f| f.image(Phase::Evaluation, Some(CostClass::Device));
-    "read_joules_converter", "energy to read an image, converters", Joules, Priced, |f| f.image(Phase::Evaluation, Some(CostClass::Converter));
-    "read_joules_digital", "energy to read an image, digital", Joules, Priced, |f| f.image(Phase::Evaluation, Some(CostClass::Digital));
-    "read_joules_static", "energy to read an image, static", Joules, Priced, |f| f.image(Phase::Evaluation, Some(CostClass::Static));
-    "read_seconds", "time to read an image", Seconds, Priced, |f| f.image_seconds(Phase::Evaluation);
+    "learn_joules", "energy to learn from an image", Joules, Priced of "classify", |f| f.piece(Phase::Training, None);
+    "learn_joules_device", "energy to learn from an image, device", Joules, Priced of "classify", |f| f.piece(Phase::Training, Some(CostClass::Device));
+    "learn_joules_converter", "energy to learn from an image, converters", Joules, Priced of "classify", |f| f.piece(Phase::Training, Some(CostClass::Converter));
+    "learn_joules_digital", "energy to learn from an image, digital", Joules, Priced of "classify", |f| f.piece(Phase::Training, Some(CostClass::Digital));
+    "learn_joules_static", "energy to learn from an image, static", Joules, Priced of "classify", |f| f.piece(Phase::Training, Some(CostClass::Static));
+    "learn_seconds", "time to learn from an image", Seconds, Priced of "classify", |f| f.piece_seconds(Phase::Training);
+    "read_joules", "energy to read an image", Joules, Priced of "classify", |f| f.piece(Phase::Evaluation, None);
+    "read_joules_device", "energy to read an image, device", Joules, Priced of "classify", |f| f.piece(Phase::Evaluation, Some(CostClass::Device));
+    "read_joules_converter", "energy to read an image, converters", Joules, Priced of "classify", |f| f.piece(Phase::Evaluation, Some(CostClass::Converter));
+    "read_joules_digital", "energy to read an image, digital", Joules, Priced of "classify", |f| f.piece(Phase::Evaluation, Some(CostClass::Digital));
+    "read_joules_static", "energy to read an image, static", Joules, Priced of "classify", |f| f.piece(Phase::Evaluation, Some(CostClass::Static));
+    "read_seconds", "time to read an image", Seconds, Priced of "classify", |f| f.piece_seconds(Phase::Evaluation);
+    "update_joules", "energy of an update", Joules, Priced of "policy", |f| f.piece(Phase::Training, None);
+    "update_seconds", "time of an update", Seconds, Priced of "policy", |f| f.piece_seconds(Phase::Training);
+    "decision_joules", "energy of a decision", Joules, Priced of "policy", |f| f.piece(Phase::Evaluation, None);
+    "decision_joules_device", "energy of a decision, device", Joules, Priced of "policy", |f| f.piece(Phase::Evaluation, Some(CostClass::Device));
+    "decision_joules_converter", "energy of a decision, converters", Joules, Priced of "policy", |f| f.piece(Phase::Evaluation, Some(CostClass::Converter));
+    "decision_joules_digital", "energy of a decision, digital", Joules, Priced of "policy", |f| f.piece(Phase::Evaluation, Some(CostClass::Digital));
+    "decision_joules_static", "energy of a decision, static", Joules, Priced of "policy", |f| f.piece(Phase::Evaluation, Some(CostClass::Static));
+    "decision_seconds", "time of a decision", Seconds, Priced of "policy", |f| f.piece_seconds(Phase::Evaluation);
     "converters_mm2", "area of converters", SquareMillimetres, Priced, |f| f.converters_mm2.and_then(Number::from_f64);
     #[cfg(feature = "grown")] "grown", "what a later program shows", Count, Whole, |f| Some(f.last.grown.into());
 ];

@@ -130,10 +130,9 @@ mod tests {
         );
         assert_eq!((tanh[0], normal[NORMAL_ENTRIES]), (0, 0));
         for (i, &entry) in normal.iter().enumerate() {
-            // one step is more than the reference is off by, even where the tail is thinnest
             let mass = ((128 + i as i128 % 128) << (precise::BITS - 40)) << (i / 128);
             let z = |steps: i128| (2 * i128::from(entry) + steps) << (precise::BITS - 28);
-            let slack = mass >> 22;
+            let slack = 4;
             assert!(precise::tail(z(-1)) + slack >= mass, "{i}");
             assert!(precise::tail(z(1)) <= mass + slack, "{i}");
         }

@@ -62,7 +62,7 @@ pub(crate) fn tanh(x: i128) -> i128 {
     (ONE - (ONE << (BITS + 1)) / (e + ONE)) * x.signum()
 }
 
-/// What of the normal distribution lies above `z`, to one part in 2^22 of itself up to `z` = 6.5.
+/// What of the normal distribution lies above `z`, to 2^-54 up to `z` = 6.5.
 pub(crate) fn tail(z: i128) -> i128 {
     if z < 0 {
         return ONE - tail(-z);

@@ -14,11 +14,11 @@
 //! Angle `a` of the upper link is from straight down, `b` of the lower from the upper, in radians; `v` and `w` are their
 //! speeds. Masses, lengths and moments are 1, centres of mass at half a length, g = 9.8. Between the four stages speeds
 //! are held to 2048 in size, so that nothing overflows: from two million states drawn from the whole box none went beyond
-//! 900. As Gymnasium 1.4 has it, to 2^-24 of a range in a step; see docs/MODEL.md, 5.
+//! 900. As Gymnasium 1.4 has it, to 2^-24 of a range in a step; see docs/MODEL.md, 5.4.
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
 use super::canvas::Canvas;
-use super::fine::{Fine, cos, reciprocal, shown, sin_cos, uniform};
+use super::fine::{Fine, cos, reciprocal, shown, sin_cos, turned, uniform};
 use super::one::{Action, Came, Environment, StatePart};
 use super::{EnvSpec, Observations, Real, Shown, Taken};
 
@@ -62,15 +62,6 @@ fn moved(from: [Fine; 4], time: Fine, change: [Fine; 4]) -> [Fine; 4] {
     let held = |speed: Fine| speed.clamp(-STAGE_SPEED_MAX, STAGE_SPEED_MAX);
     let [a, b, v, w] = std::array::from_fn(|i| from[i] + time * change[i]);
     [a, b, held(v), held(w)]
-}
-
-/// The same direction, from -pi to pi.
-#[inline]
-fn turned(angle: Fine) -> Fine {
-    if angle.abs() <= Fine::PI {
-        return angle;
-    }
-    (angle + Fine::PI).rem_euclid(Fine::TAU) - Fine::PI
 }
 
 impl Environment for Acrobot {

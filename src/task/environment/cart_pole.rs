@@ -10,7 +10,7 @@
 //! ```
 //!
 //! `x` is in metres, `a` in radians, upwards 0. Speeds `v` and `w` are held to 256 in size, twenty times what an episode
-//! reaches, so that nothing overflows. As Gymnasium 1.4 has it, to 2^-28 of a range in a step; see docs/MODEL.md, 5.
+//! reaches, so that nothing overflows. As Gymnasium 1.4 has it, to 2^-28 of a range in a step; see docs/MODEL.md, 5.4.
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
 use super::canvas::Canvas;

@@ -7,11 +7,12 @@
 //!              z = r^2:   sin r = r (1 - z/3! + z^2/5! - z^3/7! + z^4/9!)       left out: below 2^-29
 //!                         cos r = 1 - z/2! + z^2/4! - z^3/6! + z^4/8! - z^5/10!  left out: below 2^-32
 //!              within 2^-26 for |x| <= 64, since pi/2 is known to 2^-33 and k <= 41; within 2^-22 for |x| <= 1024
+//! turned       x as it is from -pi to pi, else (x + pi) mod 2 pi - pi
 //! shown        to the nearest Real, halves up, held at its ends
 //! uniform      low + floor((high - low) word / 2^32)             one word, from `low` up to below `high`
 //! ```
 //!
-//! See docs/MODEL.md, 5.
+//! See docs/MODEL.md, 5.4.
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
 use fixed::types::I32F32;
@@ -80,6 +81,16 @@ pub fn cos(angle: Fine) -> Fine {
     sin_cos(angle).1
 }
 
+/// The same direction, from -pi to pi.
+#[inline]
+#[must_use]
+pub fn turned(angle: Fine) -> Fine {
+    if angle.abs() <= Fine::PI {
+        return angle;
+    }
+    (angle + Fine::PI).rem_euclid(Fine::TAU) - Fine::PI
+}
+
 /// As it is shown: to the nearest, halves up, held at the ends.
 #[inline]
 #[must_use]
@@ -126,6 +137,18 @@ mod tests {
             let (sin, cos) = sin_cos(angle);
             assert!((sin - Fine::from_num(s)).abs() < small(26), "sin {angle}");
             assert!((cos - Fine::from_num(c)).abs() < small(26), "cos {angle}");
+        }
+    }
+
+    #[test]
+    fn a_turn_more_or_less_is_the_same_direction() {
+        assert_eq!([Fine::PI, -Fine::PI].map(turned), [Fine::PI, -Fine::PI]);
+        // pi and 2 pi are rounded each by itself
+        assert!((turned(Fine::PI + Fine::DELTA) + Fine::PI).abs() <= small(31));
+        assert!((turned(-Fine::PI - Fine::DELTA) - Fine::PI).abs() <= small(31));
+        let direction = Fine::lit("2.5");
+        for turns in -9..=9 {
+            assert_eq!(turned(direction + Fine::TAU * turns), direction);
         }
     }
 

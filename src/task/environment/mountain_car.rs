@@ -7,7 +7,7 @@
 //! begins with x uniform in -0.6 .. -0.4, v = 0
 //! ```
 //!
-//! As Gymnasium 1.4 has it, which keeps `x` and `v` in 32 bits: to 2^-22 of a range in a step; see docs/MODEL.md, 5.
+//! As Gymnasium 1.4 has it, which keeps `x` and `v` in 32 bits: to 2^-22 of a range in a step; see docs/MODEL.md, 5.4.
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
 use super::canvas::Canvas;

@@ -6,7 +6,7 @@
 //! ```
 //!
 //! An environment here is its rules alone: how it begins, what an action does, what it shows. What all have in common is
-//! said once, in [`SideBySide`]. See docs/MODEL.md, 5.
+//! said once, in [`SideBySide`]. See docs/MODEL.md, 5.4.
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
 use std::fmt;

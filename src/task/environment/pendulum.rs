@@ -1,18 +1,19 @@
 //! `Pendulum-v1`: swing a pendulum up and keep it there with a torque that is too weak to lift it at once.
 //!
 //! ```text
-//! u = 2 action        reward = -(n(a)^2 + 0.1 w^2 + 0.001 u^2), of the values before; n(a) = a in -pi .. pi
-//! w += 0.05 (15 sin a + 3 u), held to 8 in size;  a += 0.05 w, with the new w         g = 10, mass and length 1
+//! u = 2 action        reward = -(a^2 + 0.1 w^2 + 0.001 u^2), of the values before
+//! w += 0.05 (15 sin a + 3 u), held to 8 in size       g = 10, mass and length 1
+//! a += 0.05 w, with the new w, turned into -pi .. pi
 //! never over;  200 steps;  shows cos a, sin a, w
 //! begins with a uniform in -pi .. pi, w in -1 .. 1
 //! ```
 //!
-//! `a` is in radians, upwards 0, and counts turns: it is at most `pi + 200 x 0.05 x 8` in size. As Gymnasium 1.4 has it, to
-//! 2^-28 of a range in a step; see docs/MODEL.md, 5.
+//! `a` is in radians, upwards 0. As Gymnasium 1.4 has it, which counts whole turns in `a` and takes them out where it matters:
+//! to 2^-28 of a range in a step; see docs/MODEL.md, 5.4.
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
 use super::canvas::Canvas;
-use super::fine::{Fine, shown, sin, sin_cos, taken, uniform};
+use super::fine::{Fine, shown, sin, sin_cos, taken, turned, uniform};
 use super::one::{Action, Came, Environment, StatePart};
 use super::{EnvSpec, Observations, Shown, Taken};
 
@@ -35,11 +36,6 @@ pub struct Pendulum {
     speed: Fine,
 }
 
-/// The same direction, from -pi up to below pi.
-fn normal(angle: Fine) -> Fine {
-    (angle + Fine::PI).rem_euclid(Fine::TAU) - Fine::PI
-}
-
 impl Environment for Pendulum {
     fn spec() -> EnvSpec {
         EnvSpec {
@@ -52,9 +48,12 @@ impl Environment for Pendulum {
     }
 
     fn parts() -> Vec<StatePart> {
-        let part =
-            |name, most: i64| StatePart { name, numbers: 1, within: -most << 32..=most << 32 };
-        vec![part("angle", 128), part("speed", 8)]
+        let part = |name, most: Fine| StatePart {
+            name,
+            numbers: 1,
+            within: -most.to_bits()..=most.to_bits(),
+        };
+        vec![part("angle", Fine::PI), part("speed", SPEED_MAX)]
     }
 
     fn begin(words: &mut impl Iterator<Item = u32>) -> Self {
@@ -67,11 +66,10 @@ impl Environment for Pendulum {
     fn act(&mut self, action: Action<'_>) -> Came {
         let Self { angle, speed } = *self;
         let torque = TORQUE_MAX * taken(action.number());
-        let turn = normal(angle);
-        let cost = turn * turn + SPEED_COST * (speed * speed) + TORQUE_COST * (torque * torque);
+        let cost = angle * angle + SPEED_COST * (speed * speed) + TORQUE_COST * (torque * torque);
         let faster = speed + (PULL * sin(angle) + TORQUE_SHARE * torque) * TAU;
         self.speed = faster.clamp(-SPEED_MAX, SPEED_MAX);
-        self.angle = angle + self.speed * TAU;
+        self.angle = turned(angle + self.speed * TAU);
         Came { reward: shown(-cost), terminated: false }
     }
 

@@ -292,11 +292,9 @@ fn weigh(
     let d = ratio::log_ratio(log, rollout.logs[step]);
     let ratio = ratio::ratio(tables, d);
     epoch.policy_loss.add(-i64::from(clip.gain(ratio, advantage).to_bits()));
-    // (r - 1) - d in 2^-27, cut to 2^-20
-    let above = i64::from(ratio.to_bits()) - i64::from(Ratio::ONE.to_bits());
-    epoch.approx_kl.add((above - 2 * i64::from(d.to_bits())) >> 7);
+    epoch.approx_kl.add(ratio::divergence(ratio, d) >> 7); // cut to 2^-20
     epoch.clipped.add(i64::from(clip.outside(ratio)));
-    clip.weight(ratio, advantage)
+    clip.push(ratio, advantage)
 }
 
 impl State for Actor {

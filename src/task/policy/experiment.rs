@@ -113,7 +113,8 @@ impl PolicyExperiment {
                 "it must lie in 1..=1024",
             ));
         }
-        let sizes = [("ppo.horizon", self.horizon), ("ppo.rollouts_per_epoch", self.rollouts)];
+        let sizes =
+            [("environment.horizon", self.horizon), ("environment.rollouts", self.rollouts)];
         if let Some((key, _)) = sizes.into_iter().find(|(_, size)| *size == 0) {
             return Err(NetworkError::misfit(key, "is 0", "give at least 1"));
         }
@@ -121,7 +122,7 @@ impl PolicyExperiment {
         if self.steps == 0 || self.steps.div_ceil(epoch) > u64::from(u32::MAX) || epoch > 1 << 24 {
             let found = format!("is {}, in epochs of {epoch}", self.steps);
             let allowed = "give 1 step or more, in 2^32 epochs at most of 2^24 steps at most";
-            return Err(NetworkError::misfit("ppo.steps", found, allowed));
+            return Err(NetworkError::misfit("environment.steps", found, allowed));
         }
         let networks = [(&self.actor, Self::outputs(spec)), (&self.critic, 1)];
         for (network, outputs) in networks {

@@ -7,7 +7,7 @@
 //!                                                           error < 2^-30 + pi_j 2^-21; of the greatest, 2^-30 an action
 //! ln pi_j  = (x_j - max) - ln sum                           error < 2^-20
 //! H        = - sum pi_j ln pi_j                             error < 2^-20 (1 + H)
-//! e_j      = weight (1[j = a] - pi_j) - beta pi_j (ln pi_j + H)        clamped to +-4
+//! e_j      = push (1[j = a] - pi_j) - beta pi_j (ln pi_j + H)        clamped to +-4
 //! ```
 //!
 //! Continuous actions, means `mu`, deviations `s` that depend on no state; `u` is what was tried, the environment is told `tanh u`:
@@ -16,11 +16,11 @@
 //! z        = clamp((u - mu) / s, -16, 16)                   error < 2^-27 + |z| 2^-21
 //! ln p     = sum -z^2 / 2 - ln s                            without its constant, which no ratio has; nor has one that of tanh
 //! H        = sum ln s + ln(2 pi e) / 2                      of the Gaussian, before tanh
-//! e_mu     = weight z / s,     e_ln s = weight (z^2 - 1) + beta        z clamped to +-4, errors to +-4
+//! e_mu     = push z / s,     e_ln s = push (z^2 - 1) + beta        z clamped to +-4, errors to +-4
 //! ```
 //!
-//! `weight` is that of [`Clip`](super::ratio::Clip). Errors are multiples of 2^-20: e_j is off by less than `2^-19 + |weight| 2^-21`,
-//! e_mu by `2^-20 + |weight| / s (|z| 2^-20 + 2^-27)`, e_ln s by `2^-20 + |weight| 2^-15`. They point uphill: outputs should follow them. See docs/MODEL.md, 5.
+//! `push` is that of [`Clip`](super::ratio::Clip). Errors are multiples of 2^-20: e_j is off by less than `2^-19 + |push| 2^-21`,
+//! e_mu by `2^-20 + |push| / s (|z| 2^-20 + 2^-27)`, e_ln s by `2^-20 + |push| 2^-15`. They point uphill: outputs should follow them. See docs/MODEL.md, 5.
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
 use super::function;
@@ -75,20 +75,20 @@ pub fn softmax(
 pub fn discrete_errors(
     softmax: &Softmax<'_>,
     action: usize,
-    weight: Advantage,
+    push: Advantage,
     beta: Probability,
     errors: &mut [OutputError],
 ) {
     let Softmax { probabilities, logs, entropy } = *softmax;
     assert!(probabilities.len() == logs.len() && logs.len() == errors.len(), "one an action");
-    let weight = i64::from(weight.to_bits());
+    let push = i64::from(push.to_bits());
     let entropy = i64::from(entropy.to_bits()) << 6;
     for (j, ((p, log), error)) in probabilities.iter().zip(logs).zip(errors).enumerate() {
         let p = i64::from(p.to_bits());
         let taken = i64::from(j == action) << 31;
         let part = rsh(i64::from(beta.to_bits()) * p, 31);
         let spread = part * (log.to_bits() + entropy);
-        *error = bounded(rsh(weight * (taken - p) - rsh(spread, 6), 31));
+        *error = bounded(rsh(push * (taken - p) - rsh(spread, 6), 31));
     }
 }
 
@@ -170,13 +170,13 @@ impl Scatter {
         &self,
         tried: Logit,
         mean: Logit,
-        weight: Advantage,
+        push: Advantage,
         beta: Probability,
     ) -> [OutputError; 2] {
-        let weight = i64::from(weight.to_bits());
+        let push = i64::from(push.to_bits());
         let z = i64::from(self.distance(tried, mean).to_bits()).clamp(-Z_BOUND, Z_BOUND);
-        let pull = i128::from(weight * z) * i128::from(self.precision.to_bits());
-        let widen = i128::from(weight) * i128::from(z * z - (1 << 54));
+        let pull = i128::from(push * z) * i128::from(self.precision.to_bits());
+        let widen = i128::from(push) * i128::from(z * z - (1 << 54));
         let widen = widen + (i128::from(beta.to_bits()) << 43);
         [rsh(pull, 53), rsh(widen, 54)].map(|error| bounded(error as i64))
     }
@@ -311,10 +311,10 @@ mod tests {
         #[test]
         fn softmax_and_its_errors_are_within_their_bounds(
             bits in prop::collection::vec(any::<i32>(), 1..12), scale in 6u32..20,
-            action: prop::sample::Index, weight in -128i32 << 20..=128 << 20, small in 0u32..12, beta in 0u32..1 << 31,
+            action: prop::sample::Index, push in -128i32 << 20..=128 << 20, small in 0u32..12, beta in 0u32..1 << 31,
         ) {
             let logits = logits(&bits.iter().map(|x| x >> scale).collect::<Vec<_>>());
-            let (action, weight) = (action.index(logits.len()), weight >> small);
+            let (action, push) = (action.index(logits.len()), push >> small);
             let (p, log, entropy) = softmax_of(&logits);
             let max = logits.iter().max().unwrap();
             let below: Vec<i128> =
@@ -340,23 +340,23 @@ mod tests {
 
             let mut errors = vec![OutputError::ZERO; logits.len()];
             let softmax = Softmax { probabilities: &p, logs: &log, entropy };
-            discrete_errors(&softmax, action, Advantage::from_bits(weight), Probability::from_bits(beta), &mut errors);
-            let weight = wide(weight.into(), 20);
+            discrete_errors(&softmax, action, Advantage::from_bits(push), Probability::from_bits(beta), &mut errors);
+            let push = wide(push.into(), 20);
             for (j, error) in errors.iter().enumerate() {
                 let taken = if j == action { ONE } else { 0 };
                 let spread = mul(exact[j], logs[j].max(-70 * ONE) + exact_entropy);
-                let e = mul(weight, taken - exact[j]) - mul(wide(beta.into(), 31), spread);
+                let e = mul(push, taken - exact[j]) - mul(wide(beta.into(), 31), spread);
                 let off = (wide(error.to_bits().into(), 20) - e.clamp(-4 * ONE, 4 * ONE)).abs();
-                prop_assert!(off <= (ONE >> 19) + (weight.abs() >> 21), "{off}");
+                prop_assert!(off <= (ONE >> 19) + (push.abs() >> 21), "{off}");
             }
         }
 
         #[test]
         fn a_gaussian_is_within_its_bounds(
             log in -4i32 << 20..=1 << 20, mean in -8i32 << 20..8 << 20, apart in -45i32 << 20..45 << 20, near in 0u32..12,
-            weight in -128i32 << 20..=128 << 20, small in 0u32..12, beta in 0u32..1 << 31,
+            push in -128i32 << 20..=128 << 20, small in 0u32..12, beta in 0u32..1 << 31,
         ) {
-            let (apart, weight) = (apart >> near, weight >> small);
+            let (apart, push) = (apart >> near, push >> small);
             let scatter = Scatter::new(&TABLES, LogDeviation::from_bits(log));
             let (tried, mean) = (Logit::from_bits(mean + apart), Logit::from_bits(mean));
             let (ln_s, s) = (wide(log.into(), 20), precise::exp(wide(log.into(), 20)));
@@ -371,14 +371,14 @@ mod tests {
             let off = (wide(scatter.log_density(tried, mean).to_bits(), 26) - density).abs();
             prop_assert!(off <= mul(z.abs(), z_bound) + (ONE >> 26), "{off}");
 
-            let errors = scatter.errors(tried, mean, Advantage::from_bits(weight), Probability::from_bits(beta));
+            let errors = scatter.errors(tried, mean, Advantage::from_bits(push), Probability::from_bits(beta));
             let z = z.clamp(-4 * ONE, 4 * ONE);
-            let weight = wide(weight.into(), 20);
-            let pull = div(mul(weight, z), s);
-            let widen = mul(weight, mul(z, z) - ONE) + wide(beta.into(), 31);
+            let push = wide(push.into(), 20);
+            let pull = div(mul(push, z), s);
+            let widen = mul(push, mul(z, z) - ONE) + wide(beta.into(), 31);
             let bounds = [
-                (ONE >> 20) + div(mul(weight.abs(), (z.abs() >> 20) + (ONE >> 27)), s),
-                (ONE >> 20) + (weight.abs() >> 15),
+                (ONE >> 20) + div(mul(push.abs(), (z.abs() >> 20) + (ONE >> 27)), s),
+                (ONE >> 20) + (push.abs() >> 15),
             ];
             for ((error, exact), bound) in errors.iter().zip([pull, widen]).zip(bounds) {
                 let off = (wide(error.to_bits().into(), 20) - exact.clamp(-4 * ONE, 4 * ONE)).abs();

@@ -95,7 +95,7 @@ pub fn pieces(number: i128) -> [i64; 2] {
 /// What [`pieces`] gave; `None` where the lower bits are negative.
 #[must_use]
 pub fn whole([high, low]: [i64; 2]) -> Option<i128> {
-    (low >= 0).then(|| i128::from(high) << 63 | i128::from(low))
+    (low >= 0).then(|| (i128::from(high) << 63) + i128::from(low))
 }
 
 /// A mean and a standard deviation.

@@ -4,12 +4,12 @@
 //! d        = clamp(ln p' - ln p, -2.77, 2.77)               exact, in 2^-26
 //! r        = exp d                                          relative error < 2^-21;   1/16 < r < 16
 //! clipped  = A > 0 and r > 1 + epsilon,  or  A < 0 and r < 1 - epsilon
-//! weight   = 0 if clipped, else r A                         error <= 2^-21 beside that of r
+//! push     = 0 if clipped, else r A                         error <= 2^-21 beside that of r
 //! gain     = min(r A, clamp(r, 1 - epsilon, 1 + epsilon) A)
 //! KL      ~= mean of (r - 1) - d,   clip fraction = share of r outside 1 - epsilon ..= 1 + epsilon
 //! ```
 //!
-//! `weight` is what the gradient of the gain by `d` is. See docs/MODEL.md, 5.
+//! `push` is the gradient of the gain by `d`: how hard an action is pushed, and which way. See docs/MODEL.md, 5.
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
 use super::function;
@@ -54,7 +54,7 @@ impl Clip {
     /// What the errors of a policy are multiples of: `r A`, or 0 where it is clipped. Saturates.
     #[inline]
     #[must_use]
-    pub fn weight(self, ratio: Ratio, advantage: Advantage) -> Advantage {
+    pub fn push(self, ratio: Ratio, advantage: Advantage) -> Advantage {
         if self.clips(ratio, advantage) { Advantage::ZERO } else { product(ratio, advantage) }
     }
 
@@ -86,26 +86,12 @@ fn product(ratio: Ratio, advantage: Advantage) -> Advantage {
     saturated(rsh(i64::from(ratio.to_bits()) * i64::from(advantage.to_bits()), 27))
 }
 
-/// How far updates have moved a policy: sums that reports divide.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub struct Moved {
-    /// Actions looked at.
-    pub actions: u64,
-    /// Those whose ratio lay outside of the clip.
-    pub outside: u64,
-    /// Sum of `(r - 1) - d`, in 2^-27.
-    pub divergence: i64,
-}
-
-impl Moved {
-    /// Looks at one more action.
-    #[inline]
-    pub fn add(&mut self, clip: Clip, d: LogRatio, ratio: Ratio) {
-        self.actions += 1;
-        self.outside += u64::from(clip.outside(ratio));
-        let above = i64::from(ratio.to_bits()) - i64::from(Ratio::ONE.to_bits());
-        self.divergence += above - 2 * i64::from(d.to_bits());
-    }
+/// What an action says of how far an update moved the policy: `(r - 1) - d`, in 2^-27.
+#[inline]
+#[must_use]
+pub fn divergence(ratio: Ratio, d: LogRatio) -> i64 {
+    let above = i64::from(ratio.to_bits()) - i64::from(Ratio::ONE.to_bits());
+    above - 2 * i64::from(d.to_bits())
 }
 
 #[cfg(test)]
@@ -147,8 +133,8 @@ mod tests {
         let (most, least) = ((1 << 27) + 26_843_546, (1 << 27) - 26_843_546);
         let at = |ratio, advantage| {
             let (ratio, advantage) = (Ratio::from_bits(ratio), Advantage::from_num(advantage));
-            let (clips, weight) = (FIFTH.clips(ratio, advantage), FIFTH.weight(ratio, advantage));
-            assert_eq!(clips, weight == 0 && advantage != 0);
+            let (clips, push) = (FIFTH.clips(ratio, advantage), FIFTH.push(ratio, advantage));
+            assert_eq!(clips, push == 0 && advantage != 0);
             clips
         };
         assert_eq!(
@@ -180,24 +166,18 @@ mod tests {
             (gain(2, -5), gain(0, 5), gain(1, 5)),
             (Advantage::from_num(-10), Advantage::ZERO, Advantage::from_num(5))
         );
-        assert_eq!(FIFTH.weight(Ratio::from_num(16), Advantage::MIN), Advantage::MIN);
+        assert_eq!(FIFTH.push(Ratio::from_num(16), Advantage::MIN), Advantage::MIN);
     }
 
     #[test]
-    fn what_moved_is_summed_up() {
-        let mut moved = Moved::default();
-        let d = LogRatio::from_bits(1 << 25);
-        let r = ratio(&TABLES, d);
-        moved.add(FIFTH, LogRatio::ZERO, Ratio::ONE);
-        moved.add(FIFTH, d, r);
-        // sqrt(e) - 1 - 1/2 = 0.1487212707
-        let divergence = 19_961_031;
-        assert_eq!((moved.actions, moved.outside), (2, 1));
-        assert!((moved.divergence - divergence).abs() < 64, "{}", moved.divergence);
-        moved.add(FIFTH, -d, ratio(&TABLES, -d));
-        // exp(-1/2) - 1 + 1/2 = 0.1065306597
-        assert!((moved.divergence - divergence - 14_298_303).abs() < 128, "{}", moved.divergence);
-        assert_eq!((moved.actions, moved.outside), (3, 2));
+    fn what_moved_diverges_either_way() {
+        let at = |d| {
+            let d = LogRatio::from_bits(d);
+            divergence(ratio(&TABLES, d), d)
+        };
+        // sqrt(e) - 1 - 1/2 = 0.1487212707 and exp(-1/2) - 1 + 1/2 = 0.1065306597
+        assert_eq!(at(0), 0);
+        assert!((at(1 << 25) - 19_961_031).abs() < 64 && (at(-1 << 25) - 14_298_303).abs() < 64);
     }
 
     proptest! {
@@ -210,12 +190,12 @@ mod tests {
         }
 
         #[test]
-        fn a_weight_is_the_product_or_nothing(ratio: u32, advantage in -8i32 << 20..=8 << 20) {
+        fn a_push_is_the_product_or_nothing(ratio: u32, advantage in -8i32 << 20..=8 << 20) {
             let (r, a) = (Ratio::from_bits(ratio), Advantage::from_bits(advantage));
             let twice = 2 * i64::from(ratio) * i64::from(advantage);
-            let weight = i64::from(FIFTH.weight(r, a).to_bits()) << 28;
-            prop_assert!(FIFTH.clips(r, a) || (weight - twice).abs() <= 1 << 27);
-            // the gain follows the ratio where the weight is not 0
+            let push = i64::from(FIFTH.push(r, a).to_bits()) << 28;
+            prop_assert!(FIFTH.clips(r, a) || (push - twice).abs() <= 1 << 27);
+            // the gain follows the ratio where the push is not 0
             let product = (twice + (1 << 27)) >> 28;
             let gain = i64::from(FIFTH.gain(r, a).to_bits());
             let follows = if FIFTH.clips(r, a) { gain <= product } else { gain == product };

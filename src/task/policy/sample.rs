@@ -107,7 +107,7 @@ mod tests {
             let bound = (ONE >> 20) + (s >> 16) + (apart.abs() >> 21);
             // the mass above each end of the bound, in deviations
             let above = ONE - (i128::from(2 * u64::from(word) + 1) << (BITS - 33));
-            let slack = above.min(ONE - above) >> 22;
+            let slack = 4;
             prop_assert!(precise::tail(precise::div(apart - bound, s)) + slack >= above);
             prop_assert!(precise::tail(precise::div(apart + bound, s)) <= above + slack);
         }

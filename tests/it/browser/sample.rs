@@ -123,6 +123,7 @@ impl Sample {
         };
         let learning = Learning {
             label: "validation accuracy".into(),
+            shares: true,
             rows: results[1].iter().map(climb).collect(),
         };
         let [accuracy, validation, joules, low, high, floor] = results;

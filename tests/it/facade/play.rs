@@ -403,8 +403,9 @@ fn run(c: &mut Choices<'_>) {
     for _ in 0..c.byte() % 8 {
         match c.byte() % 8 {
             0 => {
-                let record = session.start();
-                let _ = session.note(&record);
+                if let Ok(record) = session.start() {
+                    let _ = session.note(&record);
+                }
             }
             1 | 2 => {
                 let mut updates = if c.one_in(2) { usize::MAX } else { c.size(0, 3) };
@@ -412,7 +413,7 @@ fn run(c: &mut Choices<'_>) {
                     updates = updates.saturating_sub(1);
                     updates > 0
                 });
-                if let Some((record, _)) = learnt {
+                if let Ok(Some((record, _))) = learnt {
                     let _ = session.note(&record);
                 }
             }

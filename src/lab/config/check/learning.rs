@@ -1,6 +1,7 @@
 //! `[learning]`: rule, batches, rates, and which state is kept.
 
 use super::{Select, TrainOn, one_a_layer, per_layer, positive, range, route, word, wrong};
+use crate::chip::layer::Optimiser;
 use crate::lab::config::ConfigError;
 use crate::lab::config::defaults::SetDefaults;
 use crate::lab::config::file::{LearningFile, MantissaFile};
@@ -30,6 +31,43 @@ impl Kind {
     }
 }
 
+/// What a rule is called for.
+#[derive(Clone, Copy)]
+pub(super) enum Named {
+    /// A rule by itself.
+    Rule(Rule),
+    /// The paper's seed rule.
+    Seeded,
+    /// Evolution, of policies.
+    Evolution,
+}
+
+/// `learning.rule`.
+pub(super) const RULES: [(&str, Named); 7] = [
+    ("ed", Named::Rule(Rule::Ed)),
+    ("ed_seed", Named::Seeded),
+    ("ed_non_dalean", Named::Rule(Rule::EdNonDalean)),
+    ("kaneko", Named::Rule(Rule::Kaneko)),
+    ("dfa", Named::Rule(Rule::Dfa)),
+    ("bp", Named::Rule(Rule::Bp)),
+    ("es", Named::Evolution),
+];
+/// `learning.mode`.
+pub(super) const MODES: [(&str, UpdateMode); 3] = [
+    ("accumulate", UpdateMode::Accumulate),
+    ("replay", UpdateMode::Replay),
+    ("online", UpdateMode::Online),
+];
+/// `learning.centre`.
+pub(super) const CENTRES: [(&str, Centre); 3] =
+    [("none", Centre::None), ("batch", Centre::Batch), ("running", Centre::Running)];
+/// `learning.decay`.
+pub(super) const DECAYS: [(&str, Decay); 3] =
+    [("cosine", Decay::Cosine), ("linear", Decay::Linear), ("constant", Decay::Constant)];
+/// `learning.optimiser`, but for what further keys say of it.
+const OPTIMISERS: [(&str, Optimiser); 2] =
+    [("plain", Optimiser::Plain), ("sign", Optimiser::Sign { dead_zone: false })];
+
 /// Checked numbers of `[learning]`.
 pub(super) struct Learning {
     pub(super) kind: Kind,
@@ -39,10 +77,31 @@ pub(super) struct Learning {
     pub(super) batch: Batch,
     pub(super) rates: Vec<Positive>,
     pub(super) decay: Decay,
+    pub(super) optimiser: Optimiser,
     pub(super) epochs: u32,
     pub(super) shift_pixels: u32,
     pub(super) train_on: TrainOn,
     pub(super) select: Select,
+}
+
+impl Learning {
+    /// What a network says that learns from no error.
+    pub(super) fn neutral() -> Self {
+        Self {
+            kind: Kind { rule: Rule::Ed, seeded: false },
+            mode: UpdateMode::Accumulate,
+            centre: Centre::None,
+            route: Some(Route::Modulo { taps: 1, shift: None }),
+            batch: Batch::new(1).expect("in range"),
+            rates: vec![],
+            decay: Decay::Constant,
+            optimiser: Optimiser::Plain,
+            epochs: 0,
+            shift_pixels: 0,
+            train_on: TrainOn::Train,
+            select: Select::Last,
+        }
+    }
 }
 
 /// Checks how a network of such hidden layers learns and writes defaults back.
@@ -51,24 +110,15 @@ pub(super) fn resolve(
     hidden: &[usize],
     defaults: &SetDefaults,
 ) -> Result<Learning, ConfigError> {
-    let seeded = file.rule.as_deref() == Some("ed_seed");
-    let rules = [
-        ("ed", Rule::Ed),
-        ("ed_seed", Rule::Ed),
-        ("ed_non_dalean", Rule::EdNonDalean),
-        ("kaneko", Rule::Kaneko),
-        ("dfa", Rule::Dfa),
-        ("bp", Rule::Bp),
-    ];
-    let kind = Kind { rule: word("learning.rule", &mut file.rule, "ed", &rules)?, seeded };
-    let centres = [("none", Centre::None), ("batch", Centre::Batch), ("running", Centre::Running)];
-    let modes = [
-        ("accumulate", UpdateMode::Accumulate),
-        ("replay", UpdateMode::Replay),
-        ("online", UpdateMode::Online),
-    ];
-    let mode = word("learning.mode", &mut file.mode, "accumulate", &modes)?;
-    let decays = [("cosine", Decay::Cosine), ("constant", Decay::Constant)];
+    let kind = match word("learning.rule", &mut file.rule, "ed", &RULES)? {
+        Named::Rule(rule) => Kind { rule, seeded: false },
+        Named::Seeded => Kind { rule: Rule::Ed, seeded: true },
+        Named::Evolution => {
+            let allowed = "evolution belongs to task = \"policy\": say that, or use ed, ed_seed, ed_non_dalean, kaneko, dfa or bp";
+            return Err(wrong("learning.rule", "is \"es\"", allowed));
+        }
+    };
+    let mode = word("learning.mode", &mut file.mode, "accumulate", &MODES)?;
     let (train_on, select) = selection(file, defaults)?;
     let batch = range("learning.batch", Batch::new(*file.batch.get_or_insert(defaults.batch)))?;
     file.rate.get_or_insert_with(|| defaults.rate_of(batch));
@@ -79,20 +129,43 @@ pub(super) fn resolve(
         (false, true) => "running",
         (false, false) => "batch",
     };
-    let centre = word("learning.centre", &mut file.centre, default, &centres)?;
+    let centre = word("learning.centre", &mut file.centre, default, &CENTRES)?;
     Ok(Learning {
         kind,
         mode,
         centre,
-        route: route::resolve(file, kind.rule, defaults)?,
+        route: route::resolve(file, kind.rule, defaults.taps)?,
         batch,
         rates: rates(file, hidden, defaults)?,
-        decay: word("learning.decay", &mut file.decay, "cosine", &decays)?,
+        decay: word("learning.decay", &mut file.decay, "cosine", &DECAYS)?,
+        optimiser: optimiser(file, "plain", false)?,
         epochs: *file.epochs.get_or_insert(defaults.epochs),
         shift_pixels: *file.shift_pixels.get_or_insert(0),
         train_on,
         select,
     })
+}
+
+/// What makes requests of sums, with keys that belong to one of them.
+pub(super) fn optimiser(
+    file: &mut LearningFile,
+    default: &str,
+    dead_zone: bool,
+) -> Result<Optimiser, ConfigError> {
+    match word("learning.optimiser", &mut file.optimiser, default, &OPTIMISERS)? {
+        Optimiser::Sign { .. } => {
+            let dead_zone = *file.dead_zone.get_or_insert(dead_zone);
+            Ok(Optimiser::Sign { dead_zone })
+        }
+        other => match file.dead_zone {
+            None => Ok(other),
+            Some(found) => {
+                let allowed = "it belongs to optimiser = \"sign\": take the key out (--set learning.dead_zone=default), or \
+                               choose that optimiser";
+                Err(wrong("learning.dead_zone", format!("is {found}"), allowed))
+            }
+        },
+    }
 }
 
 /// Rate times multiplier, of each layer.
@@ -105,6 +178,12 @@ fn rates(
     let rate = positive("learning.rate", *file.rate.get_or_insert(defaults.rate))?;
     file.rate_multipliers.get_or_insert_with(|| defaults.multipliers(hidden));
     let factors = per_layer(KEY, &mut file.rate_multipliers, 1.0, hidden.len() + 1)?;
+    products(rate, factors)
+}
+
+/// Rate times multiplier.
+pub(super) fn products(rate: Positive, factors: Vec<f64>) -> Result<Vec<Positive>, ConfigError> {
+    const KEY: &str = "learning.rate_multipliers";
     let rates = factors.into_iter().map(|factor| {
         let product = rate.times(positive(KEY, factor)?);
         product.ok_or_else(|| wrong(KEY, "times the rate is out of range", "keep it in 1e-6..=1e6"))

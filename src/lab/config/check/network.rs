@@ -1,7 +1,7 @@
 //! `[network]`: units and what they are made of.
 
 use super::learning::Kind;
-use super::{per_layer, positive, word, wrong};
+use super::{Bias, per_layer, positive, word, wrong};
 use crate::lab::config::ConfigError;
 use crate::lab::config::defaults::SetDefaults;
 use crate::lab::config::file::NetworkFile;
@@ -12,9 +12,21 @@ use crate::num::tables::Activation;
 pub(super) struct Network {
     pub(super) activations: Vec<Activation>,
     pub(super) weight_max_log2: Vec<i32>,
-    pub(super) bias_rows: bool,
+    pub(super) bias: Bias,
     pub(super) gain_64ths: [[u32; 2]; 2],
 }
+
+/// `network.bias`.
+pub(super) const BIASES: [(&str, Bias); 3] =
+    [("none", Bias::None), ("input_row", Bias::InputRow), ("rows", Bias::Rows)];
+
+/// `network.activation`: nothing for a sigmoid, which has a width.
+pub(super) const ACTIVATIONS: [(&str, Option<Activation>); 4] = [
+    ("sigmoid", None),
+    ("relu", Some(Activation::Relu)),
+    ("identity", Some(Activation::Identity)),
+    ("rms", Some(Activation::Rms)),
+];
 
 /// Checks a network of so many layers and writes defaults back.
 pub(super) fn resolve(
@@ -23,9 +35,11 @@ pub(super) fn resolve(
     kind: Kind,
     defaults: &SetDefaults,
 ) -> Result<Network, ConfigError> {
-    let biases = [("none", false), ("rows", true)];
-    let bias_rows = word("network.bias", &mut file.bias, "none", &biases)?;
-    word("network.readout", &mut file.readout, "p", &[("p", ())])?;
+    let bias = word("network.bias", &mut file.bias, "none", &BIASES)?;
+    if word("network.readout", &mut file.readout, "p", &[("p", false), ("p-n", true)])? {
+        let allowed = "classes are told apart by the p stream: use \"p\", or task = \"policy\"";
+        return Err(wrong("network.readout", "is \"p-n\"", allowed));
+    }
     let gain = if kind.is_symmetric() { [1.0, 1.0] } else { [1.5, 0.5] };
     let gain_64ths = [
         gains("network.init_gain", *file.init_gain.get_or_insert(gain))?,
@@ -34,7 +48,7 @@ pub(super) fn resolve(
     Ok(Network {
         activations: activations(file, layers, kind, defaults)?,
         weight_max_log2: weights(file, layers, defaults)?,
-        bias_rows,
+        bias,
         gain_64ths,
     })
 }
@@ -48,12 +62,7 @@ fn activations(
 ) -> Result<Vec<Activation>, ConfigError> {
     let alpha = if kind.seeded { 1.0 } else { defaults.alpha };
     let alphas = per_layer("network.alpha", &mut file.alpha, alpha, layers)?;
-    let names = [
-        ("sigmoid", None),
-        ("relu", Some(Activation::Relu)),
-        ("identity", Some(Activation::Identity)),
-    ];
-    let hidden = word("network.activation", &mut file.activation, "sigmoid", &names)?;
+    let hidden = word("network.activation", &mut file.activation, "sigmoid", &ACTIVATIONS)?;
     let layers = alphas.into_iter().enumerate().map(|(layer, alpha)| match hidden {
         Some(activation) if layer + 1 < layers => Ok(activation),
         _ => positive("network.alpha", alpha).map(Activation::Sigmoid),
@@ -68,6 +77,11 @@ fn weights(
 ) -> Result<Vec<i32>, ConfigError> {
     let weights =
         per_layer("network.weight_max", &mut file.weight_max, defaults.weight_max, layers)?;
+    logarithms(weights)
+}
+
+/// `log2` of weights that are powers of two.
+pub(super) fn logarithms(weights: Vec<f64>) -> Result<Vec<i32>, ConfigError> {
     let log2 = weights.into_iter().map(|weight| {
         let exact = WEIGHT_MAX_LOG2.into_iter().find(|&log2| f64::from(log2).exp2() == weight);
         exact.ok_or_else(|| {

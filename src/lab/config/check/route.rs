@@ -2,7 +2,6 @@
 
 use super::{word, wrong};
 use crate::lab::config::ConfigError;
-use crate::lab::config::defaults::SetDefaults;
 use crate::lab::config::file::LearningFile;
 use crate::learn::route::Route;
 use crate::learn::rule::Rule;
@@ -11,7 +10,7 @@ use crate::learn::rule::Rule;
 pub(super) fn resolve(
     file: &mut LearningFile,
     rule: Rule,
-    defaults: &SetDefaults,
+    taps: usize,
 ) -> Result<Option<Route>, ConfigError> {
     if rule == Rule::Bp && file.route.is_none() {
         no_taps(file, "rule = \"bp\" has no route")?;
@@ -26,7 +25,7 @@ pub(super) fn resolve(
     ];
     let route = word("learning.route", &mut file.route, default, &names)?;
     if let Route::Modulo { .. } = route {
-        let taps = *file.taps.get_or_insert(defaults.taps);
+        let taps = *file.taps.get_or_insert(taps);
         return Ok(Some(Route::Modulo { taps, shift: file.tap_shift }));
     }
     let name = file.route.as_deref().unwrap_or(default);

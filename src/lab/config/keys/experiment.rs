@@ -2,7 +2,10 @@
 
 use super::KeyFileKind::Experiment;
 use super::{KeyEntry, KeyTable, flag, key, other, real, whole, words};
-use crate::lab::config::file::{DataFile, ExperimentFile, LearningFile, NetworkFile};
+use crate::lab::config::file::{
+    DataFile, EnvironmentFile, EvaluationFile, EvolutionFile, ExperimentFile, LearningFile,
+    NetworkFile, PpoFile,
+};
 use crate::lab::config::keys::KeyValues;
 
 pub(super) const TABLES: &[KeyTable] = &[
@@ -34,14 +37,58 @@ pub(super) const TABLES: &[KeyTable] = &[
         meanings: LearningFile::MEANINGS,
         entries: LEARNING,
     },
+    KeyTable {
+        path: "environment",
+        file: Experiment,
+        about: "What a policy acts on, and for how long.",
+        meanings: EnvironmentFile::MEANINGS,
+        entries: ENVIRONMENT,
+    },
+    KeyTable {
+        path: "ppo",
+        file: Experiment,
+        about: "Proximal policy optimisation.",
+        meanings: PpoFile::MEANINGS,
+        entries: PPO,
+    },
+    KeyTable {
+        path: "es",
+        file: Experiment,
+        about: "Antithetic evolution strategies with ranks.",
+        meanings: EvolutionFile::MEANINGS,
+        entries: EVOLUTION,
+    },
+    KeyTable {
+        path: "evaluation",
+        file: Experiment,
+        about: "Episodes of a policy that are read without learning.",
+        meanings: EvaluationFile::MEANINGS,
+        entries: EVALUATION,
+    },
 ];
 
+/// Settings that keys of policies stand beside.
+const POLICY: &[&str] = &["task=policy"];
+const ON_POLICY: &str = "with task = \"policy\"";
+const CONTINUOUS: &[&str] = &["task=policy", "environment.id=Pendulum-v1"];
+const ON_CONTINUOUS: &str = "with task = \"policy\" and an environment that takes numbers";
+const BY_EVOLUTION: &[&str] = &["task=policy", "learning.rule=es"];
+const ON_EVOLUTION: &str = "with task = \"policy\" and rule = \"es\"";
+
 const ROOT: &[KeyEntry] = &[
-    words("task", &[("classify", "examples with labels")]).default("\"classify\""),
+    words(
+        "task",
+        &[("classify", "examples with labels"), ("policy", "a policy, by what comes of acting")],
+    )
+    .default("\"classify\""),
     whole("seed", 0, i64::MAX).default("1"),
     other("data", "a table"),
     other("network", "a table"),
     other("learning", "a table"),
+    other("environment", "a table").only(ON_POLICY, POLICY),
+    other("ppo", "a table").only("with task = \"policy\" and another rule than \"es\"", POLICY),
+    other("es", "a table").only(ON_EVOLUTION, BY_EVOLUTION),
+    other("evaluation", "a table").only(ON_POLICY, POLICY),
     other("hw", "a table, or the name of a built-in model").otherwise("`hw.model` says which"),
 ];
 
@@ -129,35 +176,78 @@ const DATA: &[KeyEntry] = &[
 ];
 
 const NETWORK: &[KeyEntry] = &[
-    other("hidden", "a list of whole numbers, each 1..=65535").unit("units").default("[256]"),
+    other("hidden", "a list of whole numbers, each 1..=65535")
+        .unit("units")
+        .default("[256]")
+        .otherwise("[64, 64] with task = \"policy\""),
+    other("critic_hidden", "a list of whole numbers, each 1..=65535")
+        .unit("units")
+        .default("[64, 64]")
+        .otherwise("those of `hidden`")
+        .law("as many as `hidden` has; not with rule = \"es\"")
+        .only(ON_POLICY, POLICY),
     whole("outputs", 1, 65_535)
         .unit("units")
         .law("the number of classes, or 1 for two classes")
-        .otherwise("the number of classes; 1 with rule = \"kaneko\""),
+        .otherwise("the number of classes; 1 with rule = \"kaneko\"; policies have one an action"),
+    words(
+        "input",
+        &[
+            ("split", "two rows a number: what is above 0, and what is below"),
+            ("offset", "one row a number, half the scale added; needs a constant row"),
+        ],
+    )
+    .default("\"split\"")
+    .otherwise("lines that are on or off need none")
+    .only("with task = \"policy\" and an environment that shows numbers", POLICY),
     words(
         "activation",
         &[
             ("sigmoid", "1 / (1 + exp(-2z / alpha))"),
             ("relu", "max(z, 0)"),
             ("identity", "z, cut off at 0 and 1"),
+            ("rms", "max(z, 0) over its root mean square in the layer and stream"),
         ],
     )
-    .default("\"sigmoid\""),
+    .default("\"sigmoid\"")
+    .otherwise("\"rms\" with task = \"policy\""),
     real("alpha", 1e-6, 1e6)
         .layers()
         .default("4.0")
-        .otherwise("6.0 with other data than the built-in digits; 1.0 with rule = \"ed_seed\""),
+        .otherwise("6.0 with other data than the built-in digits and with policies, which have it with activation = \"sigmoid\" alone; \
+             1.0 with rule = \"ed_seed\"",
+        ),
     key("weight_max", KeyValues::Lawful(1.0 / 256.0, 256.0, "a power of two"))
         .layers()
         .default("2.0")
-        .otherwise("4.0 with other data than the built-in digits"),
-    words("bias", &[("none", "no bias"), ("rows", "a constant row in each array")])
-        .default("\"none\""),
-    words("readout", &[("p", "outputs are the p stream's activities")]).default("\"p\""),
+        .otherwise(
+            "4.0 with other data than the built-in digits; 0.5, and 0.25 in the output layer, with task = \"policy\"",
+        ),
+    words(
+        "bias",
+        &[
+            ("none", "no bias"),
+            ("input_row", "a constant row in the array that reads data"),
+            ("rows", "a constant row in each array"),
+        ],
+    )
+    .default("\"none\"")
+    .otherwise("\"input_row\" with task = \"policy\""),
+    words(
+        "readout",
+        &[
+            ("p", "outputs are the p stream's activities"),
+            ("p-n", "outputs are sums, p less n, of policies alone"),
+        ],
+    )
+    .default("\"p\"")
+    .otherwise("\"p-n\" with task = \"policy\""),
     other("init_gain", "two multiples of 1/64, up to 16")
         .default("[1.5, 0.5]")
-        .otherwise("[1.0, 1.0] with rule = \"ed_seed\", \"dfa\" or \"bp\""),
-    other("init_gain_output", "two multiples of 1/64, up to 16").default("[1.0, 1.0]"),
+        .otherwise("[1.0, 1.0] with rule = \"ed_seed\", \"dfa\" or \"bp\"; policies start with an absolute Gaussian"),
+    other("init_gain_output", "two multiples of 1/64, up to 16")
+        .default("[1.0, 1.0]")
+        .otherwise("policies start with an absolute Gaussian"),
 ];
 
 const LEARNING: &[KeyEntry] = &[
@@ -167,20 +257,22 @@ const LEARNING: &[KeyEntry] = &[
             ("ed", "error diffusion under Dale's law"),
             ("ed_seed", "the same as the paper's seed rule: width 1, raw errors, symmetric gains"),
             ("ed_non_dalean", "error diffusion on pathways of differential pairs: what Dale's law costs"),
+            ("ed_non_dalean", "the same on differential pairs in two populations: what Dale's law costs"),
             ("kaneko", "Kaneko's original, which only potentiates: one output, two classes"),
             ("dfa", "direct feedback alignment on differential pairs"),
             ("bp", "back-propagation on differential pairs, by transposed reads"),
+            ("es", "evolution strategies, of policies alone: candidates in pairs, ranked"),
         ],
     )
     .default("\"ed\""),
     whole("epochs", 0, 4_294_967_295)
         .unit("epochs")
         .default("40")
-        .otherwise("20 with other data than the built-in digits"),
+        .otherwise("20 with other data than the built-in digits; of policies environment.steps says it"),
     whole("batch", 1, 4096)
         .unit("samples")
         .default("16")
-        .otherwise("32 with other data than the built-in digits"),
+        .otherwise("32 with other data than the built-in digits; 256 with task = \"policy\""),
     words(
         "mode",
         &[
@@ -190,12 +282,27 @@ const LEARNING: &[KeyEntry] = &[
         ],
     )
     .default("\"accumulate\""),
+    words(
+        "optimiser",
+        &[
+            ("plain", "the sum over the batch, shifted"),
+            ("sign", "one pulse in the direction of the sum, by chance"),
+        ],
+    )
+    .default("\"plain\"")
+    .otherwise("\"sign\" with task = \"policy\""),
+    flag("dead_zone")
+        .default("false")
+        .otherwise("true with task = \"policy\"")
+        .only("with optimiser = \"sign\"", &["learning.optimiser=sign"]),
+    flag("centred").default("true").only(ON_POLICY, POLICY),
     real("rate", 1e-6, 1e6).default("18.0").otherwise(
-        "20.0 with other data than the built-in digits; with a batch below the default one less, in proportion",
+        "20.0 with other data than the built-in digits; with a batch below the default one less, in proportion; 0.25 with \
+         task = \"policy\"",
     ),
     real("rate_multipliers", 1e-6, 1e6).layers().default("[1.0, 0.25]").otherwise(
         "1 in every layer, 0.25 in the last one of the built-in digits (1.0 with other data); behind more than 256 \
-         hidden units times 256 / units",
+         hidden units times 256 / units; 2.0 in the last one of policies",
     ),
     whole("rate_mantissa", 1, 15)
         .layers()
@@ -203,9 +310,14 @@ const LEARNING: &[KeyEntry] = &[
         .law("or `auto`: in each layer the one whose rate comes nearest"),
     words(
         "decay",
-        &[("cosine", "falls to 0 over the run as half a cosine"), ("constant", "stays")],
+        &[
+            ("cosine", "falls to 0 over the run as half a cosine"),
+            ("linear", "falls to 0 over the run in a straight line"),
+            ("constant", "stays"),
+        ],
     )
-    .default("\"cosine\""),
+    .default("\"cosine\"")
+    .otherwise("\"linear\" with task = \"policy\""),
     words(
         "centre",
         &[
@@ -216,7 +328,8 @@ const LEARNING: &[KeyEntry] = &[
     )
     .default("\"batch\"")
     .otherwise(
-        "\"running\" with a batch of one or mode = \"online\"; \"none\" with rule = \"kaneko\" or \"ed_seed\"",
+        "\"running\" with a batch of one or mode = \"online\"; \"none\" with rule = \"kaneko\" or \"ed_seed\", and of \
+         policies",
     ),
     words(
         "route",
@@ -262,7 +375,54 @@ const LEARNING: &[KeyEntry] = &[
         ],
     )
     .default("\"last\"")
-    .otherwise("\"best_validation\" with other data than the built-in digits, unless train_on = \"all\""),
+    .otherwise(
+        "\"best_validation\" with other data than the built-in digits, unless train_on = \"all\"; policies have the last",
+    ),
     #[cfg(feature = "grown")]
     whole("grown", i64::MIN, i64::MAX).default("0"),
+];
+
+const ENVIRONMENT: &[KeyEntry] = &[
+    other("id", "the name of an environment, such as Acrobot-v1; a wrong one is answered with all there are")
+    .default("\"CartPole-v1\"")
+    .only(ON_POLICY, POLICY),
+    whole("count", 1, 1024).default("16").only(ON_POLICY, POLICY),
+    whole("steps", 1, 1 << 40).unit("steps").default("500000").only(ON_POLICY, POLICY),
+    whole("horizon", 1, 65_536)
+        .unit("steps")
+        .default("128")
+        .law("times `count` at most 4194304")
+        .only(ON_POLICY, POLICY),
+    whole("rollouts", 1, 4_294_967_295)
+        .default("5")
+        .otherwise("so many that a run has about 50 epochs")
+        .only(ON_POLICY, POLICY),
+];
+
+const PPO: &[KeyEntry] = &[
+    whole("passes", 1, 1000).default("10").only(ON_POLICY, POLICY),
+    other("gamma", "a number, 0 to 1")
+        .default("0.99")
+        .otherwise("0.95 of Pendulum-v1")
+        .only(ON_POLICY, POLICY),
+    other("lambda", "a number, 0 to 1").default("0.95").only(ON_POLICY, POLICY),
+    real("clip", 1e-3, 1.0).default("0.2").only(ON_POLICY, POLICY),
+    other("entropy", "a number, 0 to 1")
+        .default("0.01")
+        .otherwise("0.0 where actions are numbers")
+        .only(ON_POLICY, POLICY),
+    other("log_sigma", "a number, -4 to 1").default("-0.5").only(ON_CONTINUOUS, CONTINUOUS),
+    other("log_sigma_rate", "a number, 0 to 1").default("0.01").only(ON_CONTINUOUS, CONTINUOUS),
+];
+
+const EVOLUTION: &[KeyEntry] = &[
+    whole("pairs", 1, 4096).default("32").only(ON_EVOLUTION, BY_EVOLUTION),
+    whole("step", 1, 4095).unit("levels").default("4").only(ON_EVOLUTION, BY_EVOLUTION),
+    whole("shift", 0, 30).unit("bits").default("4").only(ON_EVOLUTION, BY_EVOLUTION),
+];
+
+const EVALUATION: &[KeyEntry] = &[
+    whole("episodes", 1, 10_000).default("8").only(ON_POLICY, POLICY),
+    whole("final_episodes", 1, 10_000).default("100").only(ON_POLICY, POLICY),
+    flag("deterministic").default("true").only(ON_POLICY, POLICY),
 ];

@@ -82,7 +82,7 @@ const SAMPLE: &[KeyEntry] = &[
 
 const REPORT: &[KeyEntry] = &[
     other("x", "an axis").otherwise("the first axis of numbers"),
-    other("y", "a result").otherwise("`test_accuracy`"),
+    other("y", "a result").otherwise("`test_accuracy`; `return_mean` of policies"),
     other("series", "an axis").otherwise("the first other axis of few values"),
     other("panel", "an axis").otherwise("the next one"),
     other("heat", "two axes").otherwise("abscissa and series"),

@@ -106,7 +106,8 @@ mod tests {
                 "energy.cell_read energy.cell_load energy.cell_pulse energy.row_pulse power.laser power.heater area.cell",
                 "energy.dac_slice energy.hold energy.conversion energy.verify_read power.receiver area.adc area.dac",
                 "energy.shift_add energy.look_up energy.multiply energy.bus_word energy.accumulate energy.delta \
-                 energy.sram_bit area.tile",
+                 energy.sram_bit energy.square energy.root energy.scaling energy.row_mean energy.sum_square \
+                 energy.optimiser_step area.tile",
                 "power.static power.tile_static",
             ]
         );

@@ -117,12 +117,13 @@ impl Chart {
         epochs.sort_by(f64::total_cmp);
         epochs.dedup();
         let stride = epochs.len().div_ceil(BANDS_MAX).max(1);
+        let unit = self.unit;
         let bands = epochs.into_iter().step_by(stride).map(|epoch| {
             let values = all.iter().filter_map(|one| {
                 let at = one.points.iter().find(|point| point.0 == epoch)?;
                 Some(format!("\n{} {}", one.name, show(at.1)))
             });
-            (epoch, format!("epoch {epoch:.0}{}", values.collect::<String>()))
+            (epoch, format!("{unit} {epoch:.0}{}", values.collect::<String>()))
         });
         let bands: Vec<_> = bands.collect();
         self.tips(&bands);

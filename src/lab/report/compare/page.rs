@@ -12,7 +12,7 @@ use crate::lab::report::number::{
 };
 use crate::lab::report::page::Sheet;
 use crate::lab::report::scale::Axis;
-use crate::lab::store::record::{EpochRecord, Score};
+use crate::lab::store::record::{EpochRecord, PolicyTest, Score, TestOutcome, TestRecord};
 use crate::lab::table::ColumnUnit;
 
 /// Runs drawn at most: more colours are not told apart.
@@ -23,6 +23,7 @@ const DRAWN: usize = 8;
 pub fn html(comparison: &Comparison, version: &str) -> String {
     let figures = [
         accuracy(comparison),
+        returns(comparison),
         results(comparison),
         keys(comparison),
         balance(comparison),
@@ -58,12 +59,19 @@ fn share(score: Option<Score>) -> Option<f64> {
 fn header(comparison: &Comparison) -> String {
     let card = |(at, run): (usize, &ComparedRun)| {
         let last = run.records.last();
-        let big = match run.test {
-            Some((score, epoch)) => format!(
+        let big = match &run.test {
+            Some(TestOutcome::Classify(TestRecord { score, epoch, .. })) => format!(
                 "<div class=\"value\">{}</div><div class=\"note\">test accuracy, {} of {} right, state after epoch {epoch}</div>",
-                share(Some(score)).map_or("–".into(), |share| percent(share, 2)),
+                share(Some(*score)).map_or("–".into(), |share| percent(share, 2)),
                 count(score.correct),
                 count(score.total)
+            ),
+            Some(TestOutcome::Policy(PolicyTest { episodes, epoch, .. })) => format!(
+                "<div class=\"value\">{}</div><div class=\"note\">mean return of {} {} episodes, state after epoch \
+                 {epoch}</div>",
+                episodes.mean().map_or("–".into(), significant),
+                count(episodes.episodes()),
+                episodes.played()
             ),
             None => format!(
                 "<div class=\"value\">–</div><div class=\"note\">not tested: {} after epoch {} of {}</div>",
@@ -178,6 +186,31 @@ fn accuracy(comparison: &Comparison) -> Option<Figure> {
         title: "Accuracy over epochs",
         caption: "After each epoch, a line a run; epoch 0, before the first update, is left out. While learning: \
                   answers given before their example was learnt from."
+            .into(),
+        body: format!("<div class=\"multiples\">{body}</div>"),
+    })
+}
+
+fn returns(comparison: &Comparison) -> Option<Figure> {
+    let evaluated = lines(comparison, |record| record.policy()?.evaluation.mean());
+    let learning = lines(comparison, |record| record.policy()?.episodic_return);
+    let drawn = |all: &[Series], alt: &str| {
+        let values = || all.iter().flat_map(|one| &one.points).map(|point| point.1);
+        let (low, high) = (values().reduce(f64::min)?, values().reduce(f64::max)?);
+        let room = (0.06 * (high - low)).max(0.5);
+        chart(all, Axis::round(low - room, high + room, "return"), alt, significant)
+    };
+    let body = [
+        multiple("Without learning", drawn(&evaluated, "Return without learning over epochs")),
+        multiple("While learning", drawn(&learning, "Return while learning over epochs")),
+    ]
+    .concat();
+    (!body.is_empty()).then(|| Figure {
+        wide: true,
+        id: "returns",
+        title: "Returns over epochs",
+        caption: "Mean return of episodes, a line a run: of those played after an epoch without learning, and of those that \
+                  ended in it while learning."
             .into(),
         body: format!("<div class=\"multiples\">{body}</div>"),
     })

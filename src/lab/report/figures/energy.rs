@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use super::{Figure, per_epoch, span};
 use crate::lab::config::Kind;
-use crate::lab::price::{Cost, EnergySplit, EnergyTotal, Group, prefixed};
+use crate::lab::price::{Cost, EnergySplit, EnergyTotal, Group, PieceKind, prefixed};
 use crate::lab::report::RunView;
 use crate::lab::report::chart::{Chart, Series};
 use crate::lab::report::number::{count, escape, float, percent, place, share, size};
@@ -70,7 +70,7 @@ pub(super) fn draw(view: &RunView<'_>) -> Option<Figure> {
         ),
         body: format!(
             "{}<div class=\"halves\"><div>{}{left}</div><div>{}{right}</div></div>",
-            images(cost),
+            pieces(cost),
             lines(view, cost),
             constants(cost)
         ),
@@ -84,8 +84,8 @@ fn of_class(split: &EnergySplit) -> Group {
     Group { name: format!("{}{least}", split.class.name()), joules: split.total.joules }
 }
 
-/// What an image takes.
-fn images(cost: &Cost) -> String {
+/// What an image takes, or an update and a decision.
+fn pieces(cost: &Cost) -> String {
     let mut rows = String::new();
     let classes: Vec<_> = cost.split.iter().map(|split| split.class).collect();
     let joules = |total: &EnergyTotal| match (total.priced, total.whole()) {
@@ -93,12 +93,12 @@ fn images(cost: &Cost) -> String {
         (_, Some(joules)) => prefixed(joules[1], "J"),
         (_, None) => format!("≥ {}", prefixed(total.joules[1], "J")),
     };
-    for one in &cost.per_image {
+    for one in &cost.per_piece {
         let _ = write!(
             rows,
             "<tr><th scope=\"row\">to {}</th><td>{}</td><td>{}</td><td><b>{}</b></td>",
             one.doing(),
-            count(one.images),
+            count(one.count),
             one.seconds.map_or("–".into(), |seconds| prefixed(seconds, "s")),
             joules(&one.total)
         );
@@ -113,9 +113,12 @@ fn images(cost: &Cost) -> String {
         return rows;
     }
     let heads = classes.iter().map(|class| format!("<th scope=\"col\">{}</th>", class.name()));
+    let of_images = cost.per_piece.iter().all(|one| one.kind == PieceKind::Image);
+    let [takes, pieces] =
+        if of_images { ["An image takes", "images"] } else { ["It takes", "how often"] };
     format!(
-        "<div class=\"scroll\"><table class=\"stack\"><thead><tr><th scope=\"col\">An image takes</th>\
-         <th scope=\"col\">images</th><th scope=\"col\">time</th><th scope=\"col\">energy</th>{}</tr></thead>\
+        "<div class=\"scroll\"><table class=\"stack\"><thead><tr><th scope=\"col\">{takes}</th>\
+         <th scope=\"col\">{pieces}</th><th scope=\"col\">time</th><th scope=\"col\">energy</th>{}</tr></thead>\
          <tbody>{rows}</tbody></table></div>",
         heads.collect::<String>()
     )

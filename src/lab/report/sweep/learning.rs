@@ -1,4 +1,4 @@
-//! Right answers over epochs: what the runs of a setting knew after each, their mean and its interval.
+//! Right answers over epochs, or returns of a policy: what the runs of a setting knew after each, their mean and its interval.
 
 use std::collections::BTreeMap;
 
@@ -19,12 +19,14 @@ const EPOCHS_MAX: usize = 60;
 /// Lines drawn on paper at most.
 const LINES_MAX: usize = 8;
 
-/// Right answers over epochs, by row of the table.
+/// Right answers over epochs, or returns, by row of the table.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Learning {
     /// What the answers are, such as `validation accuracy`.
     pub label: String,
-    /// Epoch and share of right answers, in order; empty where a run has none or was not read.
+    /// Whether they are shares of a whole, shown in percent; returns are shown as they are.
+    pub shares: bool,
+    /// Epoch and share or return, in order; empty where a run has none or was not read.
     pub rows: Vec<Vec<(u32, f64)>>,
 }
 
@@ -85,7 +87,7 @@ pub(super) fn data(settings: &Settings<'_>) -> Value {
         })
     };
     let all: Vec<_> = settings.groups.iter().map(of).collect();
-    json!({"label": learning.label, "epochs": epochs, "settings": all})
+    json!({"label": learning.label, "shares": learning.shares, "epochs": epochs, "settings": all})
 }
 
 /// The axis whose values are the curves: that of the curves of the result, or its abscissa.
@@ -122,21 +124,24 @@ pub(super) fn draw(settings: &Settings<'_>) -> Option<String> {
         })
         .take(LINES_MAX)
         .collect();
-    let values = || lines.iter().flat_map(|(_, points)| points).map(|(_, one)| 100.0 * one.mean);
+    let by = if learning.shares { 100.0 } else { 1.0 };
+    let ends = if learning.shares { (0.0, 100.0) } else { (f64::MIN, f64::MAX) };
+    let values = || lines.iter().flat_map(|(_, points)| points).map(|(_, one)| by * one.mean);
     let (low, high) = (values().reduce(f64::min)?, values().reduce(f64::max)?);
     let key = series.map_or(12.0, |axis| {
         let texts = axis.texts.iter().take(LINES_MAX).map(|text| wide(&short(text)));
         texts.fold(wide(&short(&axis.axis.label)), f64::max) + 60.0
     });
     let width = COLUMN + key - 12.0;
-    let title = format!("{} (%)", learning.label);
-    let y = Axis::round((low - 2.0).max(0.0), (high + 2.0).min(100.0), &title);
+    let unit = if learning.shares { " (%)" } else { "" };
+    let title = format!("{}{unit}", learning.label);
+    let y = Axis::round((low - 2.0).max(ends.0), (high + 2.0).min(ends.1), &title);
     let mut chart = Chart::framed([width, 300.0], [12.0, key], Axis::epochs(first, last), y);
     let pooled = held.iter().any(|(_, value)| value.is_none());
     for (at, points) in &lines {
         let band = points.iter().filter_map(|(epoch, one)| {
             let half = one.half.filter(|_| !pooled)?;
-            let end = |value: f64| (100.0 * value).clamp(0.0, 100.0);
+            let end = |value: f64| (by * value).clamp(ends.0, ends.1);
             Some((*epoch, end(one.mean - half), end(one.mean + half)))
         });
         let band: Vec<_> = band.collect();
@@ -145,7 +150,7 @@ pub(super) fn draw(settings: &Settings<'_>) -> Option<String> {
         }
     }
     for (at, points) in &lines {
-        let points: Vec<_> = points.iter().map(|(epoch, one)| (*epoch, 100.0 * one.mean)).collect();
+        let points: Vec<_> = points.iter().map(|(epoch, one)| (*epoch, by * one.mean)).collect();
         chart.line(&points, hue(*at), "line", *at);
     }
     if let Some(axis) = series {

@@ -158,14 +158,17 @@ impl<'a> Settings<'a> {
     }
 
     /// What settings are chosen by where a result is asked for: the validation set in place of the test set, which is
-    /// read and never chosen by.
+    /// read and never chosen by; of policies, episodes after the last epoch in place of those of the final test.
     pub(super) fn chooser<'m>(&self, measure: Measure<'m>) -> Measure<'m>
     where
         'a: 'm,
     {
-        let instead = (measure.column.name == "test_accuracy")
-            .then(|| self.measure("validation_accuracy").filter(|other| other.ends.is_some()));
-        instead.flatten().unwrap_or(measure)
+        let instead = match &*measure.column.name {
+            "test_accuracy" => self.measure("validation_accuracy"),
+            "return_mean" => self.measure("return_evaluated"),
+            _ => None,
+        };
+        instead.filter(|other| other.ends.is_some()).unwrap_or(measure)
     }
 
     /// The setting with the best mean of its [`Settings::chooser`] among those with most runs, and the numbers of that.

@@ -227,8 +227,11 @@ fn figures_for_papers_stand_alone() {
 fn learning_curves_are_drawn_where_records_have_several_epochs() {
     let mut sample = Sample::new();
     let climb = |row: usize| vec![(0, 0.1), (1, 0.4 + 0.01 * row as f64), (2, 0.8)];
-    sample.learning =
-        Learning { label: "validation accuracy".into(), rows: (0..12).map(climb).collect() };
+    sample.learning = Learning {
+        label: "validation accuracy".into(),
+        shares: true,
+        rows: (0..12).map(climb).collect(),
+    };
     let drawn = figures(&sample.view());
     let learning = drawn.iter().find(|figure| figure.name == "learning").unwrap();
     assert!(learning.svg.contains("validation accuracy (%)") && learning.svg.contains("epoch"));

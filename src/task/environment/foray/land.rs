@@ -9,7 +9,7 @@
 //! ```
 //!
 //! What was drawn needs nobody to check it: bench and vault stand where they and the lake can enclose nothing, and all
-//! else gives way. Draws are 32-bit words, `floor(n word / 2^32)` a number below `n`. See docs/MODEL.md, 5.
+//! else gives way. Draws are 32-bit words, `floor(n word / 2^32)` a number below `n`. See docs/MODEL.md, 5.4.
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
 use crate::chip::ledger::coded;

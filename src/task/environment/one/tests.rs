@@ -256,3 +256,51 @@ proptest! {
         }
     }
 }
+
+/// From any state within its parts, an environment that is not over stays within them.
+fn stays_within<E: Environment>(words: &mut impl Iterator<Item = u32>) {
+    let parts: Vec<StatePart> = E::parts().into_iter().flat_map(singles).collect();
+    let numbers: Vec<i64> = parts
+        .iter()
+        .map(|part| {
+            let (least, most) = (*part.within.start(), *part.within.end());
+            let [word, share] = [words.next().unwrap(), words.next().unwrap()];
+            // an end now and then
+            match word % 8 {
+                0 => least,
+                1 => most,
+                _ => least + (i128::from(most - least) * i128::from(share) >> 32) as i64,
+            }
+        })
+        .collect();
+    let mut one = E::from_numbers(&numbers);
+    for _ in 0..20 {
+        let (choices, reals) = drawn(E::spec().taken, 1, words);
+        let came = one.act(match E::spec().taken {
+            Taken::Discrete(_) => Action::Discrete(choices[0]),
+            Taken::Continuous(_) => Action::Continuous(&reals),
+        });
+        one.show(&mut Observations::default());
+        assert!(!one.picture().is_empty());
+        if came.terminated {
+            return;
+        }
+        let mut after = vec![];
+        one.numbers(&mut after);
+        for (part, number) in parts.iter().zip(&after) {
+            assert!(part.within.contains(number), "{} {number} from {numbers:?}", part.name);
+        }
+    }
+}
+
+proptest! {
+    #[test]
+    fn no_state_leads_out_of_its_parts(seed: u64) {
+        let mut words = Place::global(seed, Site::Environment, 0).words();
+        stays_within::<crate::task::environment::cart_pole::CartPole>(&mut words);
+        stays_within::<crate::task::environment::acrobot::Acrobot>(&mut words);
+        stays_within::<crate::task::environment::pendulum::Pendulum>(&mut words);
+        stays_within::<crate::task::environment::mountain_car::MountainCar>(&mut words);
+        stays_within::<crate::task::environment::foray::Foray>(&mut words);
+    }
+}

@@ -196,7 +196,7 @@ impl Tile {
             asked = rounded;
             pulses = asked.clamp(-max, max);
         } else {
-            // level and remainder are clamped as one number: docs/MODEL.md, 5
+            // level and remainder are clamped as one number: docs/MODEL.md, 8
             let sum = self.residual[bank][at] + rounded;
             asked = sum >> fraction;
             pulses = asked.clamp(-max, max);
