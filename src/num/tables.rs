@@ -19,13 +19,13 @@ mod gaussian;
 mod policy;
 #[cfg(test)]
 pub(crate) mod precise;
+mod unit;
 
 pub use gaussian::half_gaussian;
 pub use policy::PolicyTables;
+pub use unit::{FullDrive, Unit};
 
-use super::fixed::{
-    Batch, DriveBits, ErrorBits, LevelBits, LutBits, OutOfRange, RateMantissa, narrow,
-};
+use super::fixed::{Batch, ErrorBits, LutBits, OutOfRange, RateMantissa, narrow};
 
 /// A finite number above 0, given by the user: a width, a rate, a factor.
 ///
@@ -93,79 +93,6 @@ impl Activation {
     #[must_use]
     pub const fn has_table(self) -> bool {
         !matches!(self, Self::Rms | Self::Accumulator)
-    }
-}
-
-/// What code 255 on the rows of a layer stands for, whatever the bits of a drive.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[non_exhaustive]
-pub enum FullDrive {
-    /// 1: data, and activities of a table.
-    One,
-    /// 255/32, as 32 stands for 1: normalised activities.
-    Normalised,
-}
-
-/// What one accumulator unit stands for.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Unit {
-    /// `log2(weight_max)`.
-    pub weight_max_log2: i32,
-    /// Bits of a level.
-    pub level_bits: LevelBits,
-    /// Bits of a drive code.
-    pub drive_bits: DriveBits,
-    /// What the greatest drive code stands for.
-    pub full_drive: FullDrive,
-}
-
-impl Unit {
-    fn of_z(self) -> f64 {
-        let levels = libm::exp2(f64::from(self.level_bits.get()));
-        libm::exp2(f64::from(self.weight_max_log2)) / (levels * self.codes_of_one())
-    }
-
-    /// Drive codes that stand for 1.
-    fn codes_of_one(self) -> f64 {
-        let codes = f64::from(self.drive_bits.code_max());
-        match self.full_drive {
-            FullDrive::One => codes,
-            FullDrive::Normalised => codes * 32.0 / 255.0,
-        }
-    }
-
-    /// What it is worth, as numerator and denominator in lowest terms: `weight_max / (2^level_bits (2^drive_bits - 1))`, 255/32
-    /// of it behind a normalised layer.
-    #[must_use]
-    pub fn ratio(self) -> [u64; 2] {
-        let codes = u64::from(self.drive_bits.code_max());
-        let (mut above, mut below, point) = match self.full_drive {
-            FullDrive::One => (1, codes, 0),
-            FullDrive::Normalised => (255, codes, 5),
-        };
-        // 255 is 3 x 5 x 17
-        for factor in [3, 5, 17] {
-            if above % factor == 0 && below % factor == 0 {
-                (above, below) = (above / factor, below / factor);
-            }
-        }
-        let log2 = i64::from(self.weight_max_log2) - i64::from(self.level_bits.get()) - point;
-        let by = log2.unsigned_abs();
-        if log2 >= 0 { [above << by, below] } else { [above, below << by] }
-    }
-
-    /// The point of an accumulator: one unit is worth exactly `2^-point`. `None` where no power of two is: behind a
-    /// normalised layer it is one with 8 drive bits, `weight_max / (32 2^level_bits)`.
-    #[must_use]
-    pub fn point(self) -> Option<i32> {
-        let [above, below] = self.ratio();
-        match (above.is_power_of_two(), below.is_power_of_two()) {
-            (true, true) => {
-                let log2 = |n: u64| i32::try_from(n.trailing_zeros()).expect("below 64");
-                Some(log2(below) - log2(above))
-            }
-            _ => None,
-        }
     }
 }
 
@@ -425,6 +352,7 @@ impl Rate {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::num::fixed::{DriveBits, LevelBits};
 
     fn unit(weight_max_log2: i32, level_bits: i64, drive_bits: i64) -> Unit {
         Unit {

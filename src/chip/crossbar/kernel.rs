@@ -236,18 +236,18 @@ impl Kernel {
         call!(self, difference(currents, sums));
     }
 
-    /// Adds to each sample's sum the squares of what is above 0 in a block of 64 units, `[sample][64]`. The plan proves that
+    /// Adds to each sample's sum the squares of what is above 0 in a panel of 32 units, `[sample][32]`. The plan proves that
     /// sums lie below [`SQUARED_MAX`].
     ///
     /// # Panics
     /// When the sizes do not match.
     pub fn stream_squares(&self, sums: &[i32], squares: &mut [u64]) {
-        assert_eq!(sums.len(), squares.len() * BLOCK_ROWS, "64 units a sample");
+        assert_eq!(sums.len(), squares.len() * PANEL_COLUMNS, "32 units a sample");
         call!(self, stream_squares(sums, squares));
     }
 
-    /// Normalises a block of 64 units, `[sample][64]`, by the reciprocal of each sample: what they hand on, and how steep
-    /// they are. Returns the codes that their bound changed.
+    /// Normalises a panel of 32 units, `[sample][32]`, by the reciprocal of each sample: what they hand on, and how steep
+    /// they are, both `[sample][64]` from this panel's first column on. Returns the codes that their bound changed.
     ///
     /// # Panics
     /// When the sizes do not match.
@@ -259,8 +259,13 @@ impl Kernel {
         values: &mut [u8],
         derivatives: &mut [u8],
     ) -> u64 {
-        assert_eq!(sums.len(), reciprocals.len() * BLOCK_ROWS, "64 units a sample");
-        assert!(values.len() == sums.len() && derivatives.len() == sums.len(), "a place a unit");
+        let samples = reciprocals.len();
+        assert_eq!(sums.len(), samples * PANEL_COLUMNS, "32 units a sample");
+        if samples == 0 {
+            return 0;
+        }
+        let least = (samples - 1) * BLOCK_ROWS + PANEL_COLUMNS;
+        assert!(values.len() >= least && derivatives.len() >= least, "every unit has its place");
         call!(self, scale(sums, reciprocals, hand_on, values, derivatives))
     }
 

@@ -32,6 +32,7 @@ const BITS: u64 = 3 * 32 + 16;
 
 /// A block of 64 units for some samples, `[sample][64]`.
 struct Block<'a> {
+    /// `[group of samples][2 panels][sample][32]`.
     sums: &'a mut [i32],
     values: &'a mut [u8],
     derivatives: &'a mut [u8],
@@ -113,28 +114,33 @@ fn put_out(
         put_out_wide(kernel, reader, &mut near, units, hand_on, &mut seen);
         return seen;
     }
-    let count = near.samples.len();
     let mut total = [0u128; NEAR];
     let mut scratch = Scratch::new();
-    let mut panel = [0; Scratch::SUMS];
     for (block, out) in near.blocks.iter_mut().enumerate() {
-        for (from, part) in panels(reader, block, &near.samples) {
-            let sums = &mut panel[..part.samples.len() * PANEL_COLUMNS];
+        let mut squares = [0; NEAR];
+        for (sums, part) in panels(reader, block, &near.samples, out.sums) {
             if part.live > 0 {
                 reader.read_narrow(kernel, &part, &mut scratch, sums, &mut seen);
             }
-            place(sums, part.live, &mut out.sums[from..]);
+            silence(sums, part.live);
+            let group =
+                part.samples.start - near.samples.start..part.samples.end - near.samples.start;
+            kernel.stream_squares(sums, &mut squares[group]);
         }
-        let mut squares = [0; NEAR];
-        kernel.stream_squares(out.sums, &mut squares[..count]);
         total.iter_mut().zip(squares).for_each(|(total, more)| *total += u128::from(more));
     }
     let mut rc = [0; NEAR];
-    for (rc, squares) in rc[..count].iter_mut().zip(total) {
+    for (rc, squares) in rc[..near.samples.len()].iter_mut().zip(total) {
         *rc = normalise::reciprocal(squares, units);
     }
-    for Block { sums, values, derivatives } in near.blocks {
-        seen.look_ups += kernel.scale(sums, &rc[..count], hand_on, values, derivatives);
+    for (block, Block { sums, values, derivatives }) in near.blocks.into_iter().enumerate() {
+        for (sums, part) in panels(reader, block, &near.samples, sums) {
+            let group =
+                part.samples.start - near.samples.start..part.samples.end - near.samples.start;
+            let at = group.start * BLOCK_ROWS + part.panel % 2 * PANEL_COLUMNS;
+            let (values, derivatives) = (&mut values[at..], &mut derivatives[at..]);
+            seen.look_ups += kernel.scale(sums, &rc[group], hand_on, values, derivatives);
+        }
     }
     seen
 }
@@ -149,20 +155,25 @@ fn put_out_wide(
     seen: &mut Seen,
 ) {
     let size = near.samples.len() * BLOCK_ROWS;
+    // `[block][sample][64]`
     let mut all = vec![0i64; near.blocks.len() * size];
     let mut scratch = Scratch::new();
-    let (mut narrow, mut wide) = ([0; Scratch::SUMS], [0; Scratch::SUMS]);
-    for (block, all) in all.chunks_mut(size).enumerate() {
-        for (from, part) in panels(reader, block, &near.samples) {
-            let cells = part.samples.len() * PANEL_COLUMNS;
-            let (sums, wide) = (&mut narrow[..cells], &mut wide[..cells]);
+    let mut wide = [0; Scratch::SUMS];
+    for ((block, out), all) in near.blocks.iter_mut().enumerate().zip(all.chunks_mut(size)) {
+        for (sums, part) in panels(reader, block, &near.samples, out.sums) {
+            let wide = &mut wide[..sums.len()];
             if part.live > 0 && reader.is_narrow() {
                 reader.read_narrow(kernel, &part, &mut scratch, sums, seen);
                 wide.iter_mut().zip(sums).for_each(|(wide, sum)| *wide = i64::from(*sum));
             } else if part.live > 0 {
                 reader.read_wide(kernel, &part, wide, seen);
             }
-            place(wide, part.live, &mut all[from..]);
+            silence(wide, part.live);
+            let at = (part.samples.start - near.samples.start) * BLOCK_ROWS;
+            let rows = all[at + part.panel % 2 * PANEL_COLUMNS..].chunks_mut(BLOCK_ROWS);
+            for (row, wide) in rows.zip(wide.as_chunks::<PANEL_COLUMNS>().0) {
+                row[..PANEL_COLUMNS].copy_from_slice(wide);
+            }
         }
     }
     for sample in 0..near.samples.len() {
@@ -181,28 +192,28 @@ fn put_out_wide(
     }
 }
 
-/// Both panels of a block for some samples, a group of them at a time, and where a group's sums begin.
+/// Both panels of a block for some samples, a group of them at a time, each with its place among `sums`.
 fn panels<'a>(
     reader: &'a Reader<'_>,
     block: usize,
     samples: &'a Range<usize>,
-) -> impl Iterator<Item = (usize, PanelPart)> + 'a {
-    samples.clone().step_by(TOGETHER).flat_map(move |start| {
+    mut sums: &'a mut [i32],
+) -> impl Iterator<Item = (&'a mut [i32], PanelPart)> {
+    let groups = samples.clone().step_by(TOGETHER);
+    let halves = groups.flat_map(move |start| [(start, 2 * block), (start, 2 * block + 1)]);
+    halves.map(move |(start, panel)| {
         let group = start..(start + TOGETHER).min(samples.end);
-        (0..2).map(move |half| {
-            let panel = 2 * block + half;
-            let live = reader.columns.saturating_sub(panel * PANEL_COLUMNS).min(PANEL_COLUMNS);
-            let from = (group.start - samples.start) * BLOCK_ROWS + half * PANEL_COLUMNS;
-            (from, PanelPart { panel, live, samples: group.clone() })
-        })
+        let live = reader.columns.saturating_sub(panel * PANEL_COLUMNS).min(PANEL_COLUMNS);
+        let (own, rest) = std::mem::take(&mut sums).split_at_mut(group.len() * PANEL_COLUMNS);
+        sums = rest;
+        (own, PanelPart { panel, live, samples: group })
     })
 }
 
-/// Puts the sums of a panel, `[sample][32]`, to those of its block, `[sample][64]`; 0 where there is no unit.
-fn place<T: Copy + Default>(sums: &[T], live: usize, block: &mut [T]) {
-    let rows = block.chunks_mut(BLOCK_ROWS).zip(sums.as_chunks::<PANEL_COLUMNS>().0);
-    for (row, sums) in rows {
-        row[..live].copy_from_slice(&sums[..live]);
-        row[live..PANEL_COLUMNS].fill(T::default());
+/// Sums of a panel, `[sample][32]`, become 0 where there is no unit.
+fn silence<T: Copy + Default>(sums: &mut [T], live: usize) {
+    if live < PANEL_COLUMNS {
+        let rows = sums.as_chunks_mut::<PANEL_COLUMNS>().0;
+        rows.iter_mut().for_each(|row| row[live..].fill(T::default()));
     }
 }

@@ -19,7 +19,13 @@
 pub const fn reciprocal(squares: u128, units: u64) -> u64 {
     // a division of 64 bits wherever it does
     let root = if squares >> 64 == 0 {
-        (squares as u64 / units).isqrt()
+        let squares = squares as u64;
+        let mean = if units.is_power_of_two() {
+            squares >> units.trailing_zeros()
+        } else {
+            squares / units
+        };
+        mean.isqrt()
     } else {
         (squares / units as u128).isqrt() as u64
     };

@@ -4,6 +4,7 @@ use crate::chip::hardware::{Adc, AdcRange, HardwareSpec, Subtract, WriteScheme};
 use crate::chip::layer::DrivenBy;
 use crate::chip::ledger::Event;
 use crate::chip::population::Wiring;
+use crate::learn::rule::Readout;
 use crate::num::fixed::AdcBits;
 use crate::num::tables::Activation;
 
@@ -63,7 +64,7 @@ fn refused(network: &NetworkSpec) -> NetworkError {
 #[test]
 fn everything_that_does_not_fit_together_is_refused_with_its_key() {
     type Change = fn(&mut NetworkSpec);
-    let cases: [(&str, &str, Change); 29] = [
+    let cases: [(&str, &str, Change); 36] = [
         ("network.hidden", "0 layers", |n| n.layers.clear()),
         ("network.hidden", "a layer of 0 units", |n| n.layers[1].units = 0),
         ("network.hidden", "a layer of 0 inputs", |n| n.layers[0].inputs = 0),
@@ -86,6 +87,25 @@ fn everything_that_does_not_fit_together_is_refused_with_its_key() {
         }),
         ("network.init_gain_output", "0/64", |n| {
             n.layers[1].initial = InitialLevels::Uniform { gain_64ths: [0, 1] }
+        }),
+        ("network.init_gain", "of layer 0 is 0/3", |n| {
+            n.layers[0].initial = InitialLevels::AbsGaussian { gain: [0, 3] }
+        }),
+        ("network.init_gain", "of layer 0 is 33/2", |n| {
+            n.layers[0].initial = InitialLevels::AbsGaussian { gain: [33, 2] }
+        }),
+        ("network.activation", "only hidden layers", |n| n.layers[1].activation = Activation::Rms),
+        ("network.activation", "keeps the accumulators of layer 0", |n| {
+            n.layers[0].activation = Activation::Accumulator
+        }),
+        ("learning.centre", "the task hands the errors", |n| {
+            n.layers[1].activation = Activation::Accumulator
+        }),
+        ("learning.rule", "have two populations above and below", |n| {
+            (n.layers[1].activation, n.centre) = (Activation::Accumulator, Centre::None)
+        }),
+        ("network.hidden", "normalised drives for each stream", |n| {
+            n.layers[0].activation = Activation::Rms
         }),
         ("learning.rule", "two classes", |n| n.rule = Rule::Kaneko),
         ("learning.rule", "make arrays that are differential pairs", |n| {
@@ -237,4 +257,56 @@ fn a_table_whose_steps_are_too_great_to_shift_by_is_refused() {
         network.check(&hardware).is_ok()
             || network.check(&hardware).unwrap_err().key() == "learning.rate"
     );
+}
+
+/// A hidden layer that is normalised, and a readout.
+fn normalised(rule: Rule) -> NetworkSpec {
+    let mut network = match rule {
+        Rule::Dfa | Rule::Bp => baseline(rule),
+        _ => NetworkSpec { rule, ..plain() },
+    };
+    network.centre = Centre::None;
+    let [hidden, last] = &mut network.layers[..] else { panic!("two layers") };
+    (hidden.activation, last.activation) = (Activation::Rms, Activation::Accumulator);
+    (hidden.wiring, last.wiring) = (rule.wiring(None), rule.wiring(Some(Readout::All)));
+    last.driven_by = DrivenBy::Normalised;
+    hidden.initial = InitialLevels::AbsGaussian { gain: [1, 1] };
+    last.initial = InitialLevels::AbsGaussian { gain: [1, 10] };
+    network
+}
+
+#[test]
+fn every_rule_learns_from_errors_that_a_task_hands() {
+    let both = |h: &mut HardwareSpec| h.tile.transposed_read = true;
+    let hardware = Hardware::reference().with(both).unwrap();
+    for rule in [Rule::Ed, Rule::EdNonDalean, Rule::Dfa, Rule::Bp] {
+        let network = normalised(rule);
+        let mut driver = network.build(&hardware, Backend::best(), PLACE).unwrap();
+        let mean_percent = |layer: usize| {
+            let arrays = driver.engine().layers()[layer].arrays.iter();
+            let levels: Vec<u64> = arrays.flat_map(|a| a.levels()).map(u64::from).collect();
+            100 * levels.iter().sum::<u64>() / levels.len() as u64
+        };
+        // weight_max 4: 0.8 times a width of 64 / sqrt(2 x 5), and of a tenth of 64 / sqrt(2 x 4)
+        assert!((1000..2300).contains(&mean_percent(0)), "{rule:?} {}", mean_percent(0));
+        assert!((110..260).contains(&mean_percent(1)), "{rule:?} {}", mean_percent(1));
+        let codes: Vec<u8> = (0..5 * 8).map(|at| (at * 37 % 256) as u8).collect();
+        let said = |driver: &mut Driver| {
+            driver.read(&codes);
+            let mut readouts = vec![];
+            driver.engine().readouts(&mut readouts);
+            readouts.chunks(3).map(|all| all[1]).sum::<i64>()
+        };
+        let before = said(&mut driver);
+        // two up, one down, in numbers of 20 fractional bits
+        driver.learn(&codes, |engine, _, list| {
+            for _ in 0..engine.samples() {
+                list.extend([-1 << 20, 2 << 20, 0]);
+            }
+        });
+        let after = said(&mut driver);
+        assert!(after > before, "{rule:?}: {before} became {after}");
+        let words = driver.engine_mut().output_words(&[1 << 20, 1 << 23, 0]);
+        assert_eq!(words, [32, 127, 0]);
+    }
 }

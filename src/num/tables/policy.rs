@@ -20,9 +20,9 @@ use std::f64::consts::{FRAC_1_SQRT_2, PI};
 use crate::num::fixed::{narrow, rsh};
 
 /// Entries of the tables of `exp2`, `log2` and `tanh`, their end not counted.
-pub const ENTRIES: usize = 1024;
+const ENTRIES: usize = 1024;
 /// Entries of the table of the normal distribution, its end not counted.
-pub const NORMAL_ENTRIES: usize = 4096;
+const NORMAL_ENTRIES: usize = 4096;
 
 /// What policies look up. All entries are below 2^31, or 2^31.
 #[derive(Debug, Clone, PartialEq, Eq)]

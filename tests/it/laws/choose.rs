@@ -167,6 +167,8 @@ pub(crate) fn wiring() -> impl Strategy<Value = (Wiring, Wiring)> {
         (Wiring::Dual, Wiring::DualReadout),
         (Wiring::Dual, Wiring::Dual),
         (Wiring::Single, Wiring::Single),
+        (Wiring::DualPairs, Wiring::DualReadoutPairs),
+        (Wiring::DualPairs, Wiring::DualPairs),
     ])
 }
 
@@ -234,6 +236,19 @@ pub(crate) fn net(sides: impl Strategy<Value = Vec<usize>>) -> impl Strategy<Val
                 });
                 let above = reads_backwards && last == Wiring::Single && at + 1 < count;
                 deliveries.push(delivery(&mut numbers, sides[at + 1], above));
+            }
+            for at in 0..count {
+                if numbers.within(0, 2) > 0 {
+                    continue;
+                }
+                if at + 1 == count {
+                    specs[at].activation = Activation::Accumulator;
+                } else {
+                    specs[at].activation = Activation::Rms;
+                    if specs[at + 1].driven_by == DrivenBy::Streams {
+                        specs[at + 1].driven_by = DrivenBy::Normalised;
+                    }
+                }
             }
             Net {
                 seed,

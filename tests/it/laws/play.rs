@@ -7,6 +7,7 @@ use dalean::chip::engine::{Calibration, Engine, Operation, Phase, Side, Write, W
 use dalean::chip::hardware::{Adc, AdcRange, WriteScheme};
 use dalean::chip::layer::{Layer, WordSource};
 use dalean::chip::ledger::Ledger;
+use dalean::chip::population::Stream;
 use dalean::learn::error::ErrorUnit;
 
 use super::choose::{Choice, Net, Numbers};
@@ -298,7 +299,8 @@ impl Script<'_> {
             }
             7 | 8
                 if self.net.hardware.tile.transposed_read
-                    && self.net.hardware.adc == Adc::Ideal =>
+                    && self.net.hardware.adc == Adc::Ideal
+                    && self.net.specs[layer].wiring.pairs(Stream::P).len() == 1 =>
             {
                 self.columns(layer);
             }

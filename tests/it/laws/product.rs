@@ -5,6 +5,7 @@ use dalean::chip::engine::{Operation, Phase, Side};
 use dalean::chip::hardware::{Adc, AdcRange, Subtract};
 use dalean::chip::layer::WordSource;
 use dalean::chip::ledger::Event;
+use dalean::chip::population::{Stream, Wiring};
 use dalean::num::fixed::AdcBits;
 use dalean::num::tables::Activation;
 use proptest::prelude::*;
@@ -27,6 +28,10 @@ fn ideal(mut net: Net) -> Net {
     net.change(|h| (h.adc, h.tile.transposed_read) = (Adc::Ideal, true));
     net.specs[0].activation = Activation::Identity;
     net.specs[0].constant_row = false;
+    if net.specs[0].wiring.pairs(Stream::P).len() > 1 {
+        // rows that several pairs share are not read backwards
+        net.specs[0].wiring = Wiring::Dual;
+    }
     net
 }
 

@@ -11,7 +11,7 @@ use dalean::chip::layer::{self, Delivery, DrivenBy, LayerSpec};
 use dalean::chip::ledger::{During, Event, Ledger};
 use dalean::chip::population::{Polarity, Stream};
 use dalean::learn::error::Centre;
-use dalean::num::tables::Lut;
+use dalean::num::tables::{Activation, Lut};
 
 use super::choose::Net;
 use super::fault::Fault;
@@ -243,19 +243,23 @@ impl Shadow {
     fn read(&mut self, layer: usize, target: Stream, probe: bool) -> Vec<Vec<i64>> {
         let hw = self.net.hardware.clone();
         let (units, t) = (self.layers[layer].spec.units, target.index());
-        let [banks] = self.layers[layer].spec.wiring.pairs(target) else { panic!("one pair") };
+        let pairs = self.layers[layer].spec.wiring.pairs(target);
         let tiles = self.row_tiles(layer);
         let slices =
             if hw.adc == Adc::Ideal { 1 } else { hw.drive.bits.get().div_ceil(hw.drive.dac_bits) };
         let mut seen = vec![vec![]; slices as usize];
-        let (mut accumulators, mut saturated, mut look_ups) = (vec![], [0; 2], 0);
+        let (mut accumulators, mut saturated, mut look_ups) =
+            (vec![], vec![[0; 2]; pairs.len()], 0);
         let mut rails = vec![[0; 2]; slices as usize];
         for sample in 0..self.samples {
             let mut row = vec![];
             for column in 0..units {
                 let mut acc = 0;
-                for (tile, s) in tiles.iter().flat_map(|tile| (0..slices).map(move |s| (tile, s))) {
-                    let at = [sample, column];
+                let reads = tiles.iter().flat_map(|tile| (0..slices).map(move |s| (tile, s)));
+                let reads = reads.flat_map(|read| (0..pairs.len()).map(move |pair| (read, pair)));
+                for ((tile, s), pair) in reads {
+                    let (at, banks, saturated) =
+                        ([sample, column], pairs[pair], &mut saturated[pair]);
                     let [e, i] = banks.map(|bank| self.current(layer, bank, at, tile.clone(), s));
                     let weight =
                         if self.is(Fault::SliceShiftMissing) { 0 } else { s * hw.drive.dac_bits };
@@ -314,8 +318,23 @@ impl Shadow {
             *saturated += u64::from(exact < -half || exact >= half);
             (exact.clamp(-half, half - 1) + half) as usize
         };
-        let (mut activity, mut derivative) = (vec![], vec![]);
+        let (mut activity, mut derivative): (Table, Table) = (vec![], vec![]);
         for row in &accumulators {
+            match self.layers[layer].spec.activation {
+                Activation::Accumulator => {
+                    activity.push(vec![0; row.len()]);
+                    derivative.push(vec![255; row.len()]);
+                    continue;
+                }
+                Activation::Rms => {
+                    let codes = normalised(row).into_iter();
+                    look_ups += codes.clone().filter(|&code| code > 255).count() as u64;
+                    activity.push(codes.map(|code| code.min(255)).collect());
+                    derivative.push(row.iter().map(|&acc| 255 * i64::from(acc > 0)).collect());
+                    continue;
+                }
+                _ => {}
+            }
             let places: Vec<_> = row.iter().map(|&acc| look(acc, &mut look_ups)).collect();
             activity.push(places.iter().map(|&at| i64::from(lut.activity[at])).collect());
             derivative.push(places.iter().map(|&at| i64::from(lut.derivative[at])).collect());
@@ -324,7 +343,8 @@ impl Shadow {
         this.accumulators[t] = accumulators;
         this.activity[t] = activity;
         this.derivative[t] = derivative;
-        for (&bank, saturated) in banks.iter().zip(saturated) {
+        let banks = pairs.as_flattened().iter();
+        for (&bank, saturated) in banks.zip(saturated.into_iter().flatten()) {
             let code = self.code(layer, bank);
             self.count(layer, code, During::ForwardRows, Event::SaturatedConversions, saturated);
         }
@@ -353,7 +373,7 @@ impl Shadow {
             for (bank, &at) in wiring.banks(target).iter().enumerate() {
                 let code = self.code(layer, at);
                 for (high, wide) in tile_sizes(rows, columns, hw.tile.rows, hw.tile.columns) {
-                    let converted = if current && bank == 1 { 0 } else { wide };
+                    let converted = if current && bank % 2 == 1 { 0 } else { wide };
                     for (event, count) in [
                         (Event::SramBits, high * u64::from(hw.drive.dac_bits)),
                         (Event::DacSlices, high),
@@ -367,8 +387,19 @@ impl Shadow {
                 }
             }
             let (code, units) = (self.unit_code(layer, target), (self.samples * columns) as u64);
-            self.count(layer, code, During::ForwardRows, Event::LookUps, units);
-            self.count(layer, code, During::ForwardRows, Event::SramBits, 32 * units);
+            let counts: &[(Event, u64)] = match self.layers[layer].spec.activation {
+                Activation::Accumulator => &[],
+                Activation::Rms => &[
+                    (Event::Squares, units),
+                    (Event::Roots, self.samples as u64),
+                    (Event::Scalings, units),
+                    (Event::SramBits, 112 * units),
+                ],
+                _ => &[(Event::LookUps, units), (Event::SramBits, 32 * units)],
+            };
+            for &(event, count) in counts {
+                self.count(layer, code, During::ForwardRows, event, count);
+            }
         }
     }
 
@@ -453,4 +484,12 @@ const fn sign(polarity: Polarity) -> i64 {
         Polarity::Excites => 1,
         Polarity::Inhibits => -1,
     }
+}
+
+/// Codes of a normalised stream before they are bounded.
+fn normalised(accumulators: &[i64]) -> Vec<i64> {
+    let v: Vec<u128> = accumulators.iter().map(|&acc| acc.max(0) as u128).collect();
+    let mean = v.iter().map(|v| v * v).sum::<u128>() / v.len() as u128;
+    let reciprocal = (1 << 45) / mean.isqrt().max(1);
+    v.iter().map(|v| ((v * reciprocal + (1 << 39)) >> 40) as i64).collect()
 }

@@ -1,4 +1,4 @@
-//! Normalised activities, a block of 64 units at a time: sums of squares, and codes.
+//! Normalised activities, a panel of 32 units at a time: sums of squares, and codes.
 //!
 //! ```text
 //! squares[b] += sum_j max(sum[b][j], 0)^2                            |sum| < 2^29, so that 64 squares fit 64 bits
@@ -9,7 +9,7 @@
 //! it. See docs/MODEL.md, 2.3.
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
-use crate::chip::crossbar::layout::BLOCK_ROWS;
+use crate::chip::crossbar::layout::{BLOCK_ROWS, PANEL_COLUMNS};
 use crate::chip::periphery::normalise;
 use crate::num::fixed::DriveBits;
 
@@ -44,7 +44,7 @@ impl HandOn {
 }
 
 pub(super) fn law_squares(sums: &[i32], squares: &mut [u64]) {
-    for (square, sums) in squares.iter_mut().zip(sums.chunks_exact(BLOCK_ROWS)) {
+    for (square, sums) in squares.iter_mut().zip(sums.chunks_exact(PANEL_COLUMNS)) {
         let more = normalise::squares(sums.iter().map(|&sum| i64::from(sum)));
         *square += u64::try_from(more).expect("sums lie below `SQUARED_MAX`");
     }
@@ -59,9 +59,11 @@ pub(super) fn law_scale(
 ) -> u64 {
     let mut saturated = 0;
     for (at, &sum) in sums.iter().enumerate() {
-        let (code, beyond) = normalise::code(sum.into(), reciprocals[at / BLOCK_ROWS]);
-        values[at] = hand_on.value(code);
-        derivatives[at] = normalise::slope(sum.into());
+        let (sample, column) = (at / PANEL_COLUMNS, at % PANEL_COLUMNS);
+        let (code, beyond) = normalise::code(sum.into(), reciprocals[sample]);
+        let to = sample * BLOCK_ROWS + column;
+        values[to] = hand_on.value(code);
+        derivatives[to] = normalise::slope(sum.into());
         saturated += u64::from(beyond);
     }
     saturated
@@ -69,7 +71,7 @@ pub(super) fn law_scale(
 
 #[inline(always)]
 pub(super) fn stream_squares(sums: &[i32], squares: &mut [u64]) {
-    for (square, sums) in squares.iter_mut().zip(sums.as_chunks::<BLOCK_ROWS>().0) {
+    for (square, sums) in squares.iter_mut().zip(sums.as_chunks::<PANEL_COLUMNS>().0) {
         let mut total = 0;
         for &sum in sums {
             let v = u64::from(sum.max(0).unsigned_abs());
@@ -90,22 +92,35 @@ pub(super) fn scale(
     let HandOn { shift, max } = hand_on;
     let half = (1 << shift) >> 1;
     let mut saturated = 0;
-    let rows = values.as_chunks_mut::<BLOCK_ROWS>().0.iter_mut();
-    let rows = rows.zip(derivatives.as_chunks_mut::<BLOCK_ROWS>().0);
-    let sums = sums.as_chunks::<BLOCK_ROWS>().0.iter().zip(reciprocals);
+    let rows = values.chunks_mut(BLOCK_ROWS).zip(derivatives.chunks_mut(BLOCK_ROWS));
+    let sums = sums.as_chunks::<PANEL_COLUMNS>().0.iter().zip(reciprocals);
     for ((sums, &rc), (values, derivatives)) in sums.zip(rows) {
-        let mut codes = [0u32; BLOCK_ROWS];
-        for (code, &sum) in codes.iter_mut().zip(sums) {
-            let v = u64::from(sum.max(0).unsigned_abs());
-            *code = ((v * rc + (1 << 39)) >> 40) as u32;
+        let mut codes = [0u32; PANEL_COLUMNS];
+        let code = |v: u32, rc: u64| ((u64::from(v) * rc + (1 << 39)) >> 40) as u32;
+        // one product of 32 bits where that is enough, as it is for a root of 2^13 and more
+        match u32::try_from(rc) {
+            Ok(rc) => {
+                for (to, &sum) in codes.iter_mut().zip(sums) {
+                    *to = code(sum.max(0).unsigned_abs(), rc.into());
+                }
+            }
+            Err(_) => {
+                for (to, &sum) in codes.iter_mut().zip(sums) {
+                    *to = code(sum.max(0).unsigned_abs(), rc);
+                }
+            }
         }
+        let (Some(values), Some(derivatives)) = (
+            values.first_chunk_mut::<PANEL_COLUMNS>(),
+            derivatives.first_chunk_mut::<PANEL_COLUMNS>(),
+        ) else {
+            unreachable!("every unit has its place")
+        };
         let mut beyond = 0u32;
-        for ((code, &sum), (value, derivative)) in
-            codes.iter().zip(sums).zip(values.iter_mut().zip(derivatives))
-        {
-            beyond += u32::from(*code > 255);
-            *value = ((((*code).min(255) + half) >> shift).min(max)) as u8;
-            *derivative = if sum > 0 { 255 } else { 0 };
+        for at in 0..PANEL_COLUMNS {
+            beyond += u32::from(codes[at] > 255);
+            values[at] = ((codes[at].min(255) + half) >> shift).min(max) as u8;
+            derivatives[at] = if sums[at] > 0 { 255 } else { 0 };
         }
         saturated += u64::from(beyond);
     }
@@ -133,14 +148,14 @@ mod tests {
         fn every_back_end_normalises_as_the_law(
             sums in prop::collection::vec(
                 prop_oneof![-300i32..300, -(1i32 << 20)..1 << 20, Just(0), 1i32 - (1 << 29)..1 << 29],
-                64 * 5,
+                32 * 5,
             ),
             samples in 0usize..=5,
             roots in prop::array::uniform5(1u64..1 << 29),
             bits in 1i64..=8,
         ) {
-            let sums = &sums[..64 * samples];
-            let rc: Vec<u64> = sums.chunks(64).zip(roots).map(|(sums, root)| {
+            let sums = &sums[..32 * samples];
+            let rc: Vec<u64> = sums.chunks(32).zip(roots).map(|(sums, root)| {
                 // as great as the plan lets it be
                 let most = sums.iter().max().unwrap_or(&1);
                 (1 << 45) / root.max((*most / 512).max(1) as u64)
@@ -150,7 +165,7 @@ mod tests {
                 let kernel = Kernel::start(backend);
                 let mut squares = vec![7; samples];
                 kernel.stream_squares(sums, &mut squares);
-                let (mut values, mut slopes) = (vec![1; sums.len()], vec![1; sums.len()]);
+                let (mut values, mut slopes) = (vec![1; 2 * sums.len()], vec![1; 2 * sums.len()]);
                 let beyond = kernel.scale(sums, &rc, hand_on, &mut values, &mut slopes);
                 (squares, values, slopes, beyond)
             };

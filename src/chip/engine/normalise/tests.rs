@@ -1,7 +1,7 @@
 //! Networks whose hidden layers are normalised and whose last one is read out, against plain loops and against Tick.
 
 use super::super::tick::Network;
-use super::super::{Engine, Operation, Phase, Side, Write};
+use super::super::{Engine, ErrorUnit, Operation, Phase, Side, Write};
 use crate::chip::crossbar::kernel::Backend;
 use crate::chip::crossbar::layout::BLOCK_ROWS;
 use crate::chip::hardware::timing::{PulseCode, Timing};
@@ -282,6 +282,12 @@ proptest! {
         operations.iter().for_each(|operation| engine.execute(operation));
         engine.settle();
         tick.run(&operations);
+        let unit = ErrorUnit::handed(net.hardware.digital.error_bits);
+        tick.set_error_unit(&unit);
+        engine.set_error_unit(unit);
+        let errors: Vec<i32> =
+            (0..samples * outputs).map(|at| number(seed, at, 10 << 20) as i32 - (5 << 20)).collect();
+        prop_assert_eq!(engine.output_words(&errors), tick.output_words(&errors));
         prop_assert_eq!(engine.ledger(Phase::Training), tick.ledger(Phase::Training));
         for (layer, of) in engine.layers().iter().enumerate() {
             for (array, cells) in of.arrays.iter().enumerate() {

@@ -165,7 +165,7 @@ impl Shadow {
         let (rows, columns) = (self.layers[layer].rows, self.layers[layer].spec.units);
         let sums =
             std::mem::replace(&mut self.layers[layer].arrays[at].sums, table(rows, columns, 0));
-        let pair = wiring == dalean::chip::population::Wiring::Single;
+        let pair = wiring.pathways().iter().any(|pathway| pathway.code >= 4);
         let shift = shift + u32::from(pair && !self.is(Fault::PairShiftMissing));
         let fraction = hw.write.residual_bits.get();
         let k = i64::from(shift) - i64::from(fraction);
