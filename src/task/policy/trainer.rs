@@ -225,6 +225,15 @@ impl PolicyTrainer {
         self.epoch
     }
 
+    /// Steps of all environments that were learnt from in the epochs that are finished.
+    #[must_use]
+    pub fn steps(&self) -> u64 {
+        match &self.learner {
+            Learner::Ppo(_) => u64::from(self.epoch) * self.experiment.steps_per_epoch(),
+            Learner::Evolution(evolver) => evolver.steps,
+        }
+    }
+
     /// Steps (at most, of evolution) and updates (of each network) of an epoch.
     #[must_use]
     pub fn epoch_size(&self) -> (u64, u64) {
@@ -274,11 +283,8 @@ impl PolicyTrainer {
             }
         }
         self.epoch += 1;
-        told.steps = match learner {
-            Learner::Ppo(_) => u64::from(self.epoch) * steps_total,
-            Learner::Evolution(evolver) => evolver.steps,
-        };
-        told.log_sigma = learner.player().actor.log_sigma().to_vec();
+        told.steps = self.steps();
+        told.log_sigma = self.learner.player().actor.log_sigma().to_vec();
         Ok(told)
     }
 
