@@ -44,9 +44,9 @@ pub(in crate::lab::config) const BATCH: i64 = 256;
 /// `ppo.entropy` of one of some actions, and of numbers.
 pub(in crate::lab::config) const ENTROPY: [f64; 2] = [0.01, 0.0];
 /// `ppo.log_sigma`.
-pub(in crate::lab::config) const LOG_SIGMA: f64 = -0.5;
+pub(in crate::lab::config) const LOG_SIGMA: f64 = 0.0;
 /// `ppo.log_sigma_rate`.
-pub(in crate::lab::config) const LOG_SIGMA_RATE: f64 = 0.01;
+pub(in crate::lab::config) const LOG_SIGMA_RATE: f64 = 0.003;
 /// `es.pairs`.
 pub(in crate::lab::config) const PAIRS: i64 = 32;
 /// `es.step`.

@@ -414,8 +414,8 @@ const PPO: &[KeyEntry] = &[
         .default("0.01")
         .otherwise("0.0 where actions are numbers")
         .only(ON_POLICY, POLICY),
-    other("log_sigma", "a number, -4 to 1").default("-0.5").only(ON_CONTINUOUS, CONTINUOUS),
-    other("log_sigma_rate", "a number, 0 to 1").default("0.01").only(ON_CONTINUOUS, CONTINUOUS),
+    other("log_sigma", "a number, -4 to 1").default("0").only(ON_CONTINUOUS, CONTINUOUS),
+    other("log_sigma_rate", "a number, 0 to 1").default("0.003").only(ON_CONTINUOUS, CONTINUOUS),
 ];
 
 const EVOLUTION: &[KeyEntry] = &[
