@@ -227,7 +227,7 @@ fn side() -> impl Strategy<Value = usize> + Clone {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(24))]
+    #![proptest_config(ProptestConfig::with_cases(16))]
 
     #[test]
     fn a_write_in_two_passes_is_its_equations_on_every_back_end(case in case(side())) {
