@@ -167,7 +167,7 @@ impl Plain {
                     let s = halves_up(sum, unit);
                     let (m, v) = (word_of(array, 0, cell), word_of(array, 1, cell));
                     kept = match first {
-                        true => vec![s << a, s * s << b],
+                        true => vec![s << a, (s * s) << b],
                         false => vec![m + s - halves_up(m, 1 << a), v + s * s - (v >> b)],
                     };
                     let root = ((kept[1] >> b) as u128).isqrt() as i128;
@@ -246,7 +246,7 @@ impl Plain {
                 let (n, was) = (samples as i64, i64::from(before.requests.means(set)[row]));
                 let want = match first {
                     true => (32 * codes + n).div_euclid(2 * n),
-                    false => was + (16 * codes - n * was + (1 << (window - 1)) >> window),
+                    false => was + ((16 * codes - n * was + (1 << (window - 1))) >> window),
                 };
                 prop_assert_eq!(i64::from(now.means(set)[row]), want, "mean of {}", row);
             }

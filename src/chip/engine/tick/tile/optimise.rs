@@ -155,7 +155,8 @@ impl Tile {
         if let Some([a, b]) = more.adam {
             let s = rsh(raw, more.centred.unwrap_or(0));
             *first = if self.kept.begins { s << a } else { *first + s - rsh(*first, a) };
-            *second = if self.kept.begins { s * s << b } else { *second + s * s - (*second >> b) };
+            *second =
+                if self.kept.begins { (s * s) << b } else { *second + s * s - (*second >> b) };
             // the greatest root whose square is no more, bit by bit
             let mut root = 0i64;
             for bit in (0..31).rev() {
