@@ -22,7 +22,7 @@ pub use command::Command;
 pub use config::{More, TileAdc, TileConfig, TileSize, TileUnits};
 pub use events::{BankEvents, TileEvents};
 use optimise::Kept;
-pub use optimise::Said;
+pub(super) use optimise::Said;
 
 /// Which lines a read goes through.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]

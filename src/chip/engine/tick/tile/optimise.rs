@@ -9,7 +9,7 @@ use crate::num::fixed::rsh;
 
 /// What a look at all sums of a layer gives.
 #[derive(Debug, Clone, Copy)]
-pub enum Said {
+pub(in super::super) enum Said {
     /// The least size of a sum that is asked for a pulse.
     Least(i64),
     /// Mantissa and shift.
