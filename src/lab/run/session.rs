@@ -175,12 +175,14 @@ impl Session {
         if saturated.saturating_mul(20) > conversions {
             add(Note::Saturated { epoch, saturated, conversions });
         }
+        // what is normalised has an end as a table has one
         let ends = [
-            ("tables", Event::SaturatedLookUps, Event::LookUps),
-            ("gates", Event::SaturatedGates, Event::Multiplies),
+            ("tables", Event::SaturatedLookUps, [Event::LookUps, Event::Scalings]),
+            ("gates", Event::SaturatedGates, [Event::Multiplies; 2]),
         ];
-        for (of, saturated, all) in ends {
-            let (saturated, all) = (total(saturated), total(all));
+        for (of, saturated, [one, other]) in ends {
+            let more = if one == other { 0 } else { total(other) };
+            let (saturated, all) = (total(saturated), total(one) + more);
             if saturated.saturating_mul(2) > all {
                 add(Note::Ends { epoch, of: of.into(), saturated, all });
             }
