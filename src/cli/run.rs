@@ -11,7 +11,7 @@ use super::progress::Meter;
 use super::{Done, Failure, Moved, Shared, configuration, environment, known, note, say, usage};
 use crate::lab::config::absent_words;
 use crate::lab::price::{EnergySplit, PerPiece};
-use crate::lab::run::{self, Machine, RunError, RunEvent, Trained, Verdict};
+use crate::lab::run::{self, Keeping, Machine, RunError, RunEvent, Trained, Verdict};
 use crate::lab::runs;
 use crate::lab::store::folder::FolderError;
 use crate::lab::store::index::{INDEX, Store};
@@ -35,6 +35,9 @@ pub(super) struct TrainArgs {
     /// Folder that gets the run's folder [default: runs, or DALEAN_RUNS]
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
+    /// Keep what the environments of a policy show, an epoch a file, so that it can be done again without them
+    #[arg(long, conflicts_with = "resume")]
+    record: bool,
     /// Continue a run from its last finished epoch
     #[arg(long, value_name = "RUN", value_hint = clap::ValueHint::DirPath, conflicts_with_all = ["file", "hw", "settings", "seed", "out"])]
     resume: Option<PathBuf>,
@@ -60,6 +63,9 @@ pub(super) struct VerifyArgs {
     /// Folder of a run, or a store
     #[arg(value_hint = clap::ValueHint::DirPath)]
     run: PathBuf,
+    /// Show a policy what was kept of its environments (train --record), and do not ask them
+    #[arg(long, conflicts_with = "sample")]
+    replay: bool,
     /// Compare only the first N epochs
     #[arg(long, value_name = "N", conflicts_with = "sample")]
     epochs: Option<u32>,
@@ -131,6 +137,11 @@ pub(super) fn train(args: &TrainArgs) -> Done {
             Some(configuration(args.file.as_ref(), args.hw.as_deref(), &args.settings, args.seed)?)
         }
     };
+    if args.record && config.as_ref().is_some_and(|config| config.policy.is_none()) {
+        return Err(usage(
+            "--record keeps what the environments of a policy show; examples lie in files already",
+        ));
+    }
     let (quiet, json) = (shared.quiet || shared.json, shared.json);
     let mut meter = Meter::new(quiet, 0);
     let mut folder = PathBuf::new();
@@ -188,7 +199,8 @@ pub(super) fn train(args: &TrainArgs) -> Done {
         (None, Some(config)) => {
             let named = || environment("DALEAN_RUNS").map(PathBuf::from);
             let out = args.out.clone().or_else(named).unwrap_or_else(|| PathBuf::from("runs"));
-            run::train(config, &data, &out, machine, &mut on_event)
+            let keeping = if args.record { Keeping::STREAMS } else { Keeping::ALL };
+            run::train_keeping(config, &data, &out, machine, keeping, &mut on_event)
         }
         (None, None) => unreachable!("a run is new or continued"),
     };
@@ -349,7 +361,8 @@ pub(super) fn verify(args: &VerifyArgs) -> Done {
         )));
     }
     let mut meter = Meter::new(shared.quiet || shared.json, 0);
-    let verdict = run::verify(
+    let again = if args.replay { run::replay } else { run::verify };
+    let verdict = again(
         &args.run,
         &args.moved.root(shared.data_root()),
         machine,

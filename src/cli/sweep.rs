@@ -78,7 +78,7 @@ pub(super) fn execute(args: &SweepArgs) -> Done {
     let mut store = Store::open(&path).map_err(SweepError::from)?;
     let stop = stop_flag();
     let every = Duration::from_secs(args.checkpoint_seconds);
-    let keeping = Keeping { states: args.keep_states, every };
+    let keeping = Keeping { states: args.keep_states, every, streams: false };
     let options = Options {
         backend: machine.backend(),
         jobs: machine.threads(),

@@ -26,8 +26,9 @@ pub use session::Session;
 pub use task::Progress;
 pub use train::{
     Keeping, RunEvent, Trained, address_of, carry_on, configuration, evaluate, resume, train,
+    train_keeping,
 };
-pub use verify::{Verdict, verify};
+pub use verify::{Verdict, replay, verify};
 pub use watch::{Watched, watch};
 pub use weigh::Memory;
 pub(crate) use weigh::weigh;

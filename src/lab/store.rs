@@ -7,6 +7,7 @@
 //! checkpoint.safetensors  the state after the last finished epoch
 //! best-NNNNN.safetensors  the state with the best validation score
 //! receipt.json            hashes that let anyone do it again
+//! stream-NNNNN.safetensors  what the environments of a policy showed in an epoch, where that is kept
 //! report.html             for people
 //! ```
 //!
@@ -23,6 +24,7 @@ pub mod index;
 pub mod ledger;
 pub mod place;
 pub mod record;
+pub mod stream;
 
 /// Version of the arithmetic. It rises when an equation moves; `verify` refuses another.
 pub const ARITHMETIC: u32 = 2;

@@ -50,7 +50,7 @@ fn every_experiment_learns_two_batches() {
     let sweeps = examples().join("sweeps");
     let experiments: Vec<_> =
         files(&examples(), "toml").into_iter().filter(|path| !path.starts_with(&sweeps)).collect();
-    assert_eq!(experiments.len(), 29, "{experiments:?}");
+    assert_eq!(experiments.len(), 30, "{experiments:?}");
     for path in experiments {
         let name = path.display().to_string();
         let text = std::fs::read_to_string(&path).unwrap();

@@ -67,7 +67,7 @@ fn apply(text: &str, [before, after]: &Hunk) -> Result<String, String> {
 fn applied() -> BTreeMap<String, String> {
     let document = std::fs::read_to_string(root().join("docs/EXTENDING.md")).unwrap();
     let differences = differences(&document);
-    assert!(differences.len() >= 4, "a rule, a route, an activation, a figure");
+    assert!(differences.len() >= 5, "a rule, a route, an activation, a figure, an environment");
     let mut files: BTreeMap<String, String> = BTreeMap::new();
     for (path, hunks) in differences.into_iter().flatten() {
         let on_disk = || std::fs::read_to_string(root().join(&path)).unwrap_or_default();
@@ -82,7 +82,9 @@ fn applied() -> BTreeMap<String, String> {
 #[test]
 fn every_difference_fits_the_sources() {
     let files = applied();
-    assert!(files.contains_key("src/learn/rule.rs"), "{:?}", files.keys());
+    for path in ["src/learn/rule.rs", "src/task/environment.rs"] {
+        assert!(files.contains_key(path), "{path}: {:?}", files.keys());
+    }
     for (path, text) in files {
         let now = std::fs::read_to_string(root().join(&path)).unwrap_or_default();
         assert_ne!(text, now, "{path}");
@@ -167,6 +169,15 @@ fn the_changed_program_compiles_and_trains_with_every_new_word() {
         ]);
         assert_eq!(verified.code, Some(0), "{setting}: {}", verified.stderr);
     }
+    // an environment is acted on, and its run verified
+    let program = ["run", "--quiet", "--bin", "dalean", "--"];
+    let policy = ["train", "examples/policies/cartpole.toml", "--json", "--out", &out];
+    let settings = ["--set", "environment.id=Corridor-v0", "--set", "environment.steps=20000"];
+    let ran = cargo(&[&program[..], &policy, &settings].concat());
+    assert_eq!(ran.code, Some(0), "Corridor-v0: {}", ran.stderr);
+    let run = ran.last()["run"].as_str().unwrap().to_owned();
+    let verified = cargo(&[&program[..], &["verify", &run]].concat());
+    assert_eq!(verified.code, Some(0), "Corridor-v0: {}", verified.stderr);
     let ran = cargo(&["run", "--quiet", "--bin", "dalean", "--", "keys", "rule"]);
     assert!(ran.stdout.contains("readout"), "{}", ran.stdout);
 }

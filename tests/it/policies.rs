@@ -5,8 +5,9 @@ use std::path::Path;
 use dalean::chip::crossbar::kernel::Backend;
 use dalean::lab::config::{Config, Sources, load};
 use dalean::lab::data::DataRoot;
-use dalean::lab::run::{self, Machine, RunError, RunEvent, Verdict};
+use dalean::lab::run::{self, Keeping, Machine, RunError, RunEvent, Verdict};
 use dalean::lab::store::record::{PolicyTest, TestOutcome};
+use dalean::lab::store::stream;
 use serde_json::Value;
 
 use super::program::{dalean, finished, only_run, run as run_program};
@@ -76,6 +77,35 @@ fn a_policy_that_was_stopped_goes_on_to_the_same_bits_and_is_verified() {
     assert!(matches!(verdict, Verdict::Same { epochs: 4, test: true, .. }), "{verdict:?}");
     let (test, _) = run::evaluate(&folder, &root(), machine).unwrap();
     assert_eq!(test.policy(), Some(&whole.1));
+}
+
+#[test]
+fn a_policy_is_done_again_from_what_was_kept_of_its_environments_and_from_nothing_else() {
+    let machine = machine(Backend::best(), 1);
+    let work = tempfile::tempdir().unwrap();
+    for (settings, name) in [(&[][..], "one"), (&["environment.id=Foray-v0"], "two")] {
+        let out = work.path().join(name);
+        let config = config(settings);
+        run::train_keeping(&config, &root(), &out, machine, Keeping::STREAMS, &mut |_| true)
+            .unwrap();
+        let folder = only_run(&out);
+        let replayed = || run::replay(&folder, &root(), machine, None, &mut |_| true);
+        assert!(matches!(replayed().unwrap(), Verdict::Same { epochs: 3, test: true, .. }));
+        // what was shown decides what comes out
+        let file = folder.join("stream-00002.safetensors");
+        let kept = std::fs::read(&file).unwrap();
+        let mut record = stream::read(&kept).unwrap();
+        record.training.rewards[3] ^= 1 << 16;
+        std::fs::write(&file, stream::write(&record)).unwrap();
+        let other = replayed().unwrap();
+        assert!(matches!(other, Verdict::Different { .. }), "{other:?}");
+        record = stream::read(&kept).unwrap();
+        record.training.entries.pop();
+        std::fs::write(&file, stream::write(&record)).unwrap();
+        assert!(matches!(replayed(), Err(RunError::Environment(_))), "a stream that ends");
+        std::fs::write(&file, &kept[..kept.len() / 2]).unwrap();
+        assert!(replayed().is_err(), "half a file");
+    }
 }
 
 #[test]

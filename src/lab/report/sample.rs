@@ -48,6 +48,7 @@ impl Sample {
                 kernel: "scalar".into(),
                 threads: 2,
                 epoch_seconds: vec![0.0, 12.3],
+                steps_per_second: vec![],
             },
             warnings: vec!["a <warning>".into()],
             absent: vec![Absent {

@@ -87,7 +87,11 @@ impl Watcher {
                 pathways().filter_map(|one| one.training.get(event.name())).sum()
             };
             let before = (seen.counts, seen.pulses);
-            seen.counts = CLIPS.map(|(_, some, all, _)| [total(some), total(all)]);
+            seen.counts = CLIPS.map(|(_, some, all, _)| {
+                // what is normalised has an end as a table has one
+                let scaled = if all == Event::LookUps { total(Event::Scalings) } else { 0 };
+                [total(some), total(all) + scaled]
+            });
             seen.pulses = total(Event::PulsesAttempted);
             if epoch == 0 {
                 seen.shifts = [layer.rate_shift; 2];

@@ -14,7 +14,7 @@ use crate::lab::store::record::{
 };
 use crate::learn::driver::Driver;
 use crate::learn::statistics::PathwayRecord;
-use crate::task::environment::EnvSource;
+use crate::task::environment::{EnvSource, Record};
 use crate::task::policy::{
     Method, PolicyEpoch, PolicyError, PolicyExperiment, PolicyProgress, PolicyTrainer, WatchedStep,
 };
@@ -27,13 +27,17 @@ pub(super) struct Policy {
 
 impl Policy {
     /// Builds the networks and the environments, and finds ranges of converters.
-    pub(super) fn new(experiment: PolicyExperiment, machine: Machine) -> Result<Self, RunError> {
+    pub(super) fn new(
+        experiment: PolicyExperiment,
+        machine: Machine,
+        source: EnvSource,
+    ) -> Result<Self, RunError> {
         let mut layers = experiment.actor.layers.clone();
         if matches!(experiment.method, Method::Ppo(_)) {
             layers.extend(experiment.critic.layers.clone());
         }
         super::weigh(&layers, &experiment.hardware, super::Memory::left())?;
-        let mut trainer = PolicyTrainer::new(experiment, machine.backend(), EnvSource::Native)?;
+        let mut trainer = PolicyTrainer::new(experiment, machine.backend(), source)?;
         let threads = machine.threads();
         for network in trainer.networks_mut() {
             let engine = network.engine_mut();
@@ -94,11 +98,11 @@ impl Task for Policy {
     fn test(&mut self) -> Result<Option<TestOutcome>, RunError> {
         let evaluating = self.trainer.experiment().evaluation;
         let found = self.trainer.evaluate(evaluating.episodes_final)?;
-        let (epoch, of_epoch) = (self.trainer.epoch(), self.trainer.epoch_size().0);
+        let (epoch, steps) = (self.trainer.epoch(), self.trainer.steps());
         Ok(Some(TestOutcome::Policy(PolicyTest {
             epoch,
             select: "last".into(),
-            steps: u64::from(epoch) * of_epoch,
+            steps,
             episodes: EpisodesRecord::of(&found, evaluating.deterministic),
         })))
     }
@@ -145,6 +149,10 @@ impl Task for Policy {
 
     fn infer(&mut self) -> Result<(), RunError> {
         Ok(self.trainer.watch(0, &mut |_| false)?)
+    }
+
+    fn take_record(&mut self) -> Option<Record> {
+        self.trainer.take_record()
     }
 
     fn watch(

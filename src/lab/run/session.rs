@@ -16,6 +16,7 @@ use crate::lab::store::record::{
 use crate::lab::store::{address, hash};
 use crate::learn::driver::Driver;
 use crate::task::classify::Examples;
+use crate::task::environment::{EnvSource, Record};
 use crate::task::policy::WatchedStep;
 
 /// A training in memory.
@@ -59,9 +60,19 @@ impl Session {
     /// # Errors
     /// When the configuration does not fit the data or the chip, or the system gives no threads.
     pub fn new(config: &Config, data: Data, machine: Machine) -> Result<Self, RunError> {
+        Self::acting_on(config, data, machine, EnvSource::Native)
+    }
+
+    /// The same, of a policy whose environments come from elsewhere.
+    pub(crate) fn acting_on(
+        config: &Config,
+        data: Data,
+        machine: Machine,
+        source: EnvSource,
+    ) -> Result<Self, RunError> {
         let record = DataRecord::of(&data);
         let given = config.given(record.features, record.classes, record.image)?;
-        let task = task::build(config, data, machine)?;
+        let task = task::build(config, data, machine, source)?;
         let rates = rates(config, &record, &task.networks())?;
         let run = address::key(given, &record.hash);
         let notes = task.notes();
@@ -83,6 +94,11 @@ impl Session {
     /// Reads one sample, as an inference does.
     pub(crate) fn infer(&mut self) -> Result<(), RunError> {
         self.task.infer()
+    }
+
+    /// What environments showed since the last call, where that is recorded.
+    pub(crate) fn take_record(&mut self) -> Option<Record> {
+        self.task.take_record()
     }
 
     /// Shows an episode of a policy step by step until `look` says false; false where there are none.
@@ -159,12 +175,14 @@ impl Session {
         if saturated.saturating_mul(20) > conversions {
             add(Note::Saturated { epoch, saturated, conversions });
         }
+        // what is normalised has an end as a table has one
         let ends = [
-            ("tables", Event::SaturatedLookUps, Event::LookUps),
-            ("gates", Event::SaturatedGates, Event::Multiplies),
+            ("tables", Event::SaturatedLookUps, [Event::LookUps, Event::Scalings]),
+            ("gates", Event::SaturatedGates, [Event::Multiplies; 2]),
         ];
-        for (of, saturated, all) in ends {
-            let (saturated, all) = (total(saturated), total(all));
+        for (of, saturated, [one, other]) in ends {
+            let more = if one == other { 0 } else { total(other) };
+            let (saturated, all) = (total(saturated), total(one) + more);
             if saturated.saturating_mul(2) > all {
                 add(Note::Ends { epoch, of: of.into(), saturated, all });
             }

@@ -17,6 +17,7 @@ use crate::lab::store::record::{DataRecord, Note, Outcome, Score, SumRecord, Tes
 use crate::learn::driver::Driver;
 use crate::learn::statistics::PathwayRecord;
 use crate::task::classify::Examples;
+use crate::task::environment::{EnvSource, Record};
 use crate::task::policy::WatchedStep;
 
 /// How far an epoch is.
@@ -99,6 +100,11 @@ pub(super) trait Task: fmt::Debug {
         None
     }
 
+    /// What environments showed since the last call, where that is recorded.
+    fn take_record(&mut self) -> Option<Record> {
+        None
+    }
+
     /// Shows an episode step by step until `look` says false; false where there are none.
     fn watch(
         &mut self,
@@ -110,14 +116,15 @@ pub(super) trait Task: fmt::Debug {
     }
 }
 
-/// Builds what a configuration asks to be learnt.
+/// Builds what a configuration asks to be learnt; a policy acts on environments of this source.
 pub(super) fn build(
     config: &Config,
     data: Data,
     machine: Machine,
+    source: EnvSource,
 ) -> Result<Box<dyn Task>, RunError> {
     if let Some(experiment) = config.policy_experiment()? {
-        return Ok(Box::new(Policy::new(experiment, machine)?));
+        return Ok(Box::new(Policy::new(experiment, machine, source)?));
     }
     let record = DataRecord::of(&data);
     Ok(Box::new(Classify::new(config, data.split, &record, machine)?))

@@ -5,6 +5,7 @@
 )]
 
 use std::path::Path;
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use super::notes::{Watcher, with_calibration};
@@ -19,7 +20,8 @@ use crate::lab::store::ledger::LedgerRecord;
 use crate::lab::store::record::{
     BestRecord, DataRecord, EpochRecord, Note, RateRecord, Receipt, TestOutcome, TimingRecord,
 };
-use crate::lab::store::{address, hash};
+use crate::lab::store::{address, hash, stream};
+use crate::task::environment::EnvSource;
 use crate::task::policy::WatchedStep;
 
 /// What happens while a run is carried out.
@@ -63,11 +65,21 @@ pub struct Keeping {
     pub states: bool,
     /// Epochs that end within this time of the last checkpoint are not written down one by one.
     pub every: Duration,
+    /// Whether what the environments of a policy showed is kept, so that it can be done again without them.
+    pub streams: bool,
 }
 
 impl Keeping {
     /// Everything, after every epoch.
-    pub const ALL: Self = Self { states: true, every: Duration::ZERO };
+    pub const ALL: Self = Self { states: true, every: Duration::ZERO, streams: false };
+
+    /// The same, with what environments showed.
+    pub const STREAMS: Self = Self { streams: true, ..Self::ALL };
+
+    /// Where the environments of a policy come from.
+    fn source(self) -> EnvSource {
+        if self.streams { EnvSource::Recorded(Arc::default()) } else { EnvSource::Native }
+    }
 }
 
 /// A finished run.
@@ -137,13 +149,30 @@ pub fn train(
     machine: Machine,
     on_event: &mut (dyn FnMut(RunEvent<'_>) -> bool + Send),
 ) -> Result<Trained, RunError> {
+    train_keeping(config, data_root, root, machine, Keeping::ALL, on_event)
+}
+
+/// The same; `keeping` says which files it leaves.
+///
+/// # Errors
+/// As [`train`].
+pub fn train_keeping(
+    config: &Config,
+    data_root: &DataRoot,
+    root: &Path,
+    machine: Machine,
+    keeping: Keeping,
+    on_event: &mut (dyn FnMut(RunEvent<'_>) -> bool + Send),
+) -> Result<Trained, RunError> {
     let loaded = data::load(&config.source()?, data_root)?;
     let about = About::of(&loaded);
-    let session = Session::new(config, loaded, machine)?;
+    let session = Session::acting_on(config, loaded, machine, keeping.source())?;
     let folder = RunFolder::create(root, &config.run_name())?;
     let text = config.settled(&about.told, folder.path());
     folder.write(names::CONFIG, text.as_bytes())?;
-    Run::new(config, text, folder, machine, about, session).carry_out(on_event)
+    let mut run = Run::new(config, text, folder, machine, about, session);
+    run.keeping = keeping;
+    run.carry_out(on_event)
 }
 
 /// Continues a run from its last finished epoch.
@@ -162,9 +191,17 @@ pub fn resume(
     let (config, text) = read_config(path)?;
     let loaded = data::load(&config.source()?, data_root)?;
     let about = About::of(&loaded);
-    let session = Session::new(&config, loaded, machine)?;
+    // a run that began to keep what it was shown goes on with it
+    let streams = path.join(stream::stream_name(0)).exists();
+    let keeping = if streams { Keeping::STREAMS } else { Keeping::ALL };
+    let session = Session::acting_on(&config, loaded, machine, keeping.source())?;
     let mut run = Run::new(&config, text, folder, machine, about, session);
+    run.keeping = keeping;
     run.restore()?;
+    if !run.records.is_empty() {
+        // of what was shown while this was built, the folder has a record already
+        let _ = run.session.take_record();
+    }
     run.carry_out(on_event)
 }
 
@@ -181,7 +218,7 @@ pub fn carry_on(
     on_event: &mut (dyn FnMut(RunEvent<'_>) -> bool + Send),
 ) -> Result<Trained, RunError> {
     let about = About::of(loaded);
-    let session = || Session::new(config, loaded.clone(), machine);
+    let session = || Session::acting_on(config, loaded.clone(), machine, keeping.source());
     let text = config.settled(&about.told, folder.path());
     let begun = folder::read_text(folder.path(), names::CONFIG).is_ok_and(|found| found == text);
     let mut run = Run::new(config, text, folder, machine, about, session()?);
@@ -340,6 +377,7 @@ impl<'a> Run<'a> {
                 kernel: machine.backend().name().into(),
                 threads: machine.threads(),
                 epoch_seconds: vec![],
+                steps_per_second: vec![],
             },
             keeping: Keeping::ALL,
             written: Instant::now(),
@@ -382,7 +420,7 @@ impl<'a> Run<'a> {
         let mut records = proof::records(&path, &receipt)?;
         if !path.join(names::CHECKPOINT).exists() {
             // killed before the first one was in its place; later there is always one
-            if receipt.epoch_hashes.len() > 1 && self.keeping == Keeping::ALL {
+            if receipt.epoch_hashes.len() > 1 && self.keeping.every == Duration::ZERO {
                 let found = format!("is missing, though {} speaks of it", names::RECEIPT);
                 return Err(
                     FolderError::Content { path: path.join(names::CHECKPOINT), found }.into()
@@ -411,6 +449,7 @@ impl<'a> Run<'a> {
         let seconds = folder::read_timing(&path).epoch_seconds;
         self.timing.epoch_seconds =
             seconds.into_iter().chain(std::iter::repeat(0.0)).take(self.records.len()).collect();
+        self.timing.note_steps(&self.records);
         Ok(())
     }
 
@@ -466,10 +505,20 @@ impl<'a> Run<'a> {
         self.finish()
     }
 
+    /// Keeps what environments showed, where that is asked for.
+    fn keep_stream(&mut self, name: &str) -> Result<(), RunError> {
+        if let Some(record) = self.session.take_record() {
+            self.folder.write(name, &stream::write(&record))?;
+        }
+        Ok(())
+    }
+
     /// Puts a finished epoch on disk, if it is time to.
     fn keep(&mut self, record: EpochRecord, seconds: f64) -> Result<(), RunError> {
+        self.keep_stream(&stream::stream_name(record.epoch))?;
         self.records.push(record);
         self.timing.epoch_seconds.push(seconds);
+        self.timing.note_steps(&self.records);
         let epoch = self.session.epoch();
         let best = chosen(self.config.select, &self.records);
         let is_best = self.config.select == Select::BestValidation && best == Some(epoch);
@@ -583,6 +632,7 @@ impl<'a> Run<'a> {
         }
         let read = self.session.checkpoint();
         let test = self.session.test()?;
+        self.keep_stream(stream::STREAM_TEST)?;
         let receipt = self.receipt("finished", Some(&ledger_text), [metrics, checkpoint], test);
         let film = self.film()?;
         let page = super::report::Parts {

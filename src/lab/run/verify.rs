@@ -1,6 +1,7 @@
 //! Doing a run again and comparing everything that its folder says.
 
 use std::path::Path;
+use std::sync::{Arc, Mutex, PoisonError};
 
 use serde::Serialize;
 use serde_json::Value;
@@ -13,9 +14,10 @@ use crate::lab::config::Select;
 use crate::lab::data::{self, DataRoot};
 use crate::lab::store::checkpoint;
 use crate::lab::store::folder::{self, FolderError, RunFolder, names};
-use crate::lab::store::hash;
 use crate::lab::store::ledger::LedgerRecord;
 use crate::lab::store::record::{BestRecord, EpochRecord, Receipt, TestOutcome};
+use crate::lab::store::{hash, stream};
+use crate::task::environment::{EnvSource, Replaying};
 
 /// What doing a run again showed.
 ///
@@ -71,13 +73,43 @@ pub fn verify(
     epochs: Option<u32>,
     on_batch: &mut (dyn FnMut(Progress) -> bool + Send),
 ) -> Result<Verdict, RunError> {
-    match compare(path, data_root, machine, epochs, on_batch) {
+    verdict(compare(path, data_root, machine, epochs, None, on_batch))
+}
+
+/// The same of a policy, whose environments are not asked: it is shown what its folder has kept of them.
+///
+/// # Errors
+/// As [`verify`], and when nothing was kept.
+pub fn replay(
+    path: &Path,
+    data_root: &DataRoot,
+    machine: Machine,
+    epochs: Option<u32>,
+    on_batch: &mut (dyn FnMut(Progress) -> bool + Send),
+) -> Result<Verdict, RunError> {
+    let replaying = Some(Arc::default());
+    verdict(compare(path, data_root, machine, epochs, replaying, on_batch))
+}
+
+fn verdict(compared: Result<Verdict, Halt>) -> Result<Verdict, RunError> {
+    match compared {
         Ok(verdict) => Ok(verdict),
         Err(Halt::Error(error)) => Err(error),
         Err(Halt::Different { what, wanted, found }) => {
             Ok(Verdict::Different { what, wanted, found })
         }
     }
+}
+
+/// Shows what was kept in a file of the folder next; nothing where environments are asked.
+fn show(path: &Path, name: &str, replaying: Option<&Arc<Mutex<Replaying>>>) -> Result<(), Halt> {
+    if let Some(replaying) = replaying {
+        let bytes = folder::read_checkpoint(path, name)?;
+        let damaged = |found| FolderError::Content { path: path.join(name), found };
+        let record = stream::read(&bytes).map_err(damaged)?;
+        replaying.lock().unwrap_or_else(PoisonError::into_inner).begin(record);
+    }
+    Ok(())
 }
 
 fn differ(what: impl Into<String>, wanted: &str, found: &str) -> Halt {
@@ -98,11 +130,16 @@ fn compare(
     data_root: &DataRoot,
     machine: Machine,
     epochs: Option<u32>,
+    replaying: Option<Arc<Mutex<Replaying>>>,
     on_batch: &mut (dyn FnMut(Progress) -> bool + Send),
 ) -> Result<Verdict, Halt> {
     let (config, text) = read_config(path)?;
     let receipt = folder::read_receipt(path)?;
-    let mut session = Session::new(&config, data::load(&config.source()?, data_root)?, machine)?;
+    let replaying = replaying.as_ref();
+    show(path, &stream::stream_name(0), replaying)?;
+    let source = replaying.map_or(EnvSource::Native, |one| EnvSource::Replayed(Arc::clone(one)));
+    let loaded = data::load(&config.source()?, data_root)?;
+    let mut session = Session::acting_on(&config, loaded, machine, source)?;
     proof::inputs(&receipt, &session, &text)?;
     let kept = proof::records(path, &receipt)?;
     // as they were written: a record of an earlier program has fewer fields
@@ -134,8 +171,9 @@ fn compare(
         let record = if epoch == 0 {
             session.start()?
         } else {
-            let path = path.display().to_string();
+            let (folder, path) = (path, path.display().to_string());
             let stopped = || RunError::Stopped { epoch: epoch - 1, path };
+            show(folder, &stream::stream_name(epoch), replaying)?;
             session.advance(&mut on_batch)?.ok_or_else(stopped)?.0
         };
         let _ = session.note(&record);
@@ -169,6 +207,9 @@ fn compare(
     }
     let state_hash = records.last().map(|record| record.state_hash.clone()).unwrap_or_default();
     let mut unchecked = vec![names::REPORT.to_owned(), names::TIMING.to_owned()];
+    if replaying.is_none() && path.join(stream::stream_name(0)).exists() {
+        unchecked.push("what its environments showed (see --replay)".into());
+    }
     if !whole {
         unchecked.push(format!("epochs after {}", last.saturating_sub(1)));
         unchecked.push(format!("{} and {} beyond their hashes", names::LEDGER, names::CHECKPOINT));
@@ -190,7 +231,10 @@ fn compare(
         expected.status.clone_from(&receipt.status);
         expected.test = match test {
             Some(test) => Some(test),
-            None => session.test()?,
+            None => {
+                show(path, stream::STREAM_TEST, replaying)?;
+                session.test()?
+            }
         };
     }
     expected.states = receipt.states;

@@ -411,9 +411,22 @@ pub struct TimingRecord {
     pub threads: usize,
     /// Wall-clock seconds of learning, an epoch each, epoch 0 first.
     pub epoch_seconds: Vec<f64>,
+    /// Steps of all environments a second, an epoch each from the first one on; of policies.
+    #[serde(rename = "charts/SPS", default, skip_serializing_if = "Vec::is_empty")]
+    pub steps_per_second: Vec<f64>,
 }
 
 impl TimingRecord {
+    /// Steps a second of every epoch, of the steps that records tell.
+    pub(crate) fn note_steps(&mut self, records: &[EpochRecord]) {
+        let steps = records.iter().filter_map(|record| Some(record.policy()?.steps));
+        let steps: Vec<u64> = steps.collect();
+        let each = steps.windows(2).zip(self.epoch_seconds.iter().skip(1));
+        let each =
+            each.map(|(two, seconds)| two[1].saturating_sub(two[0]) as f64 / seconds.max(1e-9));
+        self.steps_per_second = each.collect();
+    }
+
     /// Wall-clock seconds of learning.
     #[must_use]
     pub fn train_seconds(&self) -> f64 {

@@ -6,14 +6,14 @@ use bitvec::prelude::*;
 
 use super::*;
 use crate::chip::crossbar::kernel::Backend;
-use crate::chip::engine::Phase;
+use crate::chip::engine::{Phase, Recorded};
 use crate::chip::hardware::Hardware;
 use crate::chip::layer::{DrivenBy, InitialLevels, LayerSpec, Optimiser};
 use crate::chip::ledger::Event;
 use crate::chip::population::Wiring;
 use crate::chip::state::{Piece, Seen, State, Visitor};
 use crate::learn::error::Centre;
-use crate::learn::network::NetworkSpec;
+use crate::learn::network::{NetworkPlace, NetworkSpec};
 use crate::learn::route::Route;
 use crate::learn::rule::{Rule, UpdateMode};
 use crate::num::fixed::{Batch, RateMantissa};
@@ -317,4 +317,63 @@ fn outcomes_that_do_not_fit_are_errors_and_move_nothing() {
         let error = check(change, &spec).unwrap_err();
         assert!(error.contains(found), "{error}");
     }
+}
+
+/// (operation, field) pairs of what was recorded.
+fn operations(tape: &[Recorded]) -> Vec<&'static str> {
+    tape.iter().filter_map(Recorded::operation).map(|operation| operation.name()).collect()
+}
+
+#[test]
+fn a_policy_and_a_classifier_learn_by_lists_of_the_same_five_operations() {
+    let mut policy = trainer(&experiment(IDS[0], Rule::Ed, None));
+    for driver in policy.networks_mut() {
+        let _ = driver.engine_mut().record(true);
+    }
+    let _ = policy.learn(&mut |_| true).unwrap();
+    let of_policy: Vec<_> = policy
+        .networks_mut()
+        .into_iter()
+        .map(|driver| operations(&driver.engine_mut().record(false)))
+        .collect();
+
+    let layer = |inputs, units, wiring, driven_by| LayerSpec {
+        inputs,
+        units,
+        wiring,
+        driven_by,
+        activation: Activation::Sigmoid(Positive::new(4.0).unwrap()),
+        weight_max_log2: 2,
+        initial: InitialLevels::Uniform { gain_64ths: [96, 32] },
+        constant_row: false,
+    };
+    let network = NetworkSpec {
+        layers: vec![
+            layer(4, 10, Wiring::Dual, DrivenBy::Shared),
+            layer(10, 2, Wiring::DualReadout, DrivenBy::Streams),
+        ],
+        centre: Centre::Batch,
+        optimisers: vec![Optimiser::Plain; 2],
+        centred: vec![false; 2],
+        ..network(4, 2, Rule::Ed)
+    };
+    let place = NetworkPlace { seed: 1, first_layer: 0, updates: 1 };
+    let mut classifier = network.build(&Hardware::reference(), Backend::best(), place).unwrap();
+    let _ = classifier.engine_mut().record(true);
+    classifier.learn(&[9; 4 * 16], |_, _, errors| errors.extend([100, -100].repeat(16)));
+    let of_classifier = operations(&classifier.engine_mut().record(false));
+
+    let wanted = [
+        "LOADX(row)",
+        "FWD(rows)",
+        "FWD(rows)",
+        "ERR(words)",
+        "ERR(words)",
+        "UPD(add)",
+        "UPD(add)",
+        "UPD(write)",
+        "UPD(write)",
+    ];
+    assert_eq!(of_classifier, wanted);
+    assert_eq!(of_policy, [wanted; 2], "actor and critic");
 }

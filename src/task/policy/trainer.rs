@@ -97,6 +97,22 @@ impl Learner {
         }
     }
 
+    /// Reads are charged to evaluation from now on; what they were charged to.
+    fn look(&mut self) -> Vec<Phase> {
+        let phase = |driver: &mut Driver| {
+            let (phase, engine) = (driver.engine().phase(), driver.engine_mut());
+            let _ = (engine.take_currents(), engine.take_mute());
+            engine.set_phase(Phase::Evaluation);
+            phase
+        };
+        self.networks_mut().into_iter().map(phase).collect()
+    }
+
+    fn go_back_to(&mut self, phases: &[Phase]) {
+        let networks = self.networks_mut().into_iter().zip(phases);
+        networks.for_each(|(driver, &phase)| driver.engine_mut().set_phase(phase));
+    }
+
     fn networks_mut(&mut self) -> Vec<&mut Driver> {
         match self {
             Self::Ppo(agent) => vec![&mut agent.player.actor.driver, &mut agent.critic.driver],
@@ -209,6 +225,15 @@ impl PolicyTrainer {
         self.epoch
     }
 
+    /// Steps of all environments that were learnt from in the epochs that are finished.
+    #[must_use]
+    pub fn steps(&self) -> u64 {
+        match &self.learner {
+            Learner::Ppo(_) => u64::from(self.epoch) * self.experiment.steps_per_epoch(),
+            Learner::Evolution(evolver) => evolver.steps,
+        }
+    }
+
     /// Steps (at most, of evolution) and updates (of each network) of an epoch.
     #[must_use]
     pub fn epoch_size(&self) -> (u64, u64) {
@@ -258,11 +283,8 @@ impl PolicyTrainer {
             }
         }
         self.epoch += 1;
-        told.steps = match learner {
-            Learner::Ppo(_) => u64::from(self.epoch) * steps_total,
-            Learner::Evolution(evolver) => evolver.steps,
-        };
-        told.log_sigma = learner.player().actor.log_sigma().to_vec();
+        told.steps = self.steps();
+        told.log_sigma = self.learner.player().actor.log_sigma().to_vec();
         Ok(told)
     }
 
@@ -272,16 +294,7 @@ impl PolicyTrainer {
     /// When the environment cannot go on.
     pub fn evaluate(&mut self, episodes: u32) -> Result<PolicyEvaluation, PolicyError> {
         let Self { experiment, source, learner, .. } = self;
-        let phases: Vec<Phase> = learner
-            .networks_mut()
-            .into_iter()
-            .map(|driver| {
-                let (phase, engine) = (driver.engine().phase(), driver.engine_mut());
-                let _ = (engine.take_currents(), engine.take_mute());
-                engine.set_phase(Phase::Evaluation);
-                phase
-            })
-            .collect();
+        let phases = learner.look();
         let mut told = PolicyEvaluation::default();
         if episodes > 0 {
             let seed = experiment.seed ^ ELSEWHERE;
@@ -293,16 +306,16 @@ impl PolicyTrainer {
             let played = learner.player().play(&mut *environments, manner, &mut |_, _| {})?;
             (told.returns, told.lengths) = (played.returns, played.lengths);
         }
-        for (driver, phase) in learner.networks_mut().into_iter().zip(phases) {
+        for driver in learner.networks_mut() {
             let engine = driver.engine_mut();
             told.currents.extend(engine.take_currents());
             told.mute.extend(engine.take_mute());
-            engine.set_phase(phase);
         }
+        learner.go_back_to(&phases);
         Ok(told)
     }
 
-    /// Watches an episode of the evaluation. False stops.
+    /// Watches an episode of the evaluation, and is charged to it. False stops.
     ///
     /// # Errors
     /// When the environment cannot go on.
@@ -316,6 +329,7 @@ impl PolicyTrainer {
         let mut environments = environment::make(&experiment.environment, seed, which + 1)?;
         let (mut shown, mut outcomes) = (Observations::default(), Outcomes::default());
         environments.reset(&mut shown);
+        let phases = learner.look();
         let mut codes = Vec::new();
         for step in 0.. {
             codes.clear();
@@ -347,6 +361,7 @@ impl PolicyTrainer {
             }
             std::mem::swap(&mut shown, &mut outcomes.next);
         }
+        learner.go_back_to(&phases);
         Ok(())
     }
 

@@ -150,7 +150,7 @@ pub(super) fn resolve(
         steps: time.steps,
         horizon: time.horizon,
         rollouts: time.rollouts,
-        evaluation: evaluation(file.evaluation.get_or_insert_default())?,
+        evaluation: evaluation(file.evaluation.get_or_insert_default(), PolicyDefaults::of(&id))?,
     };
     let epochs = policy.epochs().ok_or_else(|| {
         let allowed = "a run has fewer than 2^32 epochs: lower it, or raise environment.rollouts";
@@ -280,8 +280,7 @@ fn ppo(
     continuous: bool,
     defaults: &PolicyDefaults,
 ) -> Result<Ppo, ConfigError> {
-    let [discrete, of_numbers] = defaults::ENTROPY;
-    let entropy = if continuous { of_numbers } else { discrete };
+    let entropy = if continuous { defaults::ENTROPY_OF_NUMBERS } else { defaults.entropy };
     let passes = between("ppo.passes", *file.passes.get_or_insert(10), 1, 1000)?;
     let (mut log_sigma_start, mut log_sigma_rate) = (0, Share::ZERO);
     if continuous {
@@ -318,17 +317,20 @@ fn evolution(file: &mut EvolutionFile) -> Result<Evolution, ConfigError> {
     Ok(Evolution {
         pairs: small(between("es.pairs", pairs, 1, 4096)?),
         step: small(between("es.step", step, 1, 4095)?),
-        shift: small(between("es.shift", shift, 0, 30)?),
+        shift: small(between("es.shift", shift, 0, 16)?),
     })
 }
 
-fn evaluation(file: &mut EvaluationFile) -> Result<Evaluating, ConfigError> {
+fn evaluation(
+    file: &mut EvaluationFile,
+    defaults: &PolicyDefaults,
+) -> Result<Evaluating, ConfigError> {
     let episodes = *file.episodes.get_or_insert(8);
     let last = *file.final_episodes.get_or_insert(100);
     Ok(Evaluating {
         episodes: small(between("evaluation.episodes", episodes, 1, 10_000)?),
         episodes_final: small(between("evaluation.final_episodes", last, 1, 10_000)?),
-        deterministic: *file.deterministic.get_or_insert(true),
+        deterministic: *file.deterministic.get_or_insert(defaults.deterministic),
     })
 }
 

@@ -13,12 +13,17 @@ pub struct PolicyDefaults {
     pub id: Option<&'static str>,
     /// `ppo.gamma`.
     pub gamma: f64,
+    /// `ppo.entropy` of one of some actions.
+    pub entropy: f64,
+    /// `evaluation.deterministic`. A policy that does not remember walks in circles where it never tries anything else.
+    pub deterministic: bool,
 }
 
 /// One entry an environment that has defaults of its own, then the entry of all others.
-pub const POLICY_DEFAULTS: [PolicyDefaults; 2] = [
-    PolicyDefaults { id: Some("Pendulum-v1"), gamma: 0.95 },
-    PolicyDefaults { id: None, gamma: 0.99 },
+pub const POLICY_DEFAULTS: [PolicyDefaults; 3] = [
+    PolicyDefaults { id: Some("Pendulum-v1"), gamma: 0.95, entropy: 0.01, deterministic: true },
+    PolicyDefaults { id: Some("Foray-v0"), gamma: 0.98, entropy: 0.03, deterministic: false },
+    PolicyDefaults { id: None, gamma: 0.99, entropy: 0.01, deterministic: true },
 ];
 
 /// What is acted on.
@@ -41,12 +46,12 @@ pub(in crate::lab::config) const RATE: f64 = 0.25;
 pub(in crate::lab::config) const OUTPUT_MULTIPLIER: f64 = 2.0;
 /// Steps of a minibatch.
 pub(in crate::lab::config) const BATCH: i64 = 256;
-/// `ppo.entropy` of one of some actions, and of numbers.
-pub(in crate::lab::config) const ENTROPY: [f64; 2] = [0.01, 0.0];
+/// `ppo.entropy` of actions that are numbers.
+pub(in crate::lab::config) const ENTROPY_OF_NUMBERS: f64 = 0.0;
 /// `ppo.log_sigma`.
-pub(in crate::lab::config) const LOG_SIGMA: f64 = -0.5;
+pub(in crate::lab::config) const LOG_SIGMA: f64 = 0.0;
 /// `ppo.log_sigma_rate`.
-pub(in crate::lab::config) const LOG_SIGMA_RATE: f64 = 0.01;
+pub(in crate::lab::config) const LOG_SIGMA_RATE: f64 = 0.003;
 /// `es.pairs`.
 pub(in crate::lab::config) const PAIRS: i64 = 32;
 /// `es.step`.

@@ -287,6 +287,9 @@ const LEARNING: &[KeyEntry] = &[
         &[
             ("plain", "the sum over the batch, shifted"),
             ("sign", "one pulse in the direction of the sum, by chance"),
+            ("rms", "the sum, scaled by the root mean square over the layer"),
+            ("momentum", "an accumulator a cell that forgets an eighth at a write"),
+            ("adam_fx", "the mean sum of a cell in units of its root mean square, over 8 and 256 writes"),
         ],
     )
     .default("\"plain\"")
@@ -403,26 +406,26 @@ const PPO: &[KeyEntry] = &[
     whole("passes", 1, 1000).default("10").only(ON_POLICY, POLICY),
     other("gamma", "a number, 0 to 1")
         .default("0.99")
-        .otherwise("0.95 of Pendulum-v1")
+        .otherwise("0.95 of Pendulum-v1, 0.98 of Foray-v0")
         .only(ON_POLICY, POLICY),
     other("lambda", "a number, 0 to 1").default("0.95").only(ON_POLICY, POLICY),
     real("clip", 1e-3, 1.0).default("0.2").only(ON_POLICY, POLICY),
     other("entropy", "a number, 0 to 1")
         .default("0.01")
-        .otherwise("0.0 where actions are numbers")
+        .otherwise("0.0 where actions are numbers, 0.03 of Foray-v0")
         .only(ON_POLICY, POLICY),
-    other("log_sigma", "a number, -4 to 1").default("-0.5").only(ON_CONTINUOUS, CONTINUOUS),
-    other("log_sigma_rate", "a number, 0 to 1").default("0.01").only(ON_CONTINUOUS, CONTINUOUS),
+    other("log_sigma", "a number, -4 to 1").default("0").only(ON_CONTINUOUS, CONTINUOUS),
+    other("log_sigma_rate", "a number, 0 to 1").default("0.003").only(ON_CONTINUOUS, CONTINUOUS),
 ];
 
 const EVOLUTION: &[KeyEntry] = &[
     whole("pairs", 1, 4096).default("32").only(ON_EVOLUTION, BY_EVOLUTION),
     whole("step", 1, 4095).unit("levels").default("4").only(ON_EVOLUTION, BY_EVOLUTION),
-    whole("shift", 0, 30).unit("bits").default("4").only(ON_EVOLUTION, BY_EVOLUTION),
+    whole("shift", 0, 16).unit("bits").default("4").only(ON_EVOLUTION, BY_EVOLUTION),
 ];
 
 const EVALUATION: &[KeyEntry] = &[
     whole("episodes", 1, 10_000).default("8").only(ON_POLICY, POLICY),
     whole("final_episodes", 1, 10_000).default("100").only(ON_POLICY, POLICY),
-    flag("deterministic").default("true").only(ON_POLICY, POLICY),
+    flag("deterministic").default("true").otherwise("false of Foray-v0").only(ON_POLICY, POLICY),
 ];
