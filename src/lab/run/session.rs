@@ -180,7 +180,8 @@ impl Session {
             ("gates", Event::SaturatedGates, Event::Multiplies),
         ];
         for (of, saturated, all) in ends {
-            let (saturated, all) = (total(saturated), total(all));
+            let scaled = if all == Event::LookUps { total(Event::Scalings) } else { 0 };
+            let (saturated, all) = (total(saturated), total(all).saturating_add(scaled));
             if saturated.saturating_mul(2) > all {
                 add(Note::Ends { epoch, of: of.into(), saturated, all });
             }
