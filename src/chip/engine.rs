@@ -24,6 +24,7 @@ use super::hardware::Hardware;
 use super::layer::{DrivenBy, Layer};
 use super::ledger::{Cycles, During, Event, Ledger, coded};
 use super::population::{Stream, Wiring};
+use crate::num::tables::Scales;
 
 mod calibrate;
 mod columns;
@@ -232,6 +233,8 @@ pub struct Engine {
     collect: Collect,
     /// Small factor of the rate of each layer.
     mantissas: Vec<u32>,
+    /// Factors by powers of two, where an optimiser needs them.
+    scales: Option<Scales>,
     unit: ErrorUnit,
     layers: Vec<Layer>,
     /// What units do with their accumulators, by layer.
@@ -280,6 +283,7 @@ impl Engine {
             potentiation_only: false,
             collect,
             mantissas: vec![1; count],
+            scales: None,
             unit: ErrorUnit::new(
                 Centre::None,
                 hardware.digital.error_bits,

@@ -21,7 +21,7 @@ pub mod requests;
 mod state;
 
 pub use delivery::{Delivery, Taps, WordSource};
-pub use requests::{Optimiser, Requests};
+pub use requests::{Followed, Optimiser, Requests};
 
 /// Whose codes are on the rows of an array.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -22,7 +22,7 @@ use crate::chip::crossbar::{InitialLaw, initial_levels, initial_scale};
 use crate::chip::engine::{Engine, Operation};
 use crate::chip::hardware::Hardware;
 use crate::chip::layer::{self, Delivery, InitialLevels, Layer, LayerSpec, Optimiser, PlanError};
-use crate::chip::population::Polarity;
+use crate::chip::population::{Pathway, Polarity};
 use crate::num::draw::{Place, Site};
 use crate::num::fixed::{Batch, RateMantissa, log2_ceil};
 use crate::num::tables::{Activation, Decay, Positive, Rate, RateOf, half_gaussian};
@@ -159,7 +159,7 @@ impl NetworkSpec {
         let rates = self.rates.iter().zip(&self.mantissas).zip(&self.optimisers);
         self.layers.iter().zip(rates).map(|(spec, ((&rate, &mantissa), optimiser))| Rate {
             rate,
-            of: if optimiser.is_sign() { RateOf::Pulses } else { RateOf::Sums },
+            of: rate_of(spec, *optimiser),
             batch: self.batch,
             mantissa,
             error_bits: hardware.digital.error_bits,
@@ -236,6 +236,21 @@ impl NetworkSpec {
             Some(route) => route.delivery(spec.units, outputs, seed, number),
         });
         delivery.collect()
+    }
+}
+
+/// What the rate of a layer is a measure of.
+fn rate_of(spec: &LayerSpec, optimiser: Optimiser) -> RateOf {
+    match optimiser {
+        Optimiser::Sign { .. } => RateOf::Pulses,
+        Optimiser::Rms => {
+            let excites = |pathway: &&Pathway| pathway.polarity == Polarity::Excites;
+            let arrays = spec.wiring.pathways().iter().filter(excites).count();
+            let rows = spec.inputs + usize::from(spec.constant_row);
+            RateOf::Levels { fan_in: spec.inputs, cells: rows * spec.units * arrays }
+        }
+        Optimiser::AdamFx { .. } => RateOf::Requests,
+        _ => RateOf::Sums,
     }
 }
 

@@ -401,7 +401,7 @@ impl Kernel {
     ) -> WriteCounts {
         assert!(write.floor <= write.ceiling, "the window is not empty");
         let sums = sums.into();
-        let shift_max = if matches!(sums, Sums::Narrow(_)) { 31 } else { 39 };
+        let shift_max = if matches!(sums, Sums::Narrow(_)) { 31 } else { 55 };
         let fits = write.shift <= shift_max && (1..=15).contains(&write.mantissa);
         assert!(fits, "products fit 32 bits, and what is added before a shift too");
         assert!((1..=127).contains(&write.increment_max), "pulses fit a byte");
@@ -449,10 +449,30 @@ impl Kernel {
         call!(self, centre(sums, means, totals));
     }
 
-    /// Sums of the squares of the sums of a half block.
+    /// Sums of the gates of the 16 columns of a half block over all samples: `[stride / 4][16 columns][4 samples]`.
+    ///
+    /// # Panics
+    /// When the size is no such.
     #[must_use]
-    pub fn squares(&self, sums: &Half<i32>) -> Squares {
-        call!(self, squares(sums))
+    pub fn gate_totals(&self, gates: &[i8]) -> [i32; HALF_COLUMNS] {
+        assert!(gates.len().is_multiple_of(4 * HALF_COLUMNS), "16 columns of padded samples");
+        call!(self, gate_totals(gates))
+    }
+
+    /// Sums of the drives of the 64 rows of a block over all samples: `[64 rows][stride]`.
+    ///
+    /// # Panics
+    /// When the size is no such.
+    #[must_use]
+    pub fn drive_totals(&self, turned: &[u8], stride: usize) -> [u32; BLOCK_ROWS] {
+        assert!(stride > 0 && turned.len() == BLOCK_ROWS * stride, "64 rows");
+        call!(self, drive_totals(turned, stride))
+    }
+
+    /// Sums of the squares of the sums of a half block; `wide`: of centred ones.
+    #[must_use]
+    pub fn squares(&self, sums: &Half<i32>, wide: bool) -> Squares {
+        call!(self, squares(sums, wide))
     }
 
     /// Groups of four rows, a bit each, with a sum of at least that size.

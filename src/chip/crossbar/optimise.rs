@@ -9,8 +9,14 @@
 
 use std::ops::Range;
 
+mod adam;
+mod momentum;
+
+pub use adam::Adam;
+pub use momentum::Momentum;
+
 use super::StripMut;
-use super::kernel::{Draws, Half, Kernel, SignLaw, Squares, WriteCounts, WriteLaw, is_driven};
+use super::kernel::{Draws, Half, Kernel, SignLaw, WriteCounts, WriteLaw, is_driven, joined};
 use super::layout::{BLOCK_ROWS, HALF_CELLS, HALF_COLUMNS, PANEL_COLUMNS};
 use super::pulses::Collector;
 use super::words::Words;
@@ -27,21 +33,50 @@ pub struct Form<'a> {
 }
 
 /// What is asked for by sums that were kept.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Asks {
+#[derive(Debug)]
+pub enum Asks<'a> {
     /// A pulse towards each that is loud, with a chance. Words are of 16 bits, whatever the chip rounds with.
     Signs(SignLaw),
-    /// As many pulses as they are rounded to.
-    Rounded,
+    /// Nothing.
+    Nothing,
+    /// As many pulses as they are rounded to. They may be 16 times as large as those of a batch.
+    Sums,
+    /// The same, of sums that are not.
+    Narrow,
+    /// What comes of accumulators of the cells, which lie as sums do.
+    Momentum(Momentum, &'a mut [i64]),
+    /// What comes of two means of the cells, which lie as sums do.
+    Adam(Adam, [&'a mut [i64]; 2]),
 }
 
-impl Asks {
+impl Asks<'_> {
     /// Bits of a word.
-    const fn bits(self, rounding: DitherBits) -> DitherBits {
+    const fn bits(&self, rounding: DitherBits) -> DitherBits {
         match self {
             Self::Signs(_) => DitherBits::Sixteen,
-            Self::Rounded => rounding,
+            _ => rounding,
         }
+    }
+
+    /// What the sums of the half block at a place ask to be rounded, in 64 bits: a mantissa may take them beyond 32.
+    fn requests(&mut self, sums: &Half<i32>, at: usize) -> Half<i64> {
+        let mut requests = sums.map(i64::from);
+        match self {
+            Self::Signs(_) | Self::Nothing | Self::Narrow | Self::Sums => {}
+            Self::Momentum(momentum, moments) => {
+                for (request, moment) in requests.iter_mut().zip(&mut moments[at..]) {
+                    *moment = momentum.after(*moment, *request);
+                    *request = *moment;
+                }
+            }
+            Self::Adam(adam, [first, second]) => {
+                let means = first[at..].iter_mut().zip(&mut second[at..]);
+                for (request, (first, second)) in requests.iter_mut().zip(means) {
+                    *request = adam.request([first, second], *request);
+                }
+            }
+        }
+        requests
     }
 }
 
@@ -55,16 +90,17 @@ impl StripMut<'_> {
         gates: &[i8],
         form: Form<'_>,
         sums: &mut [i32],
-    ) -> Squares {
+    ) -> u128 {
         let blocks = self.layout.blocks();
-        let mut squares = [0; 2];
+        let mut squares = 0;
         if request.stride == 0 {
             sums.fill(0);
             return squares;
         }
         for (half, gates) in gates.chunks_exact(HALF_COLUMNS * request.stride).enumerate() {
             let live = is_driven(gates);
-            let totals = if live && form.means.is_some() { totals(gates) } else { [0; _] };
+            let centred = live && form.means.is_some();
+            let totals = if centred { kernel.gate_totals(gates) } else { [0; _] };
             for (block, turned) in request.turned.iter().enumerate() {
                 let sums = half_of(sums, place(half, block, blocks));
                 match turned {
@@ -76,8 +112,8 @@ impl StripMut<'_> {
                     kernel.centre(sums, means, &totals);
                 }
                 if form.squares && live {
-                    let more = kernel.squares(sums);
-                    squares.iter_mut().zip(more).for_each(|(sum, more)| *sum += more);
+                    let more = kernel.squares(sums, form.means.is_some());
+                    squares += joined(more);
                 }
             }
         }
@@ -90,54 +126,61 @@ impl StripMut<'_> {
         kernel: &Kernel,
         request: &WriteRequest<'_>,
         sums: &[i32],
-        asks: Asks,
+        mut asks: Asks<'_>,
     ) -> Written {
         let Range { start, end } = self.panels();
         let columns = start * PANEL_COLUMNS..end * PANEL_COLUMNS;
         let mut collector = Collector::new(request.collect, self.layout, columns.clone());
         let mut counts = WriteCounts::default();
-        let silent = matches!(asks, Asks::Signs(SignLaw { chance: 0, .. }));
-        if silent {
+        if matches!(asks, Asks::Nothing | Asks::Signs(SignLaw { chance: 0, .. })) {
             return Written { counts, collected: collector.finish(kernel) };
         }
-        let request = WriteRequest { dither_bits: asks.bits(request.dither_bits), ..*request };
+        let bits = asks.bits(request.dither_bits);
+        let request = WriteRequest { dither_bits: bits, ..*request };
         let draws = Draws::new(request.place, self.layout.rows);
         let mut words = Words::new(&request, draws, columns.clone());
         let blocks = self.layout.blocks();
         for block in 0..blocks {
             for half in 0..columns.len() / HALF_COLUMNS {
-                let column = columns.start + half * HALF_COLUMNS;
-                let sums = sums[place(half, block, blocks)..].first_chunk().expect("a half block");
-                let groups = match asks {
-                    Asks::Signs(law) => kernel.loud(sums, law.least),
-                    // a mantissa may take them beyond 32 bits
-                    Asks::Rounded => {
-                        let wide = sums.map(i64::from);
-                        kernel.may_move(&wide, &request.write, request.dither_bits.get())
-                    }
-                };
-                if groups == 0 {
-                    continue;
-                }
+                let (at, column) =
+                    (place(half, block, blocks), columns.start + half * HALF_COLUMNS);
+                let sums = sums[at..].first_chunk().expect("a half block");
                 let mut cells = self.half(half, block);
                 cells.pulses = collector.half(kernel, (column, block));
-                counts += match asks {
-                    Asks::Signs(law) => {
+                let groups = if let Asks::Signs(law) = asks {
+                    let groups = kernel.loud(sums, law.least);
+                    if groups != 0 {
+                        let law = SignLaw { groups, ..law };
                         let words = if law.is_certain() {
                             None
                         } else {
                             words.draw_halves(kernel, column, block)
                         };
-                        let law = SignLaw { groups, ..law };
-                        kernel.program_signs(cells, sums, &law, words, request.write.ends())
+                        counts +=
+                            kernel.program_signs(cells, sums, &law, words, request.write.ends());
                     }
-                    Asks::Rounded => {
+                    groups
+                } else if let Asks::Narrow = asks {
+                    let groups = kernel.may_move(sums, &request.write, bits.get());
+                    if groups != 0 {
                         let law = WriteLaw { groups, ..request.write };
-                        let wide = sums.map(i64::from);
-                        kernel.program(cells, &wide, &law, words.draw(kernel, column, block))
+                        let words = words.draw(kernel, column, block);
+                        counts += kernel.program(cells, sums, &law, words);
                     }
+                    groups
+                } else {
+                    let requests = asks.requests(sums, at);
+                    let groups = kernel.may_move(&requests, &request.write, bits.get());
+                    if groups != 0 {
+                        let law = WriteLaw { groups, ..request.write };
+                        let words = words.draw(kernel, column, block);
+                        counts += kernel.program(cells, &requests, &law, words);
+                    }
+                    groups
                 };
-                collector.take(kernel, (column, block), groups);
+                if groups != 0 {
+                    collector.take(kernel, (column, block), groups);
+                }
             }
         }
         Written { counts, collected: collector.finish(kernel) }
@@ -151,15 +194,4 @@ const fn place(half: usize, block: usize, blocks: usize) -> usize {
 
 fn half_of(sums: &mut [i32], at: usize) -> &mut Half<i32> {
     (&mut sums[at..at + HALF_CELLS]).try_into().expect("a half block has 1024 sums")
-}
-
-/// Sums of the gates of the columns of a half block.
-fn totals(gates: &[i8]) -> [i32; HALF_COLUMNS] {
-    let mut totals = [0; HALF_COLUMNS];
-    for quad in gates.as_chunks::<{ 4 * HALF_COLUMNS }>().0 {
-        for (total, gates) in totals.iter_mut().zip(quad.as_chunks::<4>().0) {
-            *total += gates.iter().map(|&gate| i32::from(gate)).sum::<i32>();
-        }
-    }
-    totals
 }

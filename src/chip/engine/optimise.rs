@@ -14,12 +14,14 @@ mod tests;
 use super::Engine;
 use super::each::each;
 use super::update::{Ready, SUM_BITS, strips};
-use crate::chip::crossbar::kernel::{MEAN_BITS, SignLaw, joined};
+use crate::chip::crossbar::kernel::{MEAN_BITS, SignLaw};
 use crate::chip::crossbar::layout::{BLOCK_ROWS, PANEL_COLUMNS};
-use crate::chip::crossbar::{Asks, Crossbar, Form, Written};
-use crate::chip::layer::Optimiser;
+use crate::chip::crossbar::{Adam, Asks, Crossbar, Form, Momentum, Written};
 use crate::chip::layer::requests::{dead_zone, first_mean, next_mean};
+use crate::chip::layer::{Optimiser, Requests};
 use crate::chip::ledger::{During, Event};
+use crate::chip::population::Polarity;
+use crate::num::tables::Scales;
 
 /// Bits of the mean of a row.
 const MEAN_WIDTH: u64 = 8 + MEAN_BITS as u64;
@@ -32,8 +34,10 @@ impl Engine {
     pub fn set_optimisers(&mut self, optimisers: &[Optimiser]) {
         assert_eq!(optimisers.len(), self.layers.len(), "one optimiser a layer");
         for (layer, &optimiser) in self.layers.iter_mut().zip(optimisers) {
-            layer.requests.optimiser = optimiser;
+            layer.requests.set_optimiser(optimiser, layer.spec.wiring, layer.layout);
         }
+        let any = optimisers.contains(&Optimiser::Rms);
+        self.scales = any.then(Scales::new);
     }
 
     /// Sets which layers are centred, and with which window: that many samples, as a power of two, move a mean by what it is
@@ -67,6 +71,7 @@ impl Engine {
         let work = this.layout.cells() * this.arrays.len() * ready.samples;
         let panels = this.layout.panels();
         let (requests, layout) = (&this.requests, this.layout);
+        let window = requests.window_log2;
         let parts = strips(&mut this.arrays);
         let strip_cells = Crossbar::STRIP_PANELS * layout.panel_cells();
         kept.resize(ready.arrays.len() * layout.cells_padded(), 0);
@@ -76,35 +81,69 @@ impl Engine {
         let parts = parts.map(|((place, (array, strip)), sums)| (place, (array, strip, sums)));
         let formed = each(&mut self.team, work, panels, parts.collect(), |kernel, part| {
             let (array, strip, sums) = part;
-            let means = requests.window_log2.map(|_| &requests.means[ready.arrays[array].set][..]);
-            let form = Form { means, squares: requests.optimiser.looks_at_layer() };
+            let means = window.map(|_| &requests.means[ready.arrays[array].set][..]);
+            let negate = ready.arrays[array].negate;
+            let form = Form { means, squares: looks_at(requests.optimiser, negate) };
             let gates = ready.gates(array, &strip);
             let squares = strip.form(kernel, &ready.request(array), gates, form, sums);
             (strip.panels().start, (array, strip, &*sums), squares)
         });
-        let squares: u128 = formed.iter().map(|(.., squares)| joined(*squares)).sum();
-        let cells = (layout.cells() * ready.arrays.len()) as u64;
-        let least = match requests.optimiser {
-            Optimiser::Sign { dead_zone: true } => 1 << dead_zone(squares, cells),
-            Optimiser::Sign { dead_zone: false } | Optimiser::Plain => 1,
-        };
-        let pulse_shift = shift + this.spec.wiring.shift_extra();
-        let asks = |negate| match requests.optimiser {
-            Optimiser::Sign { .. } => Asks::Signs(SignLaw::new(least, pulse_shift, negate)),
-            Optimiser::Plain => Asks::Rounded,
-        };
-        let finer = if requests.window_log2.is_some() { MEAN_BITS } else { 0 };
-        let parts = formed.into_iter().map(|(place, part, _)| (place, part)).collect();
-        let written =
-            each(&mut self.team, work, panels, parts, |kernel, (array, mut strip, sums)| {
-                let mut request = ready.request(array);
-                request.write.shift += finer;
-                let asks = asks(request.write.negate);
-                let written = strip.write_kept(kernel, &request, sums, asks);
-                (array, strip.panels().start * PANEL_COLUMNS, written)
-            });
-        if let (Some(codes), Some(window), false) = (&codes, requests.window_log2, first) {
-            let requests = &mut self.layers[layer].requests;
+        let squares: u128 = formed.iter().map(|(.., squares)| squares).sum();
+        let finer = if window.is_some() { MEAN_BITS } else { 0 };
+        let pairs = this.spec.wiring.shift_extra();
+        let chance = shift + pairs;
+        let (mut shift, mut scale) = (shift + pairs + finer, self.mantissas[layer]);
+        let (mut least, mut silent) = (1, false);
+        let Requests { optimiser, followed, words, .. } = &mut this.requests;
+        let optimiser = *optimiser;
+        match optimiser {
+            Optimiser::Plain | Optimiser::Sign { dead_zone: false } => {}
+            Optimiser::Sign { dead_zone: true } => {
+                least = 1 << dead_zone(squares, (layout.cells() * ready.arrays.len()) as u64);
+            }
+            Optimiser::Rms => {
+                let scales = self.scales.as_ref().expect("made with the optimiser");
+                match followed.follow(squares, chance - pairs, scales) {
+                    // centred sums have been squared as they are
+                    Some(factor) => (scale, shift) = (factor.mantissa, factor.shift + pairs),
+                    None => silent = true,
+                }
+            }
+            Optimiser::Momentum { decay } => shift += decay,
+            // fractional bits of the sums are rounded off before
+            Optimiser::AdamFx { .. } => shift -= finer,
+        }
+        let strips_of = layout.cells_padded().div_ceil(strip_cells);
+        let words = words.iter_mut().flat_map(|words| {
+            let mut parts = words.each_mut().map(|words| words.chunks_mut(strip_cells));
+            (0..strips_of).map(move |_| parts.each_mut().map(|p| p.next().unwrap_or_default()))
+        });
+        let parts = formed.into_iter().zip(words);
+        let parts = parts.map(|((place, part, _), words)| (place, (part, words))).collect();
+        let written = each(&mut self.team, work, panels, parts, |kernel, part| {
+            let ((array, mut strip, sums), [one, two]) = part;
+            let mut request = ready.request(array);
+            request.write.shift = shift;
+            request.write.mantissa = i32::try_from(scale).expect("1..=15");
+            let asks = match optimiser {
+                _ if silent => Asks::Nothing,
+                Optimiser::Plain | Optimiser::Rms if finer == 0 && shift <= 31 => Asks::Narrow,
+                Optimiser::Plain | Optimiser::Rms => Asks::Sums,
+                Optimiser::Sign { .. } => {
+                    Asks::Signs(SignLaw::new(least, chance, request.write.negate))
+                }
+                Optimiser::Momentum { decay } => Asks::Momentum(Momentum { decay }, one),
+                Optimiser::AdamFx { first_decay, second_decay } => {
+                    let (begins, fraction) = (first, finer);
+                    let adam = Adam { first_decay, second_decay, begins, fraction };
+                    Asks::Adam(adam, [one, two])
+                }
+            };
+            let written = strip.write_kept(kernel, &request, sums, asks);
+            (array, strip.panels().start * PANEL_COLUMNS, written)
+        });
+        if let (Some(codes), Some(window), false) = (&codes, window, first) {
+            let requests = &mut this.requests;
             let next = |mean, codes| next_mean(mean, codes, samples, window);
             move_means(&mut requests.means, codes, next);
         }
@@ -113,20 +152,16 @@ impl Engine {
     }
 
     /// Sums of the drive codes of each row, padded, by set of drives.
-    fn codes(&self, layer: usize, ready: &Ready<'_>) -> [Vec<i64>; 2] {
+    fn codes(&mut self, layer: usize, ready: &Ready<'_>) -> [Vec<i64>; 2] {
         let mut codes = [vec![], vec![]];
-        for (set, turned) in self.layers[layer].spec.drive_sets().iter().zip(&ready.turned) {
-            for block in turned {
-                let row = |row: &[u8]| -> i64 {
-                    row.iter().map(|&code| u32::from(code)).sum::<u32>().into()
-                };
-                match block {
-                    Some(rows) => {
-                        codes[set.index()].extend(rows.chunks_exact(ready.stride).map(row))
-                    }
-                    None => codes[set.index()].extend([0; BLOCK_ROWS]),
-                }
-            }
+        let sets = self.layers[layer].spec.drive_sets();
+        let blocks: Vec<_> = ready.turned.iter().flatten().copied().collect();
+        let sums = self.team.alone(blocks, |kernel, block| {
+            block.map_or([0; BLOCK_ROWS], |turned| kernel.drive_totals(turned, ready.stride))
+        });
+        let rows = sums.chunks((sums.len() / sets.len()).max(1));
+        for (set, rows) in sets.iter().zip(rows) {
+            codes[set.index()].extend(rows.as_flattened().iter().map(|&sum| i64::from(sum)));
         }
         codes
     }
@@ -140,13 +175,18 @@ impl Engine {
         }
         let (optimiser, centred) = (requests.optimiser, requests.window_log2.is_some());
         let (rows, spec) = (this.layout.rows as u64, this.spec.clone());
-        let looks = optimiser.looks_at_layer();
+        let cells = this.layout.cells() as u64;
         if optimiser != Optimiser::Plain {
             self.charge_cells(layer, Event::OptimiserSteps, 1);
+            // words are read and stored again
+            self.charge_cells(layer, Event::SramBits, 2 * u64::from(optimiser.memory().1));
         }
-        if looks {
-            self.charge_cells(layer, Event::SumSquares, 1);
-            self.charge_cells(layer, Event::SramBits, SUM_BITS);
+        for pathway in spec.wiring.pathways() {
+            if looks_at(optimiser, pathway.polarity == Polarity::Inhibits) {
+                let during = During::Update;
+                self.charge(layer, pathway.code, during, Event::SumSquares, cells);
+                self.charge(layer, pathway.code, during, Event::SramBits, SUM_BITS * cells);
+            }
         }
         if !centred {
             return;
@@ -155,14 +195,22 @@ impl Engine {
             self.charge(layer, code, During::Update, Event::RowMeans, count);
             self.charge(layer, code, During::Update, Event::SramBits, MEAN_WIDTH * count);
         };
-        // used by every array in each pass, and kept once a set of drives
+        // used by every array in each pass that sees it, and kept once a set of drives
         let pathways = spec.wiring.pathways();
-        pathways.iter().for_each(|pathway| means(pathway.code, rows * (1 + u64::from(looks))));
+        for pathway in pathways {
+            let looks = looks_at(optimiser, pathway.polarity == Polarity::Inhibits);
+            means(pathway.code, rows * (1 + u64::from(looks)));
+        }
         for &set in spec.drive_sets() {
             let first = pathways.iter().find(|pathway| spec.drives_of(pathway.source) == set);
             means(first.expect("drives drive an array").code, rows);
         }
     }
+}
+
+/// Whether an optimiser squares the sums of an array, which inhibits or excites.
+const fn looks_at(optimiser: Optimiser, inhibits: bool) -> bool {
+    optimiser.looks_at_layer() && (!inhibits || optimiser.looks_at_all())
 }
 
 /// Gives every mean another value, of what it is and of the sum of the codes of its row.

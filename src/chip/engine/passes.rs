@@ -44,8 +44,12 @@ impl Passes {
         pulses: Option<&Pulses>,
     ) -> Self {
         let mut passes = Self { busy: 0, by_target: [0; 2] };
+        // a row takes so long beside its pulses
+        let beats = layer.requests.optimiser.beats();
         match pulses {
-            None => passes.add(timing, Stream::P, layer.layout.rows.min(hardware.tile.rows), 0),
+            None => {
+                passes.add(timing, Stream::P, (layer.layout.rows.min(hardware.tile.rows), beats), 0)
+            }
             Some(Pulses::Peaks(tiles)) => {
                 for tile in tiles {
                     for rows in tile.peaks.rows.chunks(hardware.tile.rows) {
@@ -54,7 +58,7 @@ impl Passes {
                             PulseCode::Unary => peaks.map(|&peak| u32::from(peak)).sum(),
                             PulseCode::Amplitude => peaks.map(|&peak| u32::from(peak > 0)).sum(),
                         };
-                        passes.add(timing, tile.target, rows.len(), sum.into());
+                        passes.add(timing, tile.target, (rows.len(), beats), sum.into());
                     }
                 }
             }
@@ -64,7 +68,7 @@ impl Passes {
                     for first in (0..layer.layout.columns).step_by(hardware.tile.columns) {
                         let rows = limited(hardware, timing, layer, banks, first);
                         for rows in rows.chunks(hardware.tile.rows) {
-                            passes.add(timing, target, rows.len(), rows.iter().sum());
+                            passes.add(timing, target, (rows.len(), beats), rows.iter().sum());
                         }
                     }
                 }
@@ -73,9 +77,10 @@ impl Passes {
         passes
     }
 
-    /// Takes a tile along, given the passes of all its rows.
-    fn add(&mut self, timing: Timing, target: Stream, rows: usize, passes: u64) {
-        self.busy = self.busy.max(timing.rows(rows as u64, passes));
+    /// Takes a tile along, given the passes of all its rows, each of which takes so many beats more to be computed.
+    fn add(&mut self, timing: Timing, target: Stream, (rows, beats): (usize, u64), passes: u64) {
+        let computed = timing.beat * beats * rows as u64;
+        self.busy = self.busy.max(timing.rows(rows as u64, passes) + computed);
         self.by_target[target.index()] += passes;
     }
 }

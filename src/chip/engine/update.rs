@@ -95,7 +95,9 @@ impl Engine {
         let wiring = self.layers[layer].spec.wiring;
         self.row_sums[layer] = None;
         self.registers[layer].pulses = Pulses::none(self.collect, &self.layers[layer]);
-        if !samples.is_empty() {
+        // words are moved by a write of nothing too
+        let moves = self.layers[layer].requests.optimiser.memory().0 > 0;
+        if !samples.is_empty() || moves {
             let counts = self.program_some(layer, &samples, shift);
             for (array, counts) in counts {
                 let code = wiring.pathways()[array].code;
@@ -137,7 +139,8 @@ impl Engine {
             .iter()
             .zip(&live)
             .map(|(turned, live)| {
-                let blocks = turned.chunks_exact(BLOCK_ROWS * stride);
+                // of no samples, nothing
+                let blocks = turned.chunks_exact((BLOCK_ROWS * stride).max(1));
                 blocks.zip(live).map(|(block, live)| live.then_some(block)).collect()
             })
             .collect();
@@ -235,8 +238,9 @@ impl Engine {
         let blocks = self.layers[layer].layout.blocks();
         turned.resize(blocks * size, 0);
         let drives = &self.registers[layer].drives[set.index()];
-        let drives = drives.chunks_exact(self.samples * BLOCK_ROWS);
-        let parts = drives.zip(turned.chunks_exact_mut(size)).enumerate().collect();
+        let drives = drives.chunks_exact((self.samples * BLOCK_ROWS).max(1));
+        let turned = turned.chunks_exact_mut(size.max(1));
+        let parts = drives.zip(turned).enumerate().collect();
         each(&mut self.team, blocks * size * MOVE, blocks, parts, |kernel, (codes, turned)| {
             let codes = &codes[samples.start * BLOCK_ROWS..samples.end * BLOCK_ROWS];
             let live = kernel::is_driven(codes);

@@ -15,9 +15,14 @@
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
 use crate::chip::crossbar::kernel::MEAN_BITS;
-use crate::chip::population::Stream;
+use crate::chip::crossbar::layout::{BLOCK_ROWS, HALF_CELLS, HALF_COLUMNS, Layout};
+use crate::chip::population::{Stream, Wiring};
 use crate::chip::state::{Piece, Section, StateError, Visitor};
 use crate::num::fixed::rsh;
+
+mod rms;
+
+pub use rms::Followed;
 
 /// What makes requests of sums.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -30,9 +35,26 @@ pub enum Optimiser {
         /// Whether sums below the layer's root mean square, as a power of two, give none.
         dead_zone: bool,
     },
+    /// The sum, scaled so that the layer's root mean square asks for a given number of levels.
+    Rms,
+    /// An accumulator a cell, which forgets `2^-decay` of itself at a write.
+    Momentum {
+        /// 1..=8.
+        decay: u32,
+    },
+    /// The mean of a cell's sums in units of the root of the mean of their squares.
+    AdamFx {
+        /// The mean of sums forgets `2^-first_decay` of itself at a write: 1..=8.
+        first_decay: u32,
+        /// The mean of squares forgets `2^-second_decay`: 1..=8.
+        second_decay: u32,
+    },
 }
 
 impl Optimiser {
+    /// Greatest decay.
+    pub const DECAY_MAX: u32 = 8;
+
     /// Whether it asks for a whole number of pulses by itself, so that nothing is rounded.
     #[must_use]
     pub const fn is_sign(self) -> bool {
@@ -42,7 +64,29 @@ impl Optimiser {
     /// Whether it looks at the sums of a whole layer before it asks for anything.
     #[must_use]
     pub const fn looks_at_layer(self) -> bool {
+        matches!(self, Self::Sign { dead_zone: true } | Self::Rms)
+    }
+
+    /// Whether it looks at those of pathways that inhibit, too.
+    #[must_use]
+    pub const fn looks_at_all(self) -> bool {
         matches!(self, Self::Sign { dead_zone: true })
+    }
+
+    /// Words that it keeps of every cell, and the bits of both together.
+    #[must_use]
+    pub const fn memory(self) -> (usize, u32) {
+        match self {
+            Self::Plain | Self::Sign { .. } | Self::Rms => (0, 0),
+            Self::Momentum { decay } => (1, 33 + decay),
+            Self::AdamFx { first_decay, second_decay } => (2, 29 + first_decay + 55 + second_decay),
+        }
+    }
+
+    /// Beats that a row of cells takes beyond the one in which its increments are computed: a root and a division.
+    #[must_use]
+    pub const fn beats(self) -> u64 {
+        if matches!(self, Self::AdamFx { .. }) { 32 } else { 0 }
     }
 }
 
@@ -55,17 +99,35 @@ pub struct Requests {
     pub window_log2: Option<u32>,
     /// `A` by set of drives and row, padded; empty where updates are not centred.
     pub(crate) means: [Vec<i32>; 2],
+    /// The scale of the layer, of `rms`.
+    pub(crate) followed: Followed,
+    /// Words of each array, first and second, one a cell where sums lie (`crossbar::optimise`), padded.
+    pub(crate) words: Vec<[Vec<i64>; 2]>,
 }
 
 impl Requests {
     /// Sums as they are.
-    pub(super) const PLAIN: Self =
-        Self { optimiser: Optimiser::Plain, window_log2: None, means: [vec![], vec![]] };
+    pub(super) const PLAIN: Self = Self {
+        optimiser: Optimiser::Plain,
+        window_log2: None,
+        means: [vec![], vec![]],
+        followed: Followed::NOTHING,
+        words: vec![],
+    };
 
     /// Whether sums are asked for as they are, all at once.
     #[must_use]
     pub fn are_plain(&self) -> bool {
         self.optimiser == Optimiser::Plain && self.window_log2.is_none()
+    }
+
+    /// Requests by an optimiser, over arrays of a layout. What was remembered is forgotten.
+    pub(crate) fn set_optimiser(&mut self, optimiser: Optimiser, wiring: Wiring, layout: Layout) {
+        self.optimiser = optimiser;
+        self.followed = Followed::NOTHING;
+        let kept = optimiser.memory().0;
+        let plane = |word| if word < kept { vec![0; layout.cells_padded()] } else { vec![] };
+        self.words = wiring.pathways().iter().map(|_| [plane(0), plane(1)]).collect();
     }
 
     /// Centres updates with a window, over so many padded rows of these sets of drives.
@@ -84,15 +146,66 @@ impl Requests {
         &self.means[set.index()]
     }
 
-    /// Shows the means of the `rows` rows that exist.
+    /// The scale of the layer, of `rms`.
+    #[must_use]
+    pub const fn followed(&self) -> Followed {
+        self.followed
+    }
+
+    /// A word, 0 or 1, of every cell of an array, row-major; empty where there is none.
+    #[must_use]
+    pub fn words(&self, array: usize, word: usize, layout: Layout) -> Vec<i64> {
+        match self.words.get(array) {
+            Some(words) if !words[word].is_empty() => {
+                places(layout).map(|at| words[word][at]).collect()
+            }
+            _ => vec![],
+        }
+    }
+
+    /// Shows what is remembered of a layer whose arrays have these names.
     pub(super) fn visit(
         &mut self,
         layer: &str,
-        rows: usize,
+        (wiring, layout): (Wiring, Layout),
         visitor: &mut dyn Visitor,
     ) -> Result<(), StateError> {
+        if self.optimiser == Optimiser::Rms {
+            let piece = Piece {
+                name: &format!("{layer}.rms"),
+                section: Some(Section::Optimiser),
+                within: -1..=i64::MAX,
+            };
+            if let Some(new) =
+                visitor.numbers(&piece, &[self.followed.power, self.followed.ends])?
+            {
+                // squares are below 2^128
+                self.followed = Followed { power: new[0].min(128 << 8), ends: new[1].max(0) };
+            }
+        }
+        for (array, pathway) in wiring.pathways().iter().enumerate() {
+            for (word, name) in ["moment", "square"].into_iter().enumerate() {
+                let now = self.words(array, word, layout);
+                if now.is_empty() {
+                    continue;
+                }
+                // a moment is below 2^(32 + 8), a mean square below 2^(55 + 8)
+                let within = [-(1 << 40)..=1 << 40, 0..=i64::MAX][word].clone();
+                let piece = Piece {
+                    name: &format!("{layer}.{}.{name}", pathway.name),
+                    section: Some(Section::Optimiser),
+                    within,
+                };
+                if let Some(new) = visitor.numbers(&piece, &now)? {
+                    let cells = &mut self.words[array][word];
+                    places(layout).zip(new).for_each(|(at, new)| cells[at] = new);
+                }
+            }
+        }
         for (means, set) in self.means.iter_mut().zip(["p", "n"]) {
-            let Some(means) = means.get_mut(..rows) else { continue };
+            let Some(means) = means.get_mut(..layout.rows).filter(|means| !means.is_empty()) else {
+                continue;
+            };
             let piece = Piece {
                 name: &format!("{layer}.row_means.{set}"),
                 section: Some(Section::RowMeans),
@@ -107,6 +220,15 @@ impl Requests {
         }
         Ok(())
     }
+}
+
+/// Places of the cells of an array, row-major, among its kept sums.
+fn places(layout: Layout) -> impl Iterator<Item = usize> {
+    let cells = (0..layout.rows).flat_map(move |r| (0..layout.columns).map(move |c| (r, c)));
+    cells.map(move |(row, column)| {
+        let half = layout.index(row, column) / HALF_CELLS;
+        half * HALF_CELLS + row % BLOCK_ROWS * HALF_COLUMNS + column % HALF_COLUMNS
+    })
 }
 
 /// A mean before the first write: that of `samples` samples whose codes add up to `codes`.

@@ -38,7 +38,7 @@ impl Layer {
                 });
             }
         }
-        self.requests.visit(&name, self.layout.rows, visitor)?;
+        self.requests.visit(&name, (self.spec.wiring, self.layout), visitor)?;
         if !self.rails.is_empty() {
             let counts = self.rails.iter_mut().flatten().flatten();
             visit_counts(visitor, &format!("{name}.rails"), Section::SampleCounters, counts)?;

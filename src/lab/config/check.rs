@@ -295,7 +295,11 @@ fn mantissas(
     let asked = learning.rates.iter().zip(layers).zip(below.map(full_drive));
     let asked = asked.map(|((&rate, (&activation, &weight_max_log2)), full_drive)| Rate {
         rate,
-        of: if learning.optimiser.is_sign() { RateOf::Pulses } else { RateOf::Sums },
+        of: match learning.optimiser {
+            Optimiser::Sign { .. } => RateOf::Pulses,
+            Optimiser::AdamFx { .. } => RateOf::Requests,
+            _ => RateOf::Sums,
+        },
         batch: learning.batch,
         mantissa: RateMantissa::new(1).expect("in range"),
         error_bits: hardware.digital.error_bits,

@@ -168,7 +168,7 @@ keys! {
         dead_zone: bool,
         /// Policies: whether hidden layers of the network that acts learn from what differs from the mean of each row.
         centred: bool,
-        /// Rate, before multipliers; of the optimiser `sign`, the probability of a pulse.
+        /// Rate, before multipliers; of the optimiser `sign` the probability of a pulse, of `rms` and `adam_fx` a step of weights.
         rate: f64,
         /// Factor of the rate of each layer.
         rate_multipliers: PerLayer<f64>,

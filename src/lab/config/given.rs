@@ -234,9 +234,14 @@ impl List {
         }
         for (number, (optimiser, centred)) in (first..).zip(optimisers.iter().zip(centred)) {
             let optimiser = match optimiser {
-                Optimiser::Plain => "plain",
-                Optimiser::Sign { dead_zone: false } => "sign",
-                Optimiser::Sign { dead_zone: true } => "sign with a dead zone",
+                Optimiser::Plain => "plain".to_owned(),
+                Optimiser::Sign { dead_zone: false } => "sign".to_owned(),
+                Optimiser::Sign { dead_zone: true } => "sign with a dead zone".to_owned(),
+                Optimiser::Rms => "rms".to_owned(),
+                Optimiser::Momentum { decay } => format!("momentum {decay}"),
+                Optimiser::AdamFx { first_decay, second_decay } => {
+                    format!("adam_fx {first_decay} {second_decay}")
+                }
             };
             self.put(&format!("layer{number}.optimiser"), optimiser);
             self.put(&format!("layer{number}.centred"), centred);

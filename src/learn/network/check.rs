@@ -328,16 +328,30 @@ fn optimisers(network: &NetworkSpec, hardware: &Hardware) -> Checked {
         return misfit("learning.centred", "is true of a layer beside rule = \"kaneko\"", allowed);
     }
     for (at, optimiser) in network.optimisers.iter().enumerate() {
-        if !optimiser.is_sign() {
-            continue;
+        let (name, decays) = match *optimiser {
+            Optimiser::Sign { .. } => ("sign", [1, 1]),
+            Optimiser::Rms => ("rms", [1, 1]),
+            Optimiser::Momentum { decay } => ("momentum", [decay, 1]),
+            Optimiser::AdamFx { first_decay, second_decay } => {
+                ("adam_fx", [first_decay, second_decay])
+            }
+            _ => continue,
+        };
+        if let Some(decay) =
+            decays.iter().find(|decay| !(1..=Optimiser::DECAY_MAX).contains(*decay))
+        {
+            let found = format!("forgets 2^-{decay} in layer {at}");
+            let allowed = format!("a decay is 1..={}", Optimiser::DECAY_MAX);
+            return misfit("learning.optimiser", found, allowed);
         }
-        let found = format!("is \"sign\" in layer {at}");
-        if hardware.write.residual_bits.get() > 0 {
+        let found = format!("is \"{name}\" in layer {at}");
+        if optimiser.is_sign() && hardware.write.residual_bits.get() > 0 {
             let allowed = "it asks for whole pulses, of which no remainder is left; use hw.write.residual_bits = 0";
             return misfit("learning.optimiser", found, allowed);
         }
-        if network.mantissas.get(at).is_some_and(|mantissa| mantissa.get() != 1) {
-            let allowed = "its rate is the chance of a pulse, which no mantissa scales; leave learning.rate_mantissa at 1";
+        let scales = optimiser.is_sign() || *optimiser == Optimiser::Rms;
+        if scales && network.mantissas.get(at).is_some_and(|mantissa| mantissa.get() != 1) {
+            let allowed = "what it scales pulses by has no mantissa of yours beside it; leave learning.rate_mantissa at 1";
             return misfit("learning.optimiser", found, allowed);
         }
     }

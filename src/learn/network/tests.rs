@@ -5,7 +5,7 @@ use crate::chip::layer::DrivenBy;
 use crate::chip::ledger::Event;
 use crate::chip::population::Wiring;
 use crate::learn::rule::Readout;
-use crate::num::fixed::AdcBits;
+use crate::num::fixed::{AdcBits, ResidualBits};
 use crate::num::tables::Activation;
 
 /// 5 to 4 to 3 units by error diffusion: as plain as can be.
@@ -33,6 +33,12 @@ fn plain() -> NetworkSpec {
         optimisers: vec![Optimiser::Plain; 2],
         centred: vec![false; 2],
     }
+}
+
+/// The same, by pulses towards sums.
+fn signs() -> NetworkSpec {
+    let optimisers = vec![Optimiser::Sign { dead_zone: false }; 2];
+    NetworkSpec { optimisers, rates: vec![Positive::ONE; 2], ..plain() }
 }
 
 fn baseline(rule: Rule) -> NetworkSpec {
@@ -64,7 +70,7 @@ fn refused(network: &NetworkSpec) -> NetworkError {
 #[test]
 fn everything_that_does_not_fit_together_is_refused_with_its_key() {
     type Change = fn(&mut NetworkSpec);
-    let cases: [(&str, &str, Change); 36] = [
+    let cases: [(&str, &str, Change); 46] = [
         ("network.hidden", "0 layers", |n| n.layers.clear()),
         ("network.hidden", "a layer of 0 units", |n| n.layers[1].units = 0),
         ("network.hidden", "a layer of 0 inputs", |n| n.layers[0].inputs = 0),
@@ -138,6 +144,38 @@ fn everything_that_does_not_fit_together_is_refused_with_its_key() {
         ("learning.rate", "layer 1 a k of 33", |n| {
             n.rates[1] = Positive::new(5e-6).unwrap();
         }),
+        ("learning.optimiser", "of 1 layers", |n| n.optimisers.truncate(1)),
+        ("learning.centred", "of 0 layers", |n| n.centred.clear()),
+        ("learning.optimiser", "learning.mode = \"accumulate\"", |n| {
+            (n.mode, n.optimisers[1]) = (UpdateMode::Replay, Optimiser::Rms);
+        }),
+        ("learning.centred", "learning.mode = \"accumulate\"", |n| {
+            (n.mode, n.centred[0]) = (UpdateMode::Replay, true);
+        }),
+        ("learning.optimiser", "leave learning.rate_mantissa at 1", |n| {
+            n.optimisers[0] = Optimiser::Sign { dead_zone: true };
+            n.rates[0] = Positive::ONE;
+            n.mantissas[0] = RateMantissa::new(3).unwrap();
+        }),
+        ("learning.optimiser", "forgets 2^-9 in layer 1", |n| {
+            n.optimisers[1] = Optimiser::Momentum { decay: 9 };
+        }),
+        ("learning.optimiser", "forgets 2^-0 in layer 0", |n| {
+            n.optimisers[0] = Optimiser::AdamFx { first_decay: 3, second_decay: 0 };
+        }),
+        ("learning.rate", "layer 0 a chance of 2^-17", |n| {
+            n.optimisers[0] = Optimiser::Sign { dead_zone: false };
+            n.rates[0] = Positive::new(1e-5).unwrap();
+        }),
+        ("learning.rate", "layer 0 a k of -4", |n| {
+            n.optimisers[0] = Optimiser::Sign { dead_zone: false };
+            n.rates[0] = Positive::new(20.0).unwrap();
+        }),
+        ("learning.rate", "words of 16 bits give 2^-15 at least", |n| {
+            *n = baseline(Rule::Dfa);
+            n.optimisers[1] = Optimiser::Sign { dead_zone: false };
+            n.rates[1] = Positive::new(2.0f64.powi(-16)).unwrap();
+        }),
         ("learning.rate", "layer 0 a k of -2", |n| n.rates[0] = Positive::new(1e5).unwrap()),
     ];
     for (key, words, change) in cases {
@@ -159,6 +197,16 @@ fn what_lies_at_the_edge_is_built() {
         NetworkSpec { batch: Batch::new(1).unwrap(), centre: Centre::None, ..plain() },
         baseline(Rule::Dfa),
         baseline(Rule::Bp),
+        NetworkSpec {
+            optimisers: vec![Optimiser::Sign { dead_zone: true }; 2],
+            rates: vec![Positive::ONE, Positive::new(2.0f64.powi(-16)).unwrap()],
+            centred: vec![true, false],
+            ..plain()
+        },
+        NetworkSpec {
+            optimisers: vec![Optimiser::Rms, Optimiser::Momentum { decay: 8 }],
+            ..plain()
+        },
     ];
     for network in cases {
         let driver = build(&network, PLACE).unwrap();
@@ -173,13 +221,16 @@ fn what_lies_at_the_edge_is_built() {
 #[test]
 fn a_chip_that_a_network_does_not_fit_is_refused() {
     type Change = fn(&mut HardwareSpec);
-    let cases: [(NetworkSpec, &str, Change); 4] = [
+    let cases: [(NetworkSpec, &str, Change); 5] = [
         (baseline(Rule::Bp), "learning.rule", |h| h.tile.transposed_read = false),
         (baseline(Rule::Bp), "learning.rule", |h| {
             let (bits, subtract) = (AdcBits::new(8).unwrap(), Subtract::Digital);
             h.adc = Adc::Finite { bits, subtract, range: AdcRange::Full };
         }),
         (plain(), "learning.mode", |h| h.write.scheme = WriteScheme::Trains { slots_log2: 2 }),
+        (signs(), "learning.optimiser", |h| {
+            h.write.residual_bits = ResidualBits::new(1).unwrap();
+        }),
         (plain(), "hw.tile.count", |h| h.tile.count_max = Some(2)),
     ];
     for (network, key, change) in cases {

@@ -58,6 +58,8 @@ pub(super) const OPS: Ops = Ops {
     stream_squares,
     scale,
     centre,
+    gate_totals,
+    drive_totals,
     squares,
     loud,
     signs,

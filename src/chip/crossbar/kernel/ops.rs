@@ -61,7 +61,9 @@ pub(super) struct Ops {
         unsafe fn(Sums<'_>, &WriteLaw, Dither<'_>, &mut Cells<'_>, &mut Half<i8>) -> WriteCounts,
     pub(super) levels: unsafe fn(&mut Cells<'_>, &Half<i8>, Ends, u16) -> u64,
     pub(super) centre: unsafe fn(&mut Half<i32>, &[i32; BLOCK_ROWS], &[i32; HALF_COLUMNS]),
-    pub(super) squares: unsafe fn(&Half<i32>) -> Squares,
+    pub(super) gate_totals: unsafe fn(&[i8]) -> [i32; HALF_COLUMNS],
+    pub(super) drive_totals: unsafe fn(&[u8], usize) -> [u32; BLOCK_ROWS],
+    pub(super) squares: unsafe fn(&Half<i32>, bool) -> Squares,
     pub(super) loud: unsafe fn(&Half<i32>, u32) -> u16,
     pub(super) signs: unsafe fn(
         &Half<i32>,
@@ -127,8 +129,18 @@ macro_rules! twins {
         }
 
         #[target_feature(enable = $features)]
-        fn squares(sums: &Half<i32>) -> Squares {
-            crate::chip::crossbar::kernel::optimise::squares(sums)
+        fn gate_totals(gates: &[i8]) -> [i32; HALF_COLUMNS] {
+            crate::chip::crossbar::kernel::optimise::gate_totals(gates)
+        }
+
+        #[target_feature(enable = $features)]
+        fn drive_totals(turned: &[u8], stride: usize) -> [u32; BLOCK_ROWS] {
+            crate::chip::crossbar::kernel::optimise::drive_totals(turned, stride)
+        }
+
+        #[target_feature(enable = $features)]
+        fn squares(sums: &Half<i32>, wide: bool) -> Squares {
+            crate::chip::crossbar::kernel::optimise::squares(sums, wide)
         }
 
         #[target_feature(enable = $features)]

@@ -2,13 +2,14 @@
 //!
 //! ```text
 //! centre    sum = (sum << 4) - mean[row] total[column]              mean: 4 fractional bits; total: sum of the column's gates
-//! squares   (low, high) += (sum^2 mod 2^32, sum^2 >> 32)            so that 2^32 squares of 32-bit sums add up exactly
+//! totals    of gates by column, and of drives by row                [stride / 4][16 columns][4], [64 rows][stride]
+//! squares   (low, high) += (sum^2 mod 2^32, sum^2 >> 32), where centred;  else low += sum^2
 //! loud      a bit for each group of four rows with |sum| >= least
 //! signs     pulses = +-1 towards the sum, with the sign of the pathway, where |sum| >= least and word < chance;  else 0
 //! ```
 //!
 //! `centre`: the sum of `(16 x - mean) u` over 4,096 samples is at most 4096 x 4080 x 127 < 2^31 in size whatever its two
-//! terms are, which may wrap. `signs`: words are of 16 bits, in the order of levels; a chance of `2^16` needs none.
+//! terms are, which may wrap. `squares`: 1,024 squares of sums of 4096 x 255 x 127 are below 2^64. `signs`: words are of 16 bits, in the order of levels; a chance of `2^16` needs none.
 //!
 //! Each is written once, so that compilers make vectors of it: back ends compile it for their processor. See docs/MODEL.md, 3.10.
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
@@ -69,15 +70,49 @@ pub(super) fn centre(
     }
 }
 
+/// Sums of the gates of each of 16 columns over all samples.
 #[inline(always)]
-pub(super) fn squares(sums: &Half<i32>) -> Squares {
+pub(super) fn gate_totals(gates: &[i8]) -> [i32; HALF_COLUMNS] {
+    let mut lanes = [0i32; 64];
+    for gates in gates.as_chunks::<64>().0 {
+        for i in 0..64 {
+            lanes[i] += i32::from(gates[i]);
+        }
+    }
+    std::array::from_fn(|c| lanes[4 * c..4 * c + 4].iter().sum())
+}
+
+/// Sums of the drives of each of 64 rows over all samples, which are padded to words of four.
+#[inline(always)]
+pub(super) fn drive_totals(turned: &[u8], stride: usize) -> [u32; BLOCK_ROWS] {
+    let mut totals = [0; BLOCK_ROWS];
+    for (total, drives) in totals.iter_mut().zip(turned.chunks_exact(stride)) {
+        let mut lanes = [0u32; 32];
+        let (whole, rest) = drives.as_chunks::<32>();
+        for drives in whole {
+            for i in 0..32 {
+                lanes[i] += u32::from(drives[i]);
+            }
+        }
+        *total = lanes.iter().sum::<u32>() + rest.iter().map(|&x| u32::from(x)).sum::<u32>();
+    }
+    totals
+}
+
+/// `wide`: sums may be 16 times as large as those of a batch, whose squares 64 bits hold.
+#[inline(always)]
+pub(super) fn squares(sums: &Half<i32>, wide: bool) -> Squares {
     let (mut low, mut high) = ([0u64; HALF_COLUMNS], [0u64; HALF_COLUMNS]);
     for sums in sums.as_chunks::<HALF_COLUMNS>().0 {
         for c in 0..HALF_COLUMNS {
             let sum = i64::from(sums[c]);
             let square = (sum * sum).cast_unsigned();
-            low[c] += square & 0xffff_ffff;
-            high[c] += square >> 32;
+            if wide {
+                low[c] += square & 0xffff_ffff;
+                high[c] += square >> 32;
+            } else {
+                low[c] += square;
+            }
         }
     }
     [low, high].map(|lanes| lanes.iter().sum())

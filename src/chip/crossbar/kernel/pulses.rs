@@ -113,7 +113,7 @@ pub(super) const LANES: usize = 16;
 #[derive(Clone, Copy)]
 pub(super) struct Scale {
     plain: Plain,
-    before: i32,
+    before: i64,
     right: u32,
     less: u32,
     last: u32,
@@ -131,7 +131,7 @@ impl Scale {
         let up = write.residual_bits.saturating_sub(write.shift);
         let shift = write.shift.saturating_sub(write.residual_bits);
         let right = shift.saturating_sub(bits);
-        let before = if nearest { 0 } else { 1 << right >> 1 };
+        let before = if nearest { 0 } else { 1i64 << right >> 1 };
         Self {
             plain: Plain::new(write),
             before,
@@ -169,7 +169,8 @@ trait Lane: Copy + Default + PartialEq + BitOr<Output = Self> {
 impl Lane for i32 {
     #[inline(always)]
     fn quotient(self, scale: &Scale) -> Self {
-        (scale.plain.narrow(self) + scale.before) >> scale.right
+        // at most half of 2^31
+        (scale.plain.narrow(self) + scale.before as i32) >> scale.right
     }
 
     #[inline(always)]
@@ -194,7 +195,7 @@ impl Lane for i32 {
 impl Lane for i64 {
     #[inline(always)]
     fn quotient(self, scale: &Scale) -> Self {
-        (scale.plain.wide(self) + i64::from(scale.before)) >> scale.right
+        (scale.plain.wide(self) + scale.before) >> scale.right
     }
 
     #[inline(always)]

@@ -46,6 +46,8 @@ pub(super) const OPS: Ops = Ops {
     pulses: pulses::law,
     levels: levels::law,
     centre: optimise::centre,
+    gate_totals: optimise::gate_totals,
+    drive_totals: optimise::drive_totals,
     squares: optimise::squares,
     loud: optimise::loud,
     signs: optimise::signs,

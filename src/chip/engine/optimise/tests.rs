@@ -1,5 +1,6 @@
 //! Requests of whole batches: against a plain recomputation on every back end, and cycle by cycle.
 
+use bitvec::prelude::*;
 use proptest::prelude::*;
 
 use super::super::error::packed_at;
@@ -13,9 +14,11 @@ use crate::chip::hardware::{
 };
 use crate::chip::layer::{Delivery, DrivenBy, InitialLevels, Layer, LayerSpec, Taps};
 use crate::chip::population::{Polarity, Stream, Wiring};
+use crate::chip::state::{Piece, Seen, State, Visitor};
 use crate::num::draw::{Place, Site};
 use crate::num::fixed::{ErrorBits, LevelBits};
 use crate::num::tables::Activation;
+use crate::num::tables::Scales;
 
 /// Numbers from a seed.
 struct Numbers(u64);
@@ -49,6 +52,11 @@ fn optimiser() -> impl Strategy<Value = Optimiser> {
         Optimiser::Plain,
         Optimiser::Sign { dead_zone: false },
         Optimiser::Sign { dead_zone: true },
+        Optimiser::Rms,
+        Optimiser::Momentum { decay: 1 },
+        Optimiser::Momentum { decay: 5 },
+        Optimiser::AdamFx { first_decay: 3, second_decay: 8 },
+        Optimiser::AdamFx { first_decay: 1, second_decay: 2 },
     ])
 }
 
@@ -126,7 +134,10 @@ impl Case {
         engine.set_optimisers(&self.optimisers);
         engine.set_centred(&self.windows);
         // a pulse by chance has no scale
-        let scale = |at: usize| if self.optimisers[at].is_sign() { 1 } else { self.mantissa };
+        let scale = |at: usize| match self.optimisers[at] {
+            Optimiser::Sign { .. } | Optimiser::Rms => 1,
+            _ => self.mantissa,
+        };
         engine.set_mantissas(&[scale(0), scale(1)]);
         let mut numbers = Numbers(self.seed);
         for layer in 0..2 {
@@ -145,7 +156,10 @@ impl Case {
     fn shift(&self, layer: usize) -> u32 {
         match self.optimisers[layer] {
             Optimiser::Sign { .. } => self.shift,
-            Optimiser::Plain => 9 + self.shift,
+            Optimiser::AdamFx { .. } => 8 + self.shift,
+            // half a level to four in the root mean square of these sizes
+            Optimiser::Rms => (1 << 14) - 2000 + 300 * self.shift,
+            _ => 9 + self.shift,
         }
     }
 
@@ -254,7 +268,24 @@ impl Plain {
         let cells: Vec<(usize, usize)> = (0..self.sums.len())
             .flat_map(|array| (0..rows * columns).map(move |cell| (array, cell)))
             .collect();
-        let squares: i128 = cells.iter().map(|&(a, c)| centred(a, c).0.pow(2)).sum();
+        let counts_in = |array: usize| match case.optimisers[layer] {
+            Optimiser::Rms => wiring.pathways()[array].polarity == Polarity::Excites,
+            _ => true,
+        };
+        let squared = cells.iter().filter(|(array, _)| counts_in(*array));
+        let squares: i128 = squared.map(|&(a, c)| centred(a, c).0.pow(2)).sum();
+        // what is asked of a cell, in units of a power of two of a pulse, and words that are kept
+        let memory = &before.requests;
+        let word_of = |array, word, cell: usize| {
+            let words = memory.words(array, word, before.layout);
+            i128::from(words.get(cell).copied().unwrap_or(0))
+        };
+        let halves_up = |top: i128, bottom: i128| (2 * top + bottom).div_euclid(2 * bottom);
+        let mut power = i128::from(memory.followed().power);
+        if case.optimisers[layer] == Optimiser::Rms && squares > 0 {
+            let now = (0..126).find(|place| squares >> place == 1).unwrap() * 256;
+            power = if power < 0 { now } else { power + halves_up(now - power, 16) };
+        }
         let least = match case.optimisers[layer] {
             Optimiser::Sign { dead_zone: true } => {
                 let n = cells.len() as i128;
@@ -306,19 +337,51 @@ impl Plain {
                 }
             });
             let (sum, unit) = centred(array, cell);
-            let sum = if pathway.polarity == Polarity::Inhibits { -sum } else { sum };
+            let polarity = if pathway.polarity == Polarity::Inhibits { -1 } else { 1 };
+            let mut kept = vec![];
+            // request, mantissa and units in a pulse
+            let scaled = |sum, unit: i128| (sum, i128::from(case.mantissa), unit << shift);
+            let (request, mantissa, pulse) = match case.optimisers[layer] {
+                Optimiser::Momentum { decay } => {
+                    let was = word_of(array, 0, cell);
+                    kept = vec![was - halves_up(was, 1 << decay) + sum];
+                    scaled(kept[0], unit << decay)
+                }
+                Optimiser::AdamFx { first_decay: a, second_decay: b } => {
+                    let s = halves_up(sum, unit);
+                    let (m, v) = (word_of(array, 0, cell), word_of(array, 1, cell));
+                    kept = match first {
+                        true => vec![s << a, s * s << b],
+                        false => vec![m + s - halves_up(m, 1 << a), v + s * s - (v >> b)],
+                    };
+                    let root = ((kept[1] >> b) as u128).isqrt() as i128;
+                    let request = halves_up(kept[0] << 12, root.max(1) << a);
+                    scaled(request.clamp(-32767, 32767), 1)
+                }
+                Optimiser::Rms => {
+                    let x = ((power + 128) >> 1) + i128::from(case.shift(layer)) - 16_384;
+                    let factor = Scales::new().at(x as i64);
+                    (sum, factor.mantissa.into(), 1 << (factor.shift + wiring.shift_extra()))
+                }
+                _ => scaled(sum, unit),
+            };
+            let request = polarity * request;
             let (wanted, pulses) = if sign {
                 let lucky = shift <= 16 && word < 1 << (16 - shift);
-                let pulse = if lucky && sum.abs() >= least { sum.signum() } else { 0 };
+                let pulse = if lucky && request.abs() >= least { request.signum() } else { 0 };
                 (pulse, pulse)
+            } else if case.optimisers[layer] == Optimiser::Rms && squares == 0 {
+                (0, 0)
             } else {
                 // rounded to units of 2^-D of a pulse, half up; then a word on top
-                let scale = unit << shift;
-                let fine = sum * i128::from(case.mantissa) << bits;
-                let q = (2 * fine + scale).div_euclid(2 * scale);
+                let q = halves_up((request * mantissa) << bits, pulse);
                 let wanted = (q + if bits == 0 { 0 } else { word }) >> bits;
                 (wanted, wanted.clamp(-7, 7))
             };
+            for (word, kept) in kept.into_iter().enumerate() {
+                let now = engine.layers[layer].requests.words(array, word, before.layout);
+                prop_assert_eq!(i128::from(now[cell]), kept, "word {} of {}", word, cell);
+            }
             let level = i128::from(self.levels[array][cell]);
             let gone = self.gone[array][cell];
             let held = if gone { level } else { (level + pulses).clamp(3, 50) };
@@ -328,17 +391,21 @@ impl Plain {
             want[1] += u64::from(wanted != pulses);
             want[2] += pulses.unsigned_abs() as u64;
             want[3] += (held - level).unsigned_abs() as u64;
-            want[4] += u64::from(case.optimisers[layer].looks_at_layer());
+            let looks = case.optimisers[layer].looks_at_layer() && counts_in(array);
+            want[4] += u64::from(looks);
             want[5] += u64::from(case.optimisers[layer] != Optimiser::Plain);
         }
         if window.is_some() {
-            let passes = 1 + usize::from(case.optimisers[layer].looks_at_layer());
-            want[6] = (rows * (passes * self.sums.len() + before.spec.drive_sets().len())) as u64;
+            let looks =
+                |array: &usize| case.optimisers[layer].looks_at_layer() && counts_in(*array);
+            let passes = self.sums.len() + (0..self.sums.len()).filter(looks).count();
+            want[6] = (rows * (passes + before.spec.drive_sets().len())) as u64;
         }
         for ((event, before), want) in counted.into_iter().zip(counts).zip(want) {
             prop_assert_eq!(ledger(engine, event) - before, want, "{}", event.name());
         }
         let now = &engine.layers[layer].requests;
+        prop_assert_eq!(i128::from(now.followed().power), power);
         for (array, pathway) in wiring.pathways().iter().enumerate() {
             let set = before.spec.drives_of(pathway.source);
             let Some(window) = window else {
@@ -363,7 +430,7 @@ fn side() -> impl Strategy<Value = usize> + Clone {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(48))]
+    #![proptest_config(ProptestConfig::with_cases(24))]
 
     #[test]
     fn a_write_in_two_passes_is_its_equations_on_every_back_end(case in case(side())) {
@@ -424,6 +491,12 @@ proptest! {
                 for (array, cells) in layer.arrays.iter().enumerate() {
                     prop_assert!(cells.levels().eq(tick.levels(at, array)), "{} {}", at, array);
                 }
+                let followed = layer.requests.followed();
+                prop_assert_eq!([followed.power, followed.ends], tick.followed(at));
+                for (array, word) in (0..layer.arrays.len()).flat_map(|a| [(a, 0), (a, 1)]) {
+                    let words = layer.requests.words(array, word, layer.layout);
+                    prop_assert!(words.is_empty() || words == tick.words(at, array, word));
+                }
                 for set in [Stream::P, Stream::N] {
                     let means = layer.requests.means(set).iter().map(|&mean| i64::from(mean));
                     let rows = tick.row_means(at, set).len();
@@ -432,5 +505,101 @@ proptest! {
                 }
             }
         }
+    }
+}
+
+/// Everything that a state says, by name, and to be told again.
+#[derive(Default)]
+struct Copy {
+    numbers: std::collections::BTreeMap<String, Vec<i64>>,
+    given: bool,
+}
+
+impl Copy {
+    fn seen(&mut self, piece: &Piece<'_>, now: Vec<i64>) -> Option<Vec<i64>> {
+        if self.given {
+            return Some(self.numbers[piece.name].clone());
+        }
+        assert!(now.iter().all(|number| piece.within.contains(number)), "{}", piece.name);
+        assert!(self.numbers.insert(piece.name.to_owned(), now).is_none(), "{}", piece.name);
+        None
+    }
+}
+
+impl Visitor for Copy {
+    fn halves(
+        &mut self,
+        piece: &Piece<'_>,
+        _shape: [usize; 2],
+        values: &dyn Fn() -> Vec<u16>,
+    ) -> Seen<Vec<u16>> {
+        let seen = self.seen(piece, values().into_iter().map(i64::from).collect());
+        Ok(seen.map(|seen| seen.into_iter().map(|number| number as u16).collect()))
+    }
+
+    fn bits(
+        &mut self,
+        piece: &Piece<'_>,
+        _shape: [usize; 2],
+        values: &dyn Fn() -> BitVec<u8, Lsb0>,
+    ) -> Seen<BitVec<u8, Lsb0>> {
+        let seen = self.seen(piece, values().into_iter().map(i64::from).collect());
+        Ok(seen.map(|seen| seen.into_iter().map(|number| number != 0).collect()))
+    }
+
+    fn numbers(&mut self, piece: &Piece<'_>, values: &[i64]) -> Seen<Vec<i64>> {
+        Ok(self.seen(piece, values.to_vec()))
+    }
+
+    fn rows(
+        &mut self,
+        piece: &Piece<'_>,
+        _width: usize,
+        values: &dyn Fn() -> Vec<i64>,
+    ) -> Seen<Vec<i64>> {
+        Ok(self.seen(piece, values()))
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(24))]
+
+    #[test]
+    fn what_is_kept_goes_on_elsewhere(case in case(1usize..=40), threads in 1usize..=2) {
+        let learn = |engine: &mut Engine, at: usize| {
+            let (codes, words) = case.batch(at);
+            let operations = case.operations(&codes, &words, case.batches[at]);
+            operations.iter().for_each(|operation| engine.execute(operation));
+            (0..2).for_each(|layer| engine.execute(&case.write(layer)));
+        };
+        let mut engine = case.engine(Backend::best(), None);
+        learn(&mut engine, 0);
+        let mut copy = Copy::default();
+        engine.visit(&mut copy).unwrap();
+        copy.given = true;
+        // an engine that was made alike, and has nothing of its own left
+        let mut other = Case { seed: case.seed ^ 2, ..case.clone() }.engine(Backend::Scalar, None);
+        other.seed = case.seed;
+        other.set_threads(threads).unwrap();
+        other.visit(&mut copy).unwrap();
+        for at in 0..case.batches.len() {
+            learn(&mut engine, at);
+            learn(&mut other, at);
+        }
+        let (mut one, mut two) = (Copy::default(), Copy::default());
+        engine.visit(&mut one).unwrap();
+        other.visit(&mut two).unwrap();
+        prop_assert_eq!(&one.numbers, &two.numbers);
+        let kept = |name: &str| one.numbers.keys().filter(|key| key.ends_with(name)).count();
+        let means = |at: usize| {
+            let sets = engine.layers()[at].spec.drive_sets().len();
+            if case.windows[at].is_some() { sets } else { 0 }
+        };
+        let sets = kept(".row_means.p") + kept(".row_means.n");
+        prop_assert_eq!(sets, means(0) + means(1));
+        let words = |at: usize| case.optimisers[at].memory().0 * case.wirings[at].pathways().len();
+        prop_assert_eq!(kept(".moment") + kept(".square"), words(0) + words(1));
+        let rms = case.optimisers.iter().filter(|&&optimiser| optimiser == Optimiser::Rms).count();
+        prop_assert_eq!(kept(".rms"), rms);
     }
 }

@@ -142,6 +142,18 @@ impl Network {
         self.layers[layer].residuals(array)
     }
 
+    /// What `rms` follows in a layer, and how often its factor was held.
+    #[must_use]
+    pub fn followed(&self, layer: usize) -> [i64; 2] {
+        self.layers[layer].followed()
+    }
+
+    /// A word, 0 or 1, of an optimiser of every cell of an array, row by row.
+    #[must_use]
+    pub fn words(&self, layer: usize, array: usize, word: usize) -> Vec<i64> {
+        self.layers[layer].words(array, word)
+    }
+
     /// Mean drives of the rows of a set of drives, with 4 fractional bits; none where updates are not centred.
     #[must_use]
     pub fn row_means(&self, layer: usize, set: Stream) -> &[i64] {
@@ -508,7 +520,7 @@ impl Network {
         for (plane, (target, banks, events)) in taken.into_iter().enumerate() {
             let codes = self.layers[layer].codes(plane);
             for (code, e) in codes.into_iter().zip(banks) {
-                for (event, count) in self.bank_counts(&e, during, now) {
+                for (event, count) in self.bank_counts(layer, &e, during, now) {
                     self.charge(layer, code, during, event, count);
                 }
             }
@@ -522,11 +534,19 @@ impl Network {
         }
     }
 
-    fn bank_counts(&self, e: &BankEvents, during: During, now: bool) -> Vec<(Event, u64)> {
-        let hardware = self.layers[0].memory;
+    fn bank_counts(
+        &self,
+        layer: usize,
+        e: &BankEvents,
+        during: During,
+        now: bool,
+    ) -> Vec<(Event, u64)> {
+        let hardware = self.layers[layer].memory;
         let updating = during == During::Update;
         let sums = if updating && !now { 64 * (e.accumulates + e.delta_computations) } else { 0 };
         let rests = 2 * hardware.residual_bits * e.delta_computations;
+        let words = 2 * hardware.word_bits * e.optimiser_steps;
+        let looked = 32 * e.sum_squares;
         // every slice that is driven comes out of a memory, of codes or of gates
         let drives = hardware.dac_bits * e.dac_slices;
         vec![
@@ -545,7 +565,7 @@ impl Network {
             (Event::VerifyReads, e.verify_reads),
             (Event::SumSquares, e.sum_squares),
             (Event::OptimiserSteps, e.optimiser_steps),
-            (Event::SramBits, drives + sums + rests + 32 * e.sum_squares),
+            (Event::SramBits, drives + sums + rests + looked + words),
         ]
     }
 

@@ -22,6 +22,7 @@ pub use command::Command;
 pub use config::{More, TileAdc, TileConfig, TileSize, TileUnits};
 pub use events::{BankEvents, TileEvents};
 use optimise::Kept;
+pub use optimise::Said;
 
 /// Which lines a read goes through.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -336,7 +337,7 @@ impl Tile {
             Command::Add { slot } => self.upd = update(UpdKind::Add, slot, 0),
             Command::Write { shift } => {
                 self.upd = update(UpdKind::Write, 0, shift);
-                if self.config.more.looks {
+                if self.config.more.looks.is_some() {
                     self.upd.phase = UpdPhase::Look;
                 }
             }

@@ -65,8 +65,13 @@ pub(super) const CENTRES: [(&str, Centre); 3] =
 pub(super) const DECAYS: [(&str, Decay); 3] =
     [("cosine", Decay::Cosine), ("linear", Decay::Linear), ("constant", Decay::Constant)];
 /// `learning.optimiser`, but for what further keys say of it.
-const OPTIMISERS: [(&str, Optimiser); 2] =
-    [("plain", Optimiser::Plain), ("sign", Optimiser::Sign { dead_zone: false })];
+const OPTIMISERS: [(&str, Optimiser); 5] = [
+    ("plain", Optimiser::Plain),
+    ("sign", Optimiser::Sign { dead_zone: false }),
+    ("rms", Optimiser::Rms),
+    ("momentum", Optimiser::Momentum { decay: 3 }),
+    ("adam_fx", Optimiser::AdamFx { first_decay: 3, second_decay: 8 }),
+];
 
 /// Checked numbers of `[learning]`.
 pub(super) struct Learning {

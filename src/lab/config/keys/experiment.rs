@@ -287,6 +287,9 @@ const LEARNING: &[KeyEntry] = &[
         &[
             ("plain", "the sum over the batch, shifted"),
             ("sign", "one pulse in the direction of the sum, by chance"),
+            ("rms", "the sum, scaled by the root mean square over the layer"),
+            ("momentum", "an accumulator a cell that forgets an eighth at a write"),
+            ("adam_fx", "the mean sum of a cell in units of its root mean square, over 8 and 256 writes"),
         ],
     )
     .default("\"plain\"")

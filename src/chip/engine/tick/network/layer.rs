@@ -13,7 +13,7 @@ use super::super::tile::{BankEvents, Command, Launch, Tile, TileEvents, TileSize
 use super::normalise::{Normal, Normaliser};
 use crate::chip::hardware::timing::tree_levels;
 use crate::chip::hardware::{DitherPattern, Hardware, Timing, WriteScheme};
-use crate::chip::layer::{Delivery, DrivenBy, Layer};
+use crate::chip::layer::{Delivery, DrivenBy, Layer, Optimiser};
 use crate::chip::ledger::{During, Part};
 use crate::chip::periphery;
 use crate::chip::population::{Stream, Wiring};
@@ -31,6 +31,8 @@ use build::config;
 pub(super) struct Memory {
     pub(super) dac_bits: u64,
     pub(super) residual_bits: u64,
+    /// Of all words that an optimiser keeps of a cell.
+    pub(super) word_bits: u64,
 }
 
 #[derive(Debug)]
@@ -94,6 +96,13 @@ impl TickLayer {
             memory: Memory {
                 dac_bits: hardware.drive.dac_bits.into(),
                 residual_bits: hardware.write.residual_bits.get().into(),
+                word_bits: match layer.requests.optimiser {
+                    Optimiser::Momentum { decay } => u64::from(33 + decay),
+                    Optimiser::AdamFx { first_decay, second_decay } => {
+                        u64::from(84 + first_decay + second_decay)
+                    }
+                    _ => 0,
+                },
             },
             outputs: [vec![(0, 0); slots * columns], vec![(0, 0); slots * columns]],
             normaliser: (layer.spec.activation == Activation::Rms).then(|| {
@@ -137,6 +146,7 @@ impl TickLayer {
             }
         }
         this.load_state(layer);
+        this.load_words(layer);
         this
     }
 
@@ -432,7 +442,7 @@ impl TickLayer {
     pub(super) fn cycle(&mut self, command: Option<&Command<'_>>, words: &[i16]) {
         match command {
             Some(Command::Add { .. }) => self.batch.added += 1,
-            Some(Command::Write { .. }) => self.begin_write(),
+            Some(&Command::Write { shift }) => self.begin_write(shift),
             _ => {}
         }
         for tile in 0..self.tiles.len() {

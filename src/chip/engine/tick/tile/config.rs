@@ -136,8 +136,14 @@ pub struct More {
     pub pulse_code: PulseCode,
     /// Whether sums are asked for one pulse each, with a chance of `2^-k`.
     pub sign: bool,
-    /// Whether all sums are squared and added before the first row is written.
-    pub looks: bool,
+    /// Whether all sums are squared and added before the first row is written, and which banks' sums are.
+    pub looks: Option<[bool; 2]>,
+    /// Beats of computing a row beyond the first.
+    pub beats: u64,
+    /// `d`, where sums go into an accumulator of the cell.
+    pub momentum: Option<u32>,
+    /// `a` and `b`, where they go into two means of the cell.
+    pub adam: Option<[u32; 2]>,
     /// Fractional bits of the means that are taken off the rows, if they are.
     pub centred: Option<u32>,
     /// Slots of a train, where writes are coincidences of trains.
@@ -161,7 +167,10 @@ impl Default for More {
             active_max: None,
             pulse_code: PulseCode::Unary,
             sign: false,
-            looks: false,
+            looks: None,
+            beats: 0,
+            momentum: None,
+            adam: None,
             centred: None,
             train_slots: None,
         }

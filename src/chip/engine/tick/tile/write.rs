@@ -84,7 +84,7 @@ impl Tile {
             }
             (_, UpdPhase::Wait) => {}
             (_, UpdPhase::Compute) => {
-                if self.beat_is_over() {
+                if self.beat_is_over() && self.computed() {
                     self.compute(dither);
                 }
             }
@@ -170,7 +170,8 @@ impl Tile {
                 let pulses = if self.config.more.sign {
                     self.towards(bank, sum, word)
                 } else {
-                    self.bounded(bank, at, sum * self.config.mantissa, word)
+                    let request = self.request(bank, at, sum);
+                    self.bounded(bank, at, request, word)
                 };
                 self.pulse[bank][column] = pulses;
                 self.peak_set = self.peak_set.max(pulses);
@@ -222,8 +223,7 @@ impl Tile {
     /// `SR(total, k)`, `F` bits finer.
     fn rounded(&self, total: i64, word: u16, fraction: u32) -> i64 {
         let dither = self.config.dither_bits;
-        let finer = self.config.more.centred.unwrap_or(0);
-        let shift = i64::from(self.upd.shift + self.config.more.shift_extra + finer);
+        let shift = i64::from(self.request_shift() + self.config.more.shift_extra);
         let shift = shift - i64::from(fraction) - i64::from(dither);
         let q = match u32::try_from(shift) {
             Ok(right) => rsh(total, right),

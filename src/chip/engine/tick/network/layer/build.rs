@@ -6,7 +6,7 @@ use std::ops::Range;
 use super::super::super::tile::{More, TileAdc, TileConfig, TileUnits};
 use crate::chip::crossbar::kernel::MEAN_BITS;
 use crate::chip::hardware::{Adc, FloorKind, Hardware, Subtract, Timing, WriteScheme};
-use crate::chip::layer::Layer;
+use crate::chip::layer::{Layer, Optimiser};
 use crate::chip::population::Stream;
 use crate::num::tables::Activation;
 
@@ -79,7 +79,22 @@ pub(super) fn config(
             active_max: timing.active_max.map(small),
             pulse_code: timing.pulse_code,
             sign: layer.requests.optimiser.is_sign(),
-            looks: layer.requests.optimiser.looks_at_layer(),
+            looks: match layer.requests.optimiser {
+                Optimiser::Sign { dead_zone: true } => Some([true; 2]),
+                Optimiser::Rms => Some([true, false]),
+                _ => None,
+            },
+            beats: if let Optimiser::AdamFx { .. } = layer.requests.optimiser { 32 } else { 0 },
+            momentum: match layer.requests.optimiser {
+                Optimiser::Momentum { decay } => Some(decay),
+                _ => None,
+            },
+            adam: match layer.requests.optimiser {
+                Optimiser::AdamFx { first_decay, second_decay } => {
+                    Some([first_decay, second_decay])
+                }
+                _ => None,
+            },
             centred: layer.requests.window_log2.map(|_| MEAN_BITS),
             train_slots: match hardware.write.scheme {
                 WriteScheme::Rounded => None,

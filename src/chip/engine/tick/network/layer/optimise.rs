@@ -1,12 +1,14 @@
 //! What tiles of a layer do together for optimisers and centred updates: squares of all sums, means of rows.
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
+use super::super::super::tile::{Said, Tile};
 use super::TickLayer;
 use crate::chip::hardware::Timing;
 use crate::chip::hardware::timing::tree_levels;
-use crate::chip::layer::{DrivenBy, Layer};
-use crate::chip::population::Stream;
+use crate::chip::layer::{DrivenBy, Layer, Optimiser};
+use crate::chip::population::{Pathway, Polarity, Stream};
 use crate::num::fixed::rsh;
+use crate::num::tables::Scales;
 
 /// Registers of a layer for requests of a whole batch.
 #[derive(Debug)]
@@ -16,9 +18,14 @@ pub(super) struct Batch {
     /// Cycles until squares of all tiles are added up, and those left while they are.
     joining: u64,
     left: Option<u64>,
+    /// That of the write in progress.
+    shift: u32,
     /// Cells of the layer.
     cells: i128,
-    dead_zone: bool,
+    optimiser: Optimiser,
+    /// What `rms` follows, and how often its factor was held.
+    followed: [i64; 2],
+    scales: Scales,
     /// Window of the means, if rows are centred.
     window_log2: Option<u32>,
     /// Mean codes by set of drives and row.
@@ -37,8 +44,11 @@ impl Batch {
             added: 0,
             joining: timing.beat * tree_levels(tiles as u64),
             left: None,
+            shift: 0,
             cells: (layer.layout.cells() * wiring.pathways().len()) as i128,
-            dead_zone: layer.requests.optimiser.looks_at_layer(),
+            optimiser: layer.requests.optimiser,
+            followed: [layer.requests.followed().power, layer.requests.followed().ends],
+            scales: Scales::new(),
             window_log2: layer.requests.window_log2,
             means,
         }
@@ -75,7 +85,10 @@ impl TickLayer {
     }
 
     /// Before a write: means are those of the batch if there are none yet, and tiles are told.
-    pub(super) fn begin_write(&mut self) {
+    pub(super) fn begin_write(&mut self, shift: u32) {
+        self.batch.shift = shift;
+        let begins = self.writes == 0;
+        self.tiles.iter_mut().for_each(|tile| tile.begin(begins));
         if self.batch.window_log2.is_none() {
             return;
         }
@@ -111,12 +124,12 @@ impl TickLayer {
                 }
             }
         }
-        self.tiles.iter_mut().for_each(super::Tile::clear_lines);
+        self.tiles.iter_mut().for_each(Tile::clear_lines);
     }
 
     /// Once all tiles have looked at their sums, those are added up, and the write goes on.
     pub(super) fn join_squares(&mut self) {
-        if !self.tiles.iter().all(super::Tile::waits) {
+        if !self.tiles.iter().all(Tile::waits) {
             return;
         }
         let left = self.batch.left.map_or(self.batch.joining, |left| left - 1);
@@ -125,14 +138,60 @@ impl TickLayer {
             return;
         }
         self.batch.left = None;
-        let squares: i128 = self.tiles.iter().map(super::Tile::squares).sum();
-        let mut least = 1;
-        // 2^(2t+1) = 2 (2^t)^2
-        while self.batch.dead_zone && squares >= self.batch.cells * 2 * least * least {
-            least *= 2;
+        let squares: i128 = self.tiles.iter().map(Tile::squares).sum();
+        let said = match self.batch.optimiser {
+            Optimiser::Rms => self.follow(squares),
+            _ => {
+                let mut least = 1;
+                // 2^(2t+1) = 2 (2^t)^2
+                while squares >= self.batch.cells * 2 * least * least {
+                    least *= 2;
+                }
+                Said::Least(i64::try_from(least).expect("a sum has 32 bits"))
+            }
+        };
+        self.tiles.iter_mut().for_each(|tile| tile.go_on(said));
+    }
+
+    /// The scale of a layer whose squares add up to so much.
+    fn follow(&mut self, squares: i128) -> Said {
+        if squares == 0 {
+            return Said::Nothing;
         }
-        let least = i64::try_from(least).expect("a sum has 32 bits");
-        self.tiles.iter_mut().for_each(|tile| tile.go_on(least));
+        // the place of the leading bit
+        let mut place = 0;
+        while squares >> (place + 1) > 0 {
+            place += 1;
+        }
+        let [power, ends] = &mut self.batch.followed;
+        *power = if *power < 0 { 256 * place } else { *power + rsh(256 * place - *power, 4) };
+        let factor =
+            self.batch.scales.at(((*power + 128) >> 1) + i64::from(self.batch.shift) - 16_384);
+        *ends += i64::from(factor.held);
+        Said::Scale(factor.mantissa.into(), factor.shift)
+    }
+
+    /// What `rms` follows, and how often its factor was held.
+    pub(in super::super) const fn followed(&self) -> [i64; 2] {
+        self.batch.followed
+    }
+
+    /// A word of every cell of an array, row by row.
+    pub(in super::super) fn words(&self, array: usize, word: usize) -> Vec<i64> {
+        self.cells(array, |tile, bank, row, column| tile.word(word, bank, row, column))
+    }
+
+    /// Takes over the words of all cells.
+    pub(super) fn load_words(&mut self, layer: &Layer) {
+        for array in 0..layer.arrays.len() {
+            for word in 0..2 {
+                let words = layer.requests.words(array, word, layer.layout);
+                for (cell, value) in words.into_iter().enumerate() {
+                    let (tile, bank, row, column) = self.cell(array, cell);
+                    self.tiles[tile].set_word(word, (bank, row, column), value);
+                }
+            }
+        }
     }
 
     /// How often means were used and kept at a write, by pathway.
@@ -141,13 +200,17 @@ impl TickLayer {
             return vec![];
         }
         let (rows, pathways) = (self.rows as u64, self.wiring.pathways());
-        let passes = if self.batch.dead_zone { 2 } else { 1 };
         let mut seen = vec![];
-        let count = |pathway: &crate::chip::population::Pathway| {
+        let count = |pathway: &Pathway| {
             let set = if self.driven_by == DrivenBy::Shared { Stream::P } else { pathway.source };
             let first = !seen.contains(&set);
             seen.push(set);
-            (pathway.code, rows * (passes + u64::from(first)))
+            let looks = match self.batch.optimiser {
+                Optimiser::Sign { dead_zone } => dead_zone,
+                Optimiser::Rms => pathway.polarity == Polarity::Excites,
+                _ => false,
+            };
+            (pathway.code, rows * (1 + u64::from(looks) + u64::from(first)))
         };
         pathways.iter().map(count).collect()
     }
