@@ -87,11 +87,12 @@ impl Watcher {
                 pathways().filter_map(|one| one.training.get(event.name())).sum()
             };
             let before = (seen.counts, seen.pulses);
-            seen.counts = CLIPS.map(|(_, some, all, _)| {
-                // what is normalised has an end as a table has one
-                let scaled = if all == Event::LookUps { total(Event::Scalings) } else { 0 };
-                [total(some), total(all) + scaled]
-            });
+            let all_of = |event: Event| match event {
+                // what is normalised is scaled in place of looked up
+                Event::LookUps => total(event) + total(Event::Scalings),
+                _ => total(event),
+            };
+            seen.counts = CLIPS.map(|(_, some, all, _)| [total(some), all_of(all)]);
             seen.pulses = total(Event::PulsesAttempted);
             if epoch == 0 {
                 seen.shifts = [layer.rate_shift; 2];

@@ -74,7 +74,9 @@ pub fn profile(config: &Config, root: &DataRoot, machine: Machine) -> Result<Pro
     let plan = Footprint::of_layers(layers);
     let before = ledgers(&session, Phase::Evaluation);
     session.infer()?;
-    let inference = LedgerRecord::since(&session.engines(), Phase::Evaluation, &before);
+    // a policy acts by its first network
+    let engines = session.engines();
+    let inference = LedgerRecord::since(&engines[..1], Phase::Evaluation, &before);
     let (name, kind) = match config.policy {
         None => ("inference", PieceKind::Image),
         Some(_) => ("decision", PieceKind::Decision),

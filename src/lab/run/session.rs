@@ -175,14 +175,13 @@ impl Session {
         if saturated.saturating_mul(20) > conversions {
             add(Note::Saturated { epoch, saturated, conversions });
         }
-        // what is normalised has an end as a table has one
         let ends = [
-            ("tables", Event::SaturatedLookUps, [Event::LookUps, Event::Scalings]),
-            ("gates", Event::SaturatedGates, [Event::Multiplies; 2]),
+            ("tables", Event::SaturatedLookUps, Event::LookUps),
+            ("gates", Event::SaturatedGates, Event::Multiplies),
         ];
-        for (of, saturated, [one, other]) in ends {
-            let more = if one == other { 0 } else { total(other) };
-            let (saturated, all) = (total(saturated), total(one) + more);
+        for (of, saturated, all) in ends {
+            let scaled = if all == Event::LookUps { total(Event::Scalings) } else { 0 };
+            let (saturated, all) = (total(saturated), total(all).saturating_add(scaled));
             if saturated.saturating_mul(2) > all {
                 add(Note::Ends { epoch, of: of.into(), saturated, all });
             }

@@ -177,8 +177,10 @@ fn learns(file: &mut LearningFile, rule: Rule, layers: usize) -> Result<Learning
         return Err(wrong("learning.centre", found, allowed));
     }
     let batch = *file.batch.get_or_insert(defaults::BATCH);
-    let rate = positive("learning.rate", *file.rate.get_or_insert(defaults::RATE))?;
-    file.rate_multipliers.get_or_insert_with(|| defaults::multipliers(layers));
+    let optimiser = learning::optimiser(file, "sign", true)?;
+    let rate = *file.rate.get_or_insert(defaults::rate(optimiser));
+    let rate = positive("learning.rate", rate)?;
+    file.rate_multipliers.get_or_insert_with(|| defaults::multipliers(optimiser, layers));
     let factors = per_layer(MULTIPLIERS, &mut file.rate_multipliers, 1.0, layers)?;
     Ok(Learning {
         kind: Kind { rule, seeded: false },
@@ -188,7 +190,7 @@ fn learns(file: &mut LearningFile, rule: Rule, layers: usize) -> Result<Learning
         batch: range("learning.batch", Batch::new(batch))?,
         rates: learning::products(rate, factors)?,
         decay: word("learning.decay", &mut file.decay, "linear", &learning::DECAYS)?,
-        optimiser: learning::optimiser(file, "sign", true)?,
+        optimiser,
         select: last(file)?,
         ..Learning::neutral()
     })

@@ -4,6 +4,7 @@
 //! rollouts of an epoch = steps / (count x horizon x 50), rounded, at least 1        a run has about 50 epochs
 //! ```
 
+use crate::chip::layer::Optimiser;
 use crate::lab::config::file::PerLayer;
 
 /// Defaults of policies for one environment.
@@ -40,10 +41,6 @@ pub(in crate::lab::config) const HIDDEN: [usize; 2] = [64, 64];
 pub(in crate::lab::config) const WEIGHT_MAX: [f64; 2] = [0.5, 0.25];
 /// Width of sigmoids, where those are chosen.
 pub(in crate::lab::config) const ALPHA: f64 = 6.0;
-/// `learning.rate`: the probability of a pulse, of hidden layers.
-pub(in crate::lab::config) const RATE: f64 = 0.25;
-/// Factor of it in the output layer.
-pub(in crate::lab::config) const OUTPUT_MULTIPLIER: f64 = 2.0;
 /// Steps of a minibatch.
 pub(in crate::lab::config) const BATCH: i64 = 256;
 /// `ppo.entropy` of actions that are numbers.
@@ -70,11 +67,23 @@ impl PolicyDefaults {
     }
 }
 
-/// `learning.rate_multipliers` of a network of so many layers.
-pub(in crate::lab::config) fn multipliers(layers: usize) -> PerLayer<f64> {
+/// `learning.rate`: the probability of a pulse of hidden layers, a step of weights, or as in classification.
+pub(in crate::lab::config) const fn rate(optimiser: Optimiser) -> f64 {
+    match optimiser {
+        Optimiser::Sign { .. } => 0.25,
+        Optimiser::Rms | Optimiser::AdamFx { .. } => 0.002,
+        _ => 1.0,
+    }
+}
+
+/// `learning.rate_multipliers` of a network of so many layers: outputs are pulsed twice as often.
+pub(in crate::lab::config) fn multipliers(optimiser: Optimiser, layers: usize) -> PerLayer<f64> {
+    if !optimiser.is_sign() {
+        return PerLayer::All(1.0);
+    }
     let mut each = vec![1.0; layers];
     if let Some(output) = each.last_mut() {
-        *output = OUTPUT_MULTIPLIER;
+        *output = 2.0;
     }
     PerLayer::Each(each)
 }

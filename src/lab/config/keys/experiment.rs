@@ -300,12 +300,13 @@ const LEARNING: &[KeyEntry] = &[
         .only("with optimiser = \"sign\"", &["learning.optimiser=sign"]),
     flag("centred").default("true").only(ON_POLICY, POLICY),
     real("rate", 1e-6, 1e6).default("18.0").otherwise(
-        "20.0 with other data than the built-in digits; with a batch below the default one less, in proportion; 0.25 with \
-         task = \"policy\"",
+        "20.0 with other data than the built-in digits; with a batch below the default one less, in proportion; of \
+         policies 0.25 with optimiser = \"sign\", 0.002 with \"rms\" and \"adam_fx\", 1.0 with others",
     ),
     real("rate_multipliers", 1e-6, 1e6).layers().default("[1.0, 0.25]").otherwise(
         "1 in every layer, 0.25 in the last one of the built-in digits (1.0 with other data); behind more than 256 \
-         hidden units times 256 / units; 2.0 in the last one of policies",
+         hidden units times 256 / units; 2.0 in the last one of policies with \
+         optimiser = \"sign\"",
     ),
     whole("rate_mantissa", 1, 15)
         .layers()
