@@ -3,6 +3,7 @@
 //! A [`Session`] is a training in memory that makes records; [`train`] keeps it in a folder, [`verify()`] compares it with
 //! one. Neither prints: callers get [`RunEvent`]s.
 
+mod again;
 mod classify;
 mod notes;
 mod policy;
@@ -17,6 +18,7 @@ mod verify;
 mod watch;
 mod weigh;
 
+pub use again::{address_of, configuration, evaluate};
 pub use notes::notes;
 pub use profile::{Act, ModeUse, Profile, profile};
 pub use proof::{records, untouched};
@@ -24,10 +26,7 @@ pub use report::{ReportMade, report};
 pub use repriced::{Prices, Repriced, absent, reprice, reprice_as};
 pub use session::Session;
 pub use task::Progress;
-pub use train::{
-    Keeping, RunEvent, Trained, address_of, carry_on, configuration, evaluate, resume, train,
-    train_keeping,
-};
+pub use train::{Keeping, RunEvent, Trained, carry_on, resume, train, train_keeping};
 pub use verify::{Verdict, replay, verify};
 pub use watch::{Watched, watch};
 pub use weigh::Memory;

@@ -55,7 +55,7 @@ fn outputs(engine: &Engine, put_out: &mut Vec<Logit>) {
     } else {
         let (above, below) = (i128::from(above), i128::from(below));
         put_out.extend(sums.iter().map(|&sum| {
-            let number = ((i128::from(sum) * above << 21) + below).div_euclid(2 * below);
+            let number = (((i128::from(sum) * above) << 21) + below).div_euclid(2 * below);
             saturated(i64::try_from(number).unwrap_or(if sum < 0 { i64::MIN } else { i64::MAX }))
         }));
     }

@@ -8,9 +8,9 @@
 
 use std::path::{Path, PathBuf};
 
+use super::again::read_config;
 use super::notes::notes;
 use super::session::chosen;
-use super::train::read_config;
 use super::{Machine, RunError};
 use crate::chip::crossbar::kernel::Backend;
 use crate::lab::config::{Bias, Config, PolicySettings};

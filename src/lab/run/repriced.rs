@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::train::read_config;
+use super::again::read_config;
 use super::{RunError, records};
 use crate::chip::hardware::Hardware;
 use crate::lab::config::{Absent, Config, Constants, Model, load_model};

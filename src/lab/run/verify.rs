@@ -6,9 +6,9 @@ use std::sync::{Arc, Mutex, PoisonError};
 use serde::Serialize;
 use serde_json::Value;
 
+use super::again::read_config;
 use super::proof::{self, Difference};
 use super::session::chosen;
-use super::train::read_config;
 use super::{Machine, Progress, RunError, Session};
 use crate::lab::config::Select;
 use crate::lab::data::{self, DataRoot};

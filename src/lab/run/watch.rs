@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::train::{read_again, read_config};
+use super::again::{read_again, read_config};
 use super::{Machine, RunError};
 use crate::lab::data::DataRoot;
 use crate::task::environment::EnvSpec;

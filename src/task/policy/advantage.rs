@@ -67,9 +67,9 @@ pub fn advantages(
         out.clear();
         out.resize(all, Advantage::ZERO);
     }
-    for environment in 0..environments {
+    for (environment, &last) in last.iter().enumerate() {
         let mut later = 0;
-        let mut next = wide(last[environment]);
+        let mut next = wide(last);
         for at in (environment..all).step_by(environments).rev() {
             if terminated[at] || truncated[at] {
                 later = 0;

@@ -94,7 +94,7 @@ impl Critic {
             let steps = &batch[first..first + engine.samples()];
             for (&step, &said) in steps.iter().zip(&*said) {
                 let error = i64::from(value_error(rollout.targets[step as usize], said).to_bits());
-                epoch.value_loss.add(error * error >> 21);
+                epoch.value_loss.add((error * error) >> 21);
                 errors.push(error as i32);
             }
         });
