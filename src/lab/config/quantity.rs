@@ -132,6 +132,18 @@ impl Per {
     }
 }
 
+/// Where a number comes from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Kind {
+    /// On silicon, or read from a cited source that did.
+    Measured,
+    /// Adjusted until a model met a published result.
+    Fitted,
+    /// A guess, a memory, or a number of another chip.
+    Assumed,
+}
+
 /// How a number came to the setting that it prices.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Standing {

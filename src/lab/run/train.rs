@@ -12,16 +12,16 @@ use super::again::{read_config, restore};
 use super::notes::{Watcher, with_calibration};
 use super::session::chosen;
 use super::{Machine, Progress, RunError, Session, proof};
-use crate::lab::config::{self, Absent, Config, Select, Sources};
+use crate::lab::config::{Absent, Config, Select};
 use crate::lab::data::{self, Data, DataRoot, ImageShape, Told};
 use crate::lab::price::Cost;
 use crate::lab::report::Film;
 use crate::lab::store::folder::{self, FolderError, MetricsLog, RunFolder, names};
 use crate::lab::store::ledger::LedgerRecord;
 use crate::lab::store::record::{
-    BestRecord, DataRecord, EpochRecord, Note, RateRecord, Receipt, TestOutcome, TimingRecord,
+    BestRecord, EpochRecord, Note, RateRecord, Receipt, TestOutcome, TimingRecord,
 };
-use crate::lab::store::{address, hash, stream};
+use crate::lab::store::{hash, stream};
 use crate::task::environment::EnvSource;
 use crate::task::policy::WatchedStep;
 

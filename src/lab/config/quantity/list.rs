@@ -154,15 +154,3 @@ pub const QUANTITIES: [Quantity; 30] = [
     area("tile", Per::Tile, [1e-12, 1e-4], "what a tile has beside cells and converters")
     .of(&[Setting::Rows, Setting::Columns]),
 ];
-
-/// Where a number comes from.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Kind {
-    /// On silicon, or read from a cited source that did.
-    Measured,
-    /// Adjusted until a model met a published result.
-    Fitted,
-    /// A guess, a memory, or a number of another chip.
-    Assumed,
-}
