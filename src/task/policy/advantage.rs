@@ -143,7 +143,7 @@ mod tests {
             let reward = wide(happened.rewards[at].to_bits(), 16);
             let delta =
                 reward + part(horizon.discount, next) - wide(happened.values[at].to_bits(), 20);
-            sum += (delta >> 8) * (weight >> 8) >> (BITS - 16);
+            sum += ((delta >> 8) * (weight >> 8)) >> (BITS - 16);
             bound += weight >> 20;
             if over || stopped {
                 break;

@@ -248,12 +248,12 @@ mod tests {
                 let off = (got << (20 - bits)) * root - ((n * i128::from(x) - sum) << 40);
                 let size = got.abs() << (20 - bits);
                 // half a bit, 2^-24 of itself, 2^-20; and the rounding of this root
-                let bound = (root << (19 - bits.min(19))) + (root * size >> 24) + root + size + (1 << 20);
+                let bound = (root << (19 - bits.min(19))) + ((root * size) >> 24) + root + size + (1 << 20);
                 prop_assert!(off.abs() <= bound, "{off} {bound}");
                 // and back
                 let back = i128::from(spread.number(narrow((got << (20 - bits)).clamp(-1 << 31, (1 << 31) - 1), "a word")));
                 if size < 1 << 24 {
-                    let bound = (root / n >> (bits + 20)) + 3 + (root / n >> 38);
+                    let bound = ((root / n) >> (bits + 20)) + 3 + ((root / n) >> 38);
                     prop_assert!((back - i128::from(x)).abs() <= bound, "{back} {x} {bound}");
                 }
             }

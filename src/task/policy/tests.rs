@@ -307,9 +307,10 @@ fn outcomes_that_do_not_fit_are_errors_and_move_nothing() {
         outcomes.check(spec, 2).map_err(|error| error.to_string())
     };
     assert_eq!(check(&|_| {}, &spec), Ok(()));
-    let wrong: [(&dyn Fn(&mut Outcomes), &str); 4] = [
+    type Change<'a> = &'a dyn Fn(&mut Outcomes);
+    let wrong: [(Change<'_>, &str); 4] = [
         (&|o| o.rewards.push(Real::ONE), "a list of their outcomes has 3"),
-        (&|o| drop(o.next.values.pop()), "shows more or less than it has"),
+        (&|o| o.next.values.truncate(7), "shows more or less than it has"),
         (&|o| o.next.ends.push(0), "shows more or less than it has"),
         (&|o| (o.terminated[1], o.truncated[1]) = (true, true), "is terminated and truncated"),
     ];

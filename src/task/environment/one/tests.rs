@@ -269,7 +269,7 @@ fn stays_within<E: Environment>(words: &mut impl Iterator<Item = u32>) {
             match word % 8 {
                 0 => least,
                 1 => most,
-                _ => least + (i128::from(most - least) * i128::from(share) >> 32) as i64,
+                _ => least + ((i128::from(most - least) * i128::from(share)) >> 32) as i64,
             }
         })
         .collect();
