@@ -40,12 +40,13 @@ pub struct SetDefaults {
 }
 
 /// Keys whose default follows from other keys of an experiment than data and rule.
-pub(super) const FOLLOWING: [&str; 5] = [
+pub(super) const FOLLOWING: [&str; 6] = [
     "learning.rate",
     "learning.rate_multipliers",
     "learning.centre",
     "environment.rollouts",
     "network.critic_hidden",
+    "network.weight_max",
 ];
 
 /// One entry a data set that has defaults of its own, then the entry of all others.

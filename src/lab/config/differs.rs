@@ -110,7 +110,9 @@ impl Config {
         let learning = file.learning.as_mut()?;
         (learning.rate, learning.rate_multipliers, learning.centre) = (None, None, None);
         file.environment.iter_mut().for_each(|environment| environment.rollouts = None);
-        file.network.iter_mut().for_each(|network| network.critic_hidden = None);
+        if let Some(network) = file.network.as_mut() {
+            (network.critic_hidden, network.weight_max) = (None, None);
+        }
         check::config(file, &UnderModel::default()).ok().map(|config| config.resolved)
     }
 

@@ -388,7 +388,7 @@ mod tests {
             ("learning.epoch=3", "unknown field `epoch`"),
             ("hw.cell.level_bits=13", "`hw.cell.level_bits`"),
             ("hw.cell.floor=300", "must lie in 0..=254"),
-            ("learning.rule=adam", "ed, ed_seed, kaneko, dfa, bp"),
+            ("learning.rule=adam", "ed, ed_seed, ed_non_dalean, kaneko, dfa, bp, es"),
             ("network.weight_max=3", "power of two"),
             ("learning.rate=-1", "above 0"),
             ("hw.adc=perfect", "ideal"),

@@ -1,4 +1,4 @@
-//! An episode as an animated picture: one self-contained SVG, a group a frame, shown one after the other.
+//! An episode as an animated picture: one self-contained SVG, whose lines of text are shown and hidden in turn.
 //!
 //! Pictures are characters in a grid, as environments draw them. Frames that would not be told apart in time are left out:
 //! an episode of many steps is shown at every second, third, ... of them.
@@ -9,7 +9,7 @@ use super::number::{escape, place, significant, size};
 use crate::task::policy::WatchedStep;
 
 /// Frames of a film at most.
-const FRAMES_MAX: usize = 240;
+const FRAMES_MAX: usize = 160;
 /// Seconds of a frame.
 const FRAME_SECONDS: f64 = 0.08;
 /// Seconds of the last frame.
@@ -59,43 +59,37 @@ impl Film {
         Self { episode, steps, frames: kept.collect() }
     }
 
-    /// The animated picture. Who asks for less motion is shown the last frame alone.
+    /// The animated picture; what shows no motion shows the last frame. A line that stays is drawn once.
     #[must_use]
     pub fn svg(&self) -> String {
-        let lines = |frame: &Frame| frame.picture.lines().count();
-        let columns = |frame: &Frame| frame.picture.lines().map(|l| l.chars().count()).max();
-        let high = self.frames.iter().map(lines).max().unwrap_or(0);
-        let wide = self.frames.iter().filter_map(columns).max().unwrap_or(0).max(30);
+        let texts: Vec<Vec<String>> = self.frames.iter().map(Frame::lines).collect();
+        let high = texts.iter().map(Vec::len).max().unwrap_or(0);
+        let columns = texts.iter().flatten().map(|line| line.chars().count());
+        let wide = columns.max().unwrap_or(0).max(30);
         let [of_character, of_line] = CHARACTER;
         let (width, height) =
-            (2.0 * MARGIN + of_character * size(wide), 2.0 * MARGIN + of_line * size(high + 1));
-        let frames = size(self.frames.len());
-        let seconds = FRAME_SECONDS * frames + LAST_SECONDS;
-        let last = self.frames.len().saturating_sub(1);
+            (2.0 * MARGIN + of_character * size(wide), 2.0 * MARGIN + of_line * size(high));
+        let seconds = FRAME_SECONDS * size(self.frames.len()) + LAST_SECONDS;
         let mut body = String::new();
-        for (at, frame) in self.frames.iter().enumerate() {
-            let from = FRAME_SECONDS * size(at) / seconds;
-            let to = if at == last { 1.0 } else { FRAME_SECONDS * size(at + 1) / seconds };
-            let hidden = if at == last { "" } else { " visibility=\"hidden\"" };
-            let animated = match (at, self.frames.len()) {
-                (_, 1) => String::new(),
-                (0, _) => animate(&["visible", "hidden"], &[0.0, to], seconds),
-                (_, _) if at == last => animate(&["hidden", "visible"], &[0.0, from], seconds),
-                _ => animate(&["hidden", "visible", "hidden"], &[0.0, from, to], seconds),
-            };
-            let _ = write!(body, "<g{hidden}>{animated}");
-            let head = format!("step {}  return {}", frame.step, significant(frame.total));
-            let texts = std::iter::once(&*head).chain(frame.picture.lines());
-            for (line, text) in texts.enumerate().filter(|(_, text)| !text.trim().is_empty()) {
-                let _ = write!(
-                    body,
-                    "<text xml:space=\"preserve\" x=\"{}\" y=\"{}\">{}</text>",
-                    place(MARGIN),
-                    place(MARGIN + of_line * (size(line) + 0.8)),
-                    escape(text)
-                );
+        for line in 0..high {
+            let y = place(MARGIN + of_line * (size(line) + 0.8));
+            let of_frame = |at: usize| texts[at].get(line).map_or("", String::as_str);
+            let mut from = 0;
+            while from < texts.len() {
+                let text = of_frame(from);
+                let same = (from..texts.len()).take_while(|&at| of_frame(at) == text).count();
+                let to = from + same;
+                if !text.trim().is_empty() {
+                    let (hidden, animated) = self.shown(from, to, seconds);
+                    let _ = write!(
+                        body,
+                        "<text xml:space=\"preserve\" x=\"{}\" y=\"{y}\"{hidden}>{}{animated}</text>",
+                        place(MARGIN),
+                        escape(text.trim_end())
+                    );
+                }
+                from = to;
             }
-            body += "</g>";
         }
         format!(
             "<svg xmlns=\"http://www.w3.org/2000/svg\" class=\"film\" viewBox=\"0 0 {} {}\" style=\"max-width:{}px\" \
@@ -107,17 +101,31 @@ impl Film {
             self.episode
         )
     }
+
+    /// What shows something in the frames from one to before another, of all that make so many seconds, and hides it else.
+    fn shown(&self, from: usize, to: usize, seconds: f64) -> (&'static str, String) {
+        let time = |at: usize| FRAME_SECONDS * size(at) / seconds;
+        let last = to == self.frames.len();
+        let (values, times) = match (from, last) {
+            (0, true) => return ("", String::new()),
+            (0, false) => ("visible;hidden", format!("0;{:.5}", time(to))),
+            (_, true) => ("hidden;visible", format!("0;{:.5}", time(from))),
+            (_, false) => ("hidden;visible;hidden", format!("0;{:.5};{:.5}", time(from), time(to))),
+        };
+        let animated = format!(
+            "<animate attributeName=\"visibility\" calcMode=\"discrete\" dur=\"{seconds:.2}s\" repeatCount=\"indefinite\" \
+             values=\"{values}\" keyTimes=\"{times}\"/>"
+        );
+        (if last { "" } else { " visibility=\"hidden\"" }, animated)
+    }
 }
 
-/// Visibility over a time that starts again at its end.
-fn animate(values: &[&str], times: &[f64], seconds: f64) -> String {
-    let times: Vec<String> = times.iter().map(|time| format!("{time:.5}")).collect();
-    format!(
-        "<animate attributeName=\"visibility\" calcMode=\"discrete\" dur=\"{seconds:.2}s\" repeatCount=\"indefinite\" \
-         values=\"{}\" keyTimes=\"{}\"/>",
-        values.join(";"),
-        times.join(";")
-    )
+impl Frame {
+    /// Numbers, then the picture.
+    fn lines(&self) -> Vec<String> {
+        let head = format!("step {}  return {}", self.step, significant(self.total));
+        std::iter::once(head).chain(self.picture.lines().map(str::to_owned)).collect()
+    }
 }
 
 #[cfg(test)]
@@ -136,7 +144,7 @@ mod tests {
 
     #[test]
     fn a_film_has_few_frames_and_the_last_one() {
-        for (count, frames) in [(0, 0), (1, 1), (240, 240), (241, 121), (1000, 201)] {
+        for (count, frames) in [(0, 0), (1, 1), (160, 160), (161, 81), (1000, 144)] {
             let film = Film::new(3, &steps(count));
             assert_eq!((film.frames.len(), film.steps), (frames, count));
             if let Some(last) = film.frames.last() {
@@ -151,10 +159,9 @@ mod tests {
         let tree = resvg::usvg::Tree::from_str(&svg, &resvg::usvg::Options::default());
         assert!(tree.is_ok(), "{svg}");
         assert!(svg.contains("&lt;1&gt;") && svg.contains("step 2  return 1.5"), "{svg}");
-        assert_eq!(
-            (svg.matches("<animate").count(), svg.matches("visibility=\"hidden\"").count()),
-            (3, 2)
-        );
+        // two lines that change, thrice each, and one that stays
+        assert_eq!((svg.matches("<text").count(), svg.matches("<animate").count()), (7, 6));
+        assert_eq!(svg.matches(" visibility=\"hidden\"").count(), 4);
         assert!(!Film::new(0, &steps(1)).svg().contains("<animate"));
     }
 }

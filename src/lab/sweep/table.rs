@@ -1,7 +1,7 @@
 //! The results of a sweep as a table.
 
 use super::axis::Value;
-use super::row::{RESULTS, ResultKind, Row};
+use super::row::{RESULTS, ResultColumn, ResultKind, Row};
 use super::{Sweep, SweepError};
 use crate::lab::config::EFFECTS;
 use crate::lab::report::sweep::{Figures, Refused, ShownAxis};
@@ -206,8 +206,17 @@ fn of_values<'a>(values: impl Iterator<Item = &'a Value> + Clone) -> Values {
     }
 }
 
+/// A column a result; those of a task that no finished run is of are left out.
 fn result_columns(rows: &[Option<Row>]) -> impl Iterator<Item = Column> {
-    RESULTS.iter().map(move |column| {
+    let tasks: Vec<&str> = RESULTS
+        .iter()
+        .filter(|column| rows.iter().flatten().any(|row| row.results.contains_key(column.name)))
+        .filter_map(|column| column.task)
+        .collect();
+    let shown = move |column: &&ResultColumn| {
+        column.task.is_none_or(|task| tasks.is_empty() || tasks.contains(&task))
+    };
+    RESULTS.iter().filter(shown).map(move |column| {
         let cells =
             rows.iter().map(|row| row.as_ref().and_then(|row| row.results.get(column.name)));
         let values = if column.kind == ResultKind::Whole {

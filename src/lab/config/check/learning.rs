@@ -3,7 +3,7 @@
 use super::{Select, TrainOn, one_a_layer, per_layer, positive, range, route, word, wrong};
 use crate::chip::layer::Optimiser;
 use crate::lab::config::ConfigError;
-use crate::lab::config::defaults::SetDefaults;
+use crate::lab::config::defaults::{SetDefaults, policy};
 use crate::lab::config::file::{LearningFile, MantissaFile};
 use crate::learn::error::Centre;
 use crate::learn::route::Route;
@@ -126,7 +126,12 @@ pub(super) fn resolve(
     let mode = word("learning.mode", &mut file.mode, "accumulate", &MODES)?;
     let (train_on, select) = selection(file, defaults)?;
     let batch = range("learning.batch", Batch::new(*file.batch.get_or_insert(defaults.batch)))?;
-    file.rate.get_or_insert_with(|| defaults.rate_of(batch));
+    let optimiser = optimiser(file, "plain", false)?;
+    file.rate.get_or_insert_with(|| match optimiser {
+        Optimiser::Plain | Optimiser::Momentum { .. } => defaults.rate_of(batch),
+        // a chance, or a step of weights, is one whatever is learnt
+        other => policy::rate(other),
+    });
     // one sample has no mean but that of those before it
     let alone = batch.get() == 1 || mode == UpdateMode::Online;
     let default = match (kind.is_raw(), alone) {
@@ -143,7 +148,7 @@ pub(super) fn resolve(
         batch,
         rates: rates(file, hidden, defaults)?,
         decay: word("learning.decay", &mut file.decay, "cosine", &DECAYS)?,
-        optimiser: optimiser(file, "plain", false)?,
+        optimiser,
         epochs: *file.epochs.get_or_insert(defaults.epochs),
         shift_pixels: *file.shift_pixels.get_or_insert(0),
         train_on,

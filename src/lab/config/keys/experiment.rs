@@ -300,8 +300,8 @@ const LEARNING: &[KeyEntry] = &[
         .only("with optimiser = \"sign\"", &["learning.optimiser=sign"]),
     flag("centred").default("true").only(ON_POLICY, POLICY),
     real("rate", 1e-6, 1e6).default("18.0").otherwise(
-        "20.0 with other data than the built-in digits; with a batch below the default one less, in proportion; of \
-         policies 0.25 with optimiser = \"sign\", 0.002 with \"rms\" and \"adam_fx\", 1.0 with others",
+        "20.0 with other data than the built-in digits; with a batch below the default one less, in proportion; 0.25 \
+         with optimiser = \"sign\", 0.002 with \"rms\" and \"adam_fx\"; 1.0 of policies with others",
     ),
     real("rate_multipliers", 1e-6, 1e6).layers().default("[1.0, 0.25]").otherwise(
         "1 in every layer, 0.25 in the last one of the built-in digits (1.0 with other data); behind more than 256 \
@@ -415,7 +415,7 @@ const PPO: &[KeyEntry] = &[
         .default("0.01")
         .otherwise("0.0 where actions are numbers, 0.03 of Foray-v0")
         .only(ON_POLICY, POLICY),
-    other("log_sigma", "a number, -4 to 1").default("0").only(ON_CONTINUOUS, CONTINUOUS),
+    other("log_sigma", "a number, -4 to 1").default("0.0").only(ON_CONTINUOUS, CONTINUOUS),
     other("log_sigma_rate", "a number, 0 to 1").default("0.003").only(ON_CONTINUOUS, CONTINUOUS),
 ];
 

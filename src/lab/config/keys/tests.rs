@@ -65,7 +65,7 @@ fn set(key: &KeyShown, value: &str) -> Result<Config, String> {
     let config = with(&settings).map_err(|e| e.to_string())?;
     let network = key.table.path == "learning" || key.table.path == "network";
     if network && !matches!(key.entry.values, KeyValues::Words(_)) {
-        config.experiment(64, 10, Some([8, 8, 1])).map_err(|e| e.to_string())?;
+        config.networks(64, 10, Some([8, 8, 1])).map_err(|e| e.to_string())?;
     }
     Ok(config)
 }
@@ -198,6 +198,7 @@ fn words_are_taken_and_others_are_refused_with_the_whole_list() {
             let beside: &[&str] = match (&*key.full(), *word) {
                 ("data.format", "idx") => &["data.train=a", "data.train_labels=b"],
                 ("data.format", _) => &["data.train=a"],
+                ("learning.rule", "es") | ("network.readout", "p-n") => &["task=policy"],
                 ("learning.select", "best_validation") | ("learning.rule", _) => &[],
                 ("learning.mode", "online") => &["learning.centre=none"],
                 _ => &[],
