@@ -30,7 +30,7 @@ pub mod pendulum;
 mod stream;
 
 use one::SideBySide;
-pub use stream::{EnvSource, KeptPiece, Purpose, Record, Replaying, Stream};
+pub use stream::{EnvSource, KeptPiece, Purpose, Record, Replaying, ShownStream};
 
 /// An observation, an action or a reward.
 pub type Real = I16F16;

@@ -14,7 +14,7 @@ use std::borrow::Cow;
 use safetensors::{Dtype, SafeTensors, View};
 use serde::{Deserialize, Serialize};
 
-use crate::task::environment::{KeptPiece, Record, Stream};
+use crate::task::environment::{KeptPiece, Record, ShownStream};
 
 /// Name of the file of an epoch; of epoch 0, what was shown before the first update.
 #[must_use]
@@ -104,9 +104,9 @@ fn list<T: Element>(file: &SafeTensors<'_>, name: &str) -> Result<Vec<T>, String
 }
 
 /// The lists of a stream, each with its name.
-fn lists(prefix: &str, stream: &Stream) -> Vec<(String, Listed)> {
+fn lists(prefix: &str, stream: &ShownStream) -> Vec<(String, Listed)> {
     // without `..`: what a stream is made of is listed or does not compile
-    let Stream {
+    let ShownStream {
         entries,
         values,
         lines,
@@ -132,9 +132,9 @@ fn lists(prefix: &str, stream: &Stream) -> Vec<(String, Listed)> {
     .into()
 }
 
-fn stream(prefix: &str, file: &SafeTensors<'_>) -> Result<Stream, String> {
+fn stream(prefix: &str, file: &SafeTensors<'_>) -> Result<ShownStream, String> {
     let name = |name: &str| format!("{prefix}.{name}");
-    Ok(Stream {
+    Ok(ShownStream {
         entries: list(file, &name("entries"))?,
         values: list(file, &name("values"))?,
         lines: list(file, &name("lines"))?,
@@ -195,7 +195,7 @@ mod tests {
     use super::*;
 
     fn record() -> Record {
-        let training = Stream {
+        let training = ShownStream {
             entries: vec![-2, 2],
             values: vec![1, -2, 3, -4],
             lines: vec![7],
@@ -208,7 +208,7 @@ mod tests {
         };
         let piece =
             KeptPiece { name: "environment.x".into(), within: -3..=i64::MAX, numbers: vec![-3, 8] };
-        Record { training, evaluation: Stream::default(), state: vec![piece] }
+        Record { training, evaluation: ShownStream::default(), state: vec![piece] }
     }
 
     #[test]

@@ -7,7 +7,7 @@
 //!           the state of the former as it was at the end
 //! ```
 //!
-//! Everything is in the integers that the policy was shown, so the same record gives the same bits. See docs/MODEL.md, 5.
+//! Everything is in the integers that the policy was shown, so the same record gives the same bits. See docs/MODEL.md, 5.4.
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
 use std::ops::RangeInclusive;
@@ -21,7 +21,7 @@ use crate::chip::state::{Piece, Section, Seen, State, StateError, Visitor};
 
 /// What some environments showed, entry after entry.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
-pub struct Stream {
+pub struct ShownStream {
     /// Environments of each entry; negative where it is a reset.
     pub entries: Vec<i32>,
     /// What each shows next, `[entry][environment][value]`, 16 fractional bits; of dense ones.
@@ -57,9 +57,9 @@ pub struct KeptPiece {
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Record {
     /// In environments that were learnt in.
-    pub training: Stream,
+    pub training: ShownStream,
     /// In others.
-    pub evaluation: Stream,
+    pub evaluation: ShownStream,
     /// State of the former at the end.
     pub state: Vec<KeptPiece>,
 }
@@ -144,7 +144,7 @@ impl EnvSource {
     }
 }
 
-impl Stream {
+impl ShownStream {
     fn push_shown(&mut self, shown: &Observations) {
         self.values.extend(shown.values.iter().map(|value| value.to_bits()));
         self.lines.extend_from_slice(&shown.active);
@@ -258,7 +258,7 @@ impl Stream {
 }
 
 impl Record {
-    const fn stream(&mut self, purpose: Purpose) -> &mut Stream {
+    const fn stream(&mut self, purpose: Purpose) -> &mut ShownStream {
         match purpose {
             Purpose::Training => &mut self.training,
             Purpose::Evaluation => &mut self.evaluation,
