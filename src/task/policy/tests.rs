@@ -250,7 +250,8 @@ const EVOLUTION: Method = Method::Evolution(Evolution { pairs: 2, step: 4, shift
 
 #[test]
 fn evolution_moves_cells_by_loading_them_alone() {
-    let experiment = experiment(IDS[0], Rule::Ed, Some(EVOLUTION));
+    // whose candidates differ from the first step on
+    let experiment = experiment(IDS[1], Rule::Ed, Some(EVOLUTION));
     let mut evolved = trainer(&experiment);
     let cells: u64 = experiment.actor.layers.iter().map(cells_of).sum();
     let before = book(&mut evolved).halves;
