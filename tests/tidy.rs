@@ -40,7 +40,7 @@ const HOUSE: [(&str, &[&str]); 6] = [
         "cli",
         &[
             "out", "known", "progress", "table", "data", "hw", "keys", "run", "report", "sweep",
-            "export", "store", "price", "runs", "trace", "bench",
+            "export", "store", "price", "runs", "trace", "watch", "bench",
         ],
     ),
 ];

@@ -1,7 +1,7 @@
 //! What a policy acts on, in the place of data: nothing to learn from, but a description and a hash.
 //!
 //! ```text
-//! hash = BLAKE3( "dalean environment 1\n", id, what it shows and takes, steps of an episode at most, names of inputs )
+//! hash = BLAKE3( "dalean environment 1\n", id, what it shows and takes, steps of an episode at most )
 //! ```
 //!
 //! What an environment does is part of this program, as its arithmetic is: a change of its law raises that version.
@@ -21,19 +21,22 @@ pub(super) fn describe(id: &str) -> Result<Data, DataError> {
 }
 
 fn of(spec: &EnvSpec) -> Data {
-    let EnvSpec { id, shown, taken, steps_max, inputs } = spec;
-    let (features, shows) = match *shown {
-        Shown::Dense(values) => (values, format!("{values} numbers")),
-        Shown::Sparse { lines, active } => (lines, format!("{lines} lines, {active} on at most")),
+    // names of inputs are words for people
+    let EnvSpec { id, shown, taken, steps_max, inputs: _ } = spec;
+    let (features, shows, shown) = match *shown {
+        Shown::Dense(values) => (values, format!("{values} numbers"), format!("dense {values}")),
+        Shown::Sparse { lines, active } => {
+            let shows = format!("{lines} lines, {active} on at most");
+            (lines, shows, format!("sparse {lines} {active}"))
+        }
     };
-    let (classes, takes) = match *taken {
-        Taken::Discrete(actions) => (actions, format!("one of {actions} actions")),
-        Taken::Continuous(values) => (values, format!("{values} numbers from -1 to 1")),
+    let (classes, takes, taken) = match *taken {
+        Taken::Discrete(n) => (n, format!("one of {n} actions"), format!("discrete {n}")),
+        Taken::Continuous(n) => (n, format!("{n} numbers from -1 to 1"), format!("continuous {n}")),
     };
     let description =
         format!("{id}: shows {shows}, takes {takes}, episodes of {steps_max} steps at most");
-    let content =
-        format!("dalean environment 1\n{id}\n{shown:?}\n{taken:?}\n{steps_max}\n{inputs:?}");
+    let content = format!("dalean environment 1\n{id}\n{shown}\n{taken}\n{steps_max}\n");
     let none = Examples::new(vec![], vec![], features.max(1), 255, classes.clamp(1, 256));
     let none = none.expect("no examples break no rule");
     let split = Split { train: none.clone(), validation: none.clone(), test: none };
