@@ -132,17 +132,19 @@ pub fn sparse(active: &[u32], lines: usize, drive_bits: DriveBits, codes: &mut V
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use proptest::prelude::*;
 
     use super::*;
     use crate::chip::state::Seen;
     use bitvec::prelude::*;
 
-    /// Shows what is visited, or hands something back.
-    struct Numbers {
-        shown: Vec<i64>,
-        back: Option<Vec<i64>>,
+    /// Keeps the one piece that it is shown, which has this name, and hands something back.
+    #[derive(Default)]
+    pub(in crate::task::policy) struct Numbers {
+        pub(in crate::task::policy) name: &'static str,
+        pub(in crate::task::policy) shown: Vec<i64>,
+        pub(in crate::task::policy) back: Option<Vec<i64>>,
     }
 
     impl Visitor for Numbers {
@@ -163,7 +165,8 @@ mod tests {
             unreachable!("there are only numbers")
         }
         fn numbers(&mut self, piece: &Piece<'_>, values: &[i64]) -> Seen<Vec<i64>> {
-            assert_eq!((piece.name, piece.section), ("policy.observed", Some(Section::Task)));
+            assert_eq!((piece.name, piece.section), (self.name, Some(Section::Task)));
+            assert!(self.shown.is_empty(), "there is one piece");
             self.shown = values.to_vec();
             Ok(self.back.take())
         }
@@ -180,17 +183,17 @@ mod tests {
     fn what_a_checkpoint_holds_is_what_was_there_or_an_error() {
         let mut statistics = Statistics::new(2);
         statistics.add(&reals(&[1 << 16, i32::MIN, -3, 7, i32::MAX, i32::MIN]));
-        let mut writer = Numbers { shown: Vec::new(), back: None };
+        let name = "policy.observed";
+        let mut writer = Numbers { name, ..Numbers::default() };
         statistics.visit(&mut writer).unwrap();
+        let back = |numbers: &[i64]| Numbers { name, back: Some(numbers.to_vec()), shown: vec![] };
         let mut again = Statistics::new(2);
-        let mut reader = Numbers { shown: Vec::new(), back: Some(writer.shown.clone()) };
-        again.visit(&mut reader).unwrap();
+        again.visit(&mut back(&writer.shown)).unwrap();
         assert_eq!((again, writer.shown.len()), (statistics.clone(), 10));
         for (at, by) in [(0, 1), (3, i64::MIN)] {
-            let mut back = writer.shown.clone();
-            back[at] ^= by;
-            let mut reader = Numbers { shown: Vec::new(), back: Some(back) };
-            let error = statistics.visit(&mut reader).unwrap_err();
+            let mut numbers = writer.shown.clone();
+            numbers[at] ^= by;
+            let error = statistics.visit(&mut back(&numbers)).unwrap_err();
             assert_eq!(error.to_string(), "`policy.observed` holds sums that no observations have");
         }
     }

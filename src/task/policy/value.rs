@@ -114,6 +114,7 @@ pub fn value_error(target: Value, said: Value) -> OutputError {
 mod tests {
     use proptest::prelude::*;
 
+    use super::super::observe::tests::Numbers;
     use super::*;
 
     fn values(bits: &[i32]) -> Vec<Value> {
@@ -198,6 +199,22 @@ mod tests {
             assert_eq!(ValueScale::from_numbers(3, &wrong), None, "{wrong:?}");
         }
         assert_eq!(ValueScale::from_numbers(3, &own[..3]), None);
+    }
+
+    #[test]
+    fn what_a_checkpoint_holds_is_what_was_there_or_an_error() {
+        let mut scale = ValueScale::new(4);
+        (0..3).for_each(|x| scale.update(&values(&[x << 20, i32::MIN, 7])));
+        let name = "policy.value_scale";
+        let mut writer = Numbers { name, ..Numbers::default() };
+        scale.visit(&mut writer).unwrap();
+        let back = |numbers: &[i64]| Numbers { name, back: Some(numbers.to_vec()), shown: vec![] };
+        let mut again = ValueScale::new(4);
+        again.visit(&mut back(&writer.shown)).unwrap();
+        assert_eq!(again, scale);
+        let error = again.visit(&mut back(&[-1, 0, 0, 0])).unwrap_err();
+        assert_eq!(error.to_string(), "`policy.value_scale` holds what no values have");
+        assert_eq!(again, scale);
     }
 
     #[test]
