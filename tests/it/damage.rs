@@ -67,7 +67,10 @@ fn made_of(experiment: &str, finished: bool) -> Files {
 fn leaves(value: &Value, place: &str, out: &mut Vec<String>) {
     match value {
         Value::Object(map) if !map.is_empty() => {
-            map.iter().for_each(|(name, value)| leaves(value, &format!("{place}/{name}"), out));
+            let pointed = |name: &str| name.replace('~', "~0").replace('/', "~1");
+            map.iter().for_each(|(name, value)| {
+                leaves(value, &format!("{place}/{}", pointed(name)), out)
+            });
         }
         Value::Array(list) if !list.is_empty() => {
             let places = list.iter().enumerate();
@@ -112,7 +115,7 @@ fn changed(text: &str) -> Vec<(String, String)> {
         let (parent, name) = place.rsplit_once('/').unwrap();
         let mut without = value.clone();
         match without.pointer_mut(parent).unwrap() {
-            Value::Object(map) => drop(map.remove(name)),
+            Value::Object(map) => drop(map.remove(&name.replace("~1", "/").replace("~0", "~"))),
             Value::Array(list) => drop(list.remove(name.parse().unwrap())),
             _ => unreachable!("places lie in lists and tables"),
         }

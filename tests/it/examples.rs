@@ -74,7 +74,7 @@ fn every_experiment_learns_two_batches() {
 #[test]
 fn every_sweep_is_read_and_has_points() {
     let sweeps = files(&examples().join("sweeps"), "toml");
-    assert_eq!(sweeps.len(), 8, "{sweeps:?}");
+    assert_eq!(sweeps.len(), 9, "{sweeps:?}");
     for path in sweeps {
         let sweep = Sweep::read(&path).unwrap_or_else(|error| panic!("{error}"));
         let (points, _) =

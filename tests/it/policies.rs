@@ -119,7 +119,7 @@ fn a_seed_and_an_environment_make_another_policy() {
         of(&["learning.centred=false"]),
         of(&["learning.dead_zone=false"]),
         of(&["learning.rule=dfa"]),
-        of(&["ppo.entropy=0.5"]),
+        of(&["ppo.gamma=0.5"]),
         of(&["environment.id=Pendulum-v1"]),
         of(&["network.input=offset"]),
     ];
@@ -167,7 +167,7 @@ fn every_command_knows_a_policy() {
         assert!(page.contains(&format!("id=\"{id}\"")), "{id}");
     }
     let ran_again = ran(&["report", "--json"]).last();
-    assert_eq!(ran_again["event"], "done");
+    assert_eq!(ran_again["event"], "report");
     let metrics = std::fs::read_to_string(folder.join("metrics.jsonl")).unwrap();
     let record = &lines(&metrics)[2]["outcome"];
     for name in ["charts/global_step", "losses/policy_loss", "losses/clipfrac", "losses/entropy"] {

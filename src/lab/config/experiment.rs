@@ -86,7 +86,7 @@ impl Config {
                 initial: InitialLevels::Uniform { gain_64ths: self.gain_64ths[usize::from(last)] },
                 constant_row: match self.bias {
                     Bias::None => false,
-                    Bias::InputRow => layer == 0,
+                    Bias::InputRow => driven_by == DrivenBy::Shared,
                     Bias::Rows => true,
                 },
             }

@@ -174,7 +174,7 @@ fn everything_that_does_not_fit_together_is_refused_with_its_key() {
         ("learning.rate", "words of 16 bits give 2^-15 at least", |n| {
             *n = baseline(Rule::Dfa);
             n.optimisers[1] = Optimiser::Sign { dead_zone: false };
-            n.rates[1] = Positive::new(2.0f64.powi(-16)).unwrap();
+            n.rates[1] = Positive::new(1.0 / 65_536.0).unwrap();
         }),
         ("learning.rate", "layer 0 a k of -2", |n| n.rates[0] = Positive::new(1e5).unwrap()),
     ];
@@ -199,7 +199,7 @@ fn what_lies_at_the_edge_is_built() {
         baseline(Rule::Bp),
         NetworkSpec {
             optimisers: vec![Optimiser::Sign { dead_zone: true }; 2],
-            rates: vec![Positive::ONE, Positive::new(2.0f64.powi(-16)).unwrap()],
+            rates: vec![Positive::ONE, Positive::new(1.0 / 65_536.0).unwrap()],
             centred: vec![true, false],
             ..plain()
         },

@@ -10,7 +10,8 @@ use crate::lab::report::{Heat, RunView};
 const SHOWN: usize = 24;
 
 pub(super) fn draw(view: &RunView<'_>) -> Option<Figure> {
-    let first: Vec<&Heat> = view.heats.iter().filter(|heat| heat.layer == 0).collect();
+    let at = view.heats.iter().map(|heat| heat.layer).min()?;
+    let first: Vec<&Heat> = view.heats.iter().filter(|heat| heat.layer == at).collect();
     let rows = first.first().map(|heat| heat.rows)?;
     let named = view.inputs;
     let of_rows: usize = named.iter().map(|input| input.rows).sum();
@@ -54,7 +55,7 @@ pub(super) fn draw(view: &RunView<'_>) -> Option<Figure> {
         chart.bar((0.0, mean(*sum, *rows)), (at - 0.38, at + 0.38), ("var(--a)", 0.85), &tip);
     }
     let more = if cut > 0 { format!(" {cut} more are left out.") } else { String::new() };
-    let shape = view.last().and_then(|last| of_layer(last, 0).next().map(|one| one.shape[1]));
+    let shape = view.last().and_then(|last| of_layer(last, at).next().map(|one| one.shape[1]));
     Some(Figure {
         id: "inputs",
         title: "Inputs",
