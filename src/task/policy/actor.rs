@@ -240,10 +240,10 @@ impl Actor {
                         let step = step as usize;
                         let entropy = head::softmax(tables, logits, &mut probabilities, &mut logs);
                         let action = usize::from(rollout.choices[step]);
-                        let weight = weigh(tables, clip, logs[action], rollout, step, epoch);
+                        let push = push_of(tables, clip, logs[action], rollout, step, epoch);
                         let softmax =
                             Softmax { probabilities: &probabilities, logs: &logs, entropy };
-                        head::discrete_errors(&softmax, action, weight, beta, &mut wanted);
+                        head::discrete_errors(&softmax, action, push, beta, &mut wanted);
                         epoch.entropy.add(entropy.to_bits().into());
                         errors.extend(wanted.iter().map(|error| error.to_bits()));
                     }
@@ -255,9 +255,9 @@ impl Actor {
                         let each = || tried.iter().zip(means).zip(&scatters);
                         let log: LogProbability =
                             each().map(|((&t, &mean), scatter)| scatter.log_density(t, mean)).sum();
-                        let weight = weigh(tables, clip, log, rollout, step, epoch);
+                        let push = push_of(tables, clip, log, rollout, step, epoch);
                         for (((&t, &mean), scatter), widen) in each().zip(&mut widen) {
-                            let [error, wider] = scatter.errors(t, mean, weight, beta);
+                            let [error, wider] = scatter.errors(t, mean, push, beta);
                             errors.push(error.to_bits());
                             *widen += i64::from(wider.to_bits());
                         }
@@ -280,7 +280,7 @@ impl Actor {
 }
 
 /// What the errors of a step are multiples of, and what it says of the update.
-fn weigh(
+fn push_of(
     tables: &PolicyTables,
     clip: Clip,
     log: LogProbability,
