@@ -8,7 +8,7 @@
 use std::ops::Range;
 
 use super::crossbar::Crossbar;
-use super::crossbar::kernel::LookUp;
+use super::crossbar::kernel::{ConvShape, LookUp};
 use super::crossbar::layout::Layout;
 use super::hardware::{Adc, AdcRange, Hardware};
 use super::periphery;
@@ -18,10 +18,12 @@ use crate::num::tables::{Activation, FullDrive, Lut, Unit};
 
 mod delivery;
 pub mod requests;
+mod stage;
 mod state;
 
 pub use delivery::{Delivery, Taps, WordSource};
 pub use requests::{Followed, Optimiser, Requests};
+pub use stage::{Gain, Homeostasis, Pool};
 
 /// Whose codes are on the rows of an array.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -50,9 +52,9 @@ impl DrivenBy {
 /// kind there is.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LayerSpec {
-    /// Units of the layer below, or features; without the constant row.
+    /// Units of the layer below, or features; of a convolution the codes of its window. Without the constant row.
     pub inputs: usize,
-    /// Units of each target stream.
+    /// Units of each target stream; of a convolution its channels.
     pub units: usize,
     /// How the arrays are wired.
     pub wiring: Wiring,
@@ -66,6 +68,12 @@ pub struct LayerSpec {
     pub initial: InitialLevels,
     /// Whether a constant row is driven at full code.
     pub constant_row: bool,
+    /// The window that moves over the image below; none of a dense layer.
+    pub convolution: Option<ConvShape>,
+    /// What lies between its units and what they drive.
+    pub pool: Pool,
+    /// What its units do beside their table.
+    pub homeostasis: Homeostasis,
 }
 
 /// How the levels of a new layer are drawn.
@@ -103,11 +111,21 @@ impl LayerSpec {
         }
     }
 
+    /// Whether what a sample of `below` hands on is what one of this layer takes.
+    pub(crate) fn meets(&self, below: &Self) -> bool {
+        match self.convolution {
+            None => self.inputs == below.sample_outputs(),
+            Some(shape) => {
+                shape.channels == below.units && [shape.height, shape.width] == below.pooled()
+            }
+        }
+    }
+
     /// Whether the units of `below` can drive this array.
     #[must_use]
     pub fn follows(&self, below: &Self) -> bool {
         let given = below.wiring.targets();
-        self.inputs == below.units && self.drive_sets().iter().all(|set| given.contains(set))
+        self.meets(below) && self.drive_sets().iter().all(|set| given.contains(set))
     }
 }
 

@@ -145,7 +145,9 @@ mod tests {
     use crate::chip::crossbar::kernel::Backend;
     use crate::chip::engine::Phase;
     use crate::chip::hardware::{DitherBits, Hardware};
-    use crate::chip::layer::{Delivery, DrivenBy, InitialLevels, Layer, LayerSpec};
+    use crate::chip::layer::{
+        Delivery, DrivenBy, Homeostasis, InitialLevels, Layer, LayerSpec, Pool,
+    };
     use crate::chip::ledger::{During, Event};
     use crate::chip::population::Wiring;
     use crate::learn::error::Centre;
@@ -173,6 +175,9 @@ mod tests {
             weight_max_log2: 2,
             initial: InitialLevels::Uniform { gain_64ths: [64, 64] },
             constant_row: false,
+            convolution: None,
+            pool: Pool::None,
+            homeostasis: Homeostasis::OFF,
         };
         let dense = Route::RandomDense { shift: Some(0) };
         let first = match rule {

@@ -8,7 +8,7 @@ use dalean::chip::engine::Phase;
 use dalean::chip::hardware::{
     Adc, AdcRange, DitherBits, DitherPattern, FloorKind, Hardware, Subtract, Window,
 };
-use dalean::chip::layer::{DrivenBy, InitialLevels, LayerSpec, Optimiser};
+use dalean::chip::layer::{DrivenBy, Homeostasis, InitialLevels, LayerSpec, Optimiser, Pool};
 use dalean::chip::ledger::{During, Event};
 use dalean::chip::population::Wiring;
 use dalean::learn::error::Centre;
@@ -132,6 +132,9 @@ fn experiment(s: &Value) -> Experiment {
                     gain_64ths: if last { [64, 64] } else { [96, 32] },
                 },
                 constant_row: false,
+                convolution: None,
+                pool: Pool::None,
+                homeostasis: Homeostasis::OFF,
             }
         })
         .collect();

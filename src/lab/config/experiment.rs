@@ -4,7 +4,7 @@ use std::iter;
 
 use super::check::{Bias, wrong};
 use super::{Config, ConfigError};
-use crate::chip::layer::{DrivenBy, InitialLevels, LayerSpec};
+use crate::chip::layer::{DrivenBy, Homeostasis, InitialLevels, LayerSpec, Pool};
 use crate::learn::network::NetworkSpec;
 use crate::learn::rule::{Readout, Rule};
 use crate::num::tables::Activation;
@@ -89,6 +89,9 @@ impl Config {
                     Bias::InputRow => driven_by == DrivenBy::Shared,
                     Bias::Rows => true,
                 },
+                convolution: None,
+                pool: Pool::None,
+                homeostasis: Homeostasis::OFF,
             }
         });
         NetworkSpec {

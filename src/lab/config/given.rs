@@ -6,11 +6,12 @@
 //! users get by saying nothing changes, the key is written into the resolved configuration instead.
 
 use super::{Config, ConfigError, Select, TrainOn};
+use crate::chip::crossbar::kernel::ConvShape;
 use crate::chip::hardware::{
     Adc, AdcRange, CellSpec, DigitalSpec, DitherBits, DitherPattern, DriveSpec, FloorKind,
     HardwareSpec, PulseCode, Subtract, TileSpec, Timing, WriteScheme, WriteSpec,
 };
-use crate::chip::layer::{DrivenBy, InitialLevels, LayerSpec, Optimiser};
+use crate::chip::layer::{DrivenBy, Gain, Homeostasis, InitialLevels, LayerSpec, Optimiser, Pool};
 use crate::learn::error::Centre;
 use crate::learn::network::NetworkSpec;
 use crate::learn::route::Route;
@@ -73,6 +74,10 @@ const FROZEN: &[(&str, &str)] = &[
     ("layer.mantissa", "1"),
     ("layer.optimiser", "plain"),
     ("layer.centred", "false"),
+    ("layer.pool", "none"),
+    ("layer.threshold", "false"),
+    ("layer.gain", "table"),
+    ("layer.homeostasis_window_log2", "9"),
 ];
 
 /// Key and word.
@@ -306,6 +311,9 @@ impl List {
             weight_max_log2,
             initial,
             constant_row,
+            convolution,
+            pool,
+            homeostasis,
         } = layer;
         let mut put = |key: &str, word: &dyn ToString| {
             self.put(&format!("layer{number}.{key}"), word.to_string());
@@ -326,6 +334,7 @@ impl List {
             Activation::Identity => "identity".into(),
             Activation::Rms => "rms".into(),
             Activation::Accumulator => "accumulator".into(),
+            Activation::Ramp => "ramp".into(),
         };
         put("activation", &activation);
         put("weight_max_log2", weight_max_log2);
@@ -336,6 +345,23 @@ impl List {
             }
         }
         put("constant_row", constant_row);
+        if let Some(ConvShape { channels, height, width, side, stride, pad }) = convolution {
+            let sizes = [channels, height, width, side, stride, pad].map(ToString::to_string);
+            put("convolution", &sizes.join(" "));
+        }
+        match pool {
+            Pool::None => put("pool", &"none"),
+            Pool::Average { side } => put("pool", &format!("average {side}")),
+            Pool::Max { side } => put("pool", &format!("max {side}")),
+        }
+        let Homeostasis { threshold, gain, window_log2 } = homeostasis;
+        put("threshold", threshold);
+        match gain {
+            Gain::Table => put("gain", &"table"),
+            Gain::Fixed { spread } => put("gain", &format!("fixed {spread}")),
+            Gain::Tracking => put("gain", &"tracking"),
+        }
+        put("homeostasis_window_log2", window_log2);
     }
 
     fn chip(&mut self, hardware: &HardwareSpec) {

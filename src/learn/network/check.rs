@@ -52,9 +52,19 @@ fn sizes(network: &NetworkSpec) -> Checked {
     if network.layers.iter().any(|layer| layer.inputs == 0) {
         return misfit("network.hidden", "has a layer of 0 inputs", "give it at least 1 value");
     }
+    let last = network.layers.len().saturating_sub(1);
+    for (at, layer) in network.layers.iter().enumerate() {
+        if let Some((found, allowed)) = layer.misshapen() {
+            return misfit("network.channels", format!("makes layer {at}, which {found}"), allowed);
+        }
+        if layer.convolution.is_some() && at == last {
+            let allowed = "outputs are dense: give it a dense layer behind";
+            return misfit("network.channels", "makes the output a convolution", allowed);
+        }
+    }
     for (at, pair) in network.layers.windows(2).enumerate() {
-        let (units, inputs) = (pair[0].units, pair[1].inputs);
-        if units != inputs {
+        let (units, inputs) = (pair[0].sample_outputs(), pair[1].sample_inputs());
+        if units != inputs || !pair[1].meets(&pair[0]) {
             let found =
                 format!("gives layer {at} {units} units, and layer {} {inputs} inputs", at + 1);
             return misfit(

@@ -1,7 +1,7 @@
 use super::*;
 use crate::chip::engine::Phase;
 use crate::chip::hardware::{Adc, AdcRange, HardwareSpec, Subtract, WriteScheme};
-use crate::chip::layer::DrivenBy;
+use crate::chip::layer::{DrivenBy, Homeostasis, Pool};
 use crate::chip::ledger::Event;
 use crate::chip::population::Wiring;
 use crate::learn::rule::Readout;
@@ -19,6 +19,9 @@ fn plain() -> NetworkSpec {
         weight_max_log2: 2,
         initial: InitialLevels::Uniform { gain_64ths: [96, 32] },
         constant_row: false,
+        convolution: None,
+        pool: Pool::None,
+        homeostasis: Homeostasis::OFF,
     };
     NetworkSpec {
         layers: vec![layer(5, 4, Wiring::Dual), layer(4, 3, Wiring::DualReadout)],

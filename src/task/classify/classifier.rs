@@ -12,7 +12,9 @@ use crate::learn::network::NetworkError;
 /// A network on a chip, and the examples it learns from.
 ///
 /// ```
-/// use dalean::network::{Activation, Centre, Decay, DrivenBy, InitialLevels, LayerSpec, Wiring};
+/// use dalean::network::{
+///     Activation, Centre, Decay, DrivenBy, Homeostasis, InitialLevels, LayerSpec, Pool, Wiring,
+/// };
 /// use dalean::network::{Batch, Optimiser, Positive, RateMantissa, Route, Rule, UpdateMode};
 /// use dalean::{Backend, Classifier, Examples, Experiment, Hardware, NetworkSpec};
 ///
@@ -29,6 +31,9 @@ use crate::learn::network::NetworkError;
 ///     weight_max_log2: 2,
 ///     initial: InitialLevels::Uniform { gain_64ths: [96, 32] },
 ///     constant_row: true,
+///     convolution: None,
+///     pool: Pool::None,
+///     homeostasis: Homeostasis::OFF,
 /// };
 /// let network = NetworkSpec {
 ///     layers: vec![

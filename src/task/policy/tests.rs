@@ -8,7 +8,7 @@ use super::*;
 use crate::chip::crossbar::kernel::Backend;
 use crate::chip::engine::{Phase, Recorded};
 use crate::chip::hardware::Hardware;
-use crate::chip::layer::{DrivenBy, InitialLevels, LayerSpec, Optimiser};
+use crate::chip::layer::{DrivenBy, Homeostasis, InitialLevels, LayerSpec, Optimiser, Pool};
 use crate::chip::ledger::Event;
 use crate::chip::population::Wiring;
 use crate::chip::state::{Piece, Seen, State, Visitor};
@@ -95,6 +95,9 @@ fn network(inputs: usize, outputs: usize, rule: Rule) -> NetworkSpec {
         weight_max_log2: -1,
         initial: gain(last),
         constant_row: first,
+        convolution: None,
+        pool: Pool::None,
+        homeostasis: Homeostasis::OFF,
     };
     NetworkSpec {
         layers: vec![layer(inputs, 10, true, false), layer(10, outputs, false, true)],
@@ -348,6 +351,9 @@ fn a_policy_and_a_classifier_learn_by_lists_of_the_same_five_operations() {
         weight_max_log2: 2,
         initial: InitialLevels::Uniform { gain_64ths: [96, 32] },
         constant_row: false,
+        convolution: None,
+        pool: Pool::None,
+        homeostasis: Homeostasis::OFF,
     };
     let network = NetworkSpec {
         layers: vec![

@@ -2,7 +2,7 @@
 
 use dalean::chip::crossbar::kernel::Backend;
 use dalean::chip::hardware::{Adc, AdcRange, HardwareSpec};
-use dalean::chip::layer::{DrivenBy, InitialLevels, LayerSpec, Optimiser};
+use dalean::chip::layer::{DrivenBy, Homeostasis, InitialLevels, LayerSpec, Optimiser, Pool};
 use dalean::chip::population::Wiring;
 use dalean::lab::store::checkpoint::{self, Identity};
 use dalean::lab::store::hash;
@@ -116,6 +116,9 @@ fn run() -> impl Strategy<Value = Run> {
                     weight_max_log2: weight,
                     initial: InitialLevels::Uniform { gain_64ths: [96, 32] },
                     constant_row: row,
+                    convolution: None,
+                    pool: Pool::None,
+                    homeostasis: Homeostasis::OFF,
                 }
             });
             let network = NetworkSpec {
