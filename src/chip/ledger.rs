@@ -113,9 +113,17 @@ coded! {
         SumSquares = 26, "sum_squares";
         /// An optimiser looked at a cell: what is asked of it was computed, and a word of its own renewed if it has one.
         OptimiserSteps = 27, "optimiser_steps";
+        /// A code entered a pool behind a convolution.
+        Pooled = 28, "pooled";
+        /// A unit's threshold was taken off its accumulator.
+        ThresholdSubtractions = 29, "threshold_subtractions";
+        /// An accumulator, or the square of an index, was added to what a layer learns its thresholds or its gain from.
+        StatisticAdds = 30, "statistic_adds";
+        /// The error unit looked up an exponential, a logarithm or a share, of softmax.
+        SoftmaxLookUps = 31, "softmax_look_ups";
         /// What a later program counts and no run of this one ever does.
         #[cfg(feature = "grown")]
-        Grown = 28, "grown";
+        Grown = 32, "grown";
     }
 }
 
