@@ -24,6 +24,8 @@ const TAPS_MAX: usize = 4;
 /// Shift of a sum of words, at most: nothing is left of it beyond.
 const TAP_SHIFT_MAX: u32 = 16;
 
+mod homeostasis;
+
 type Checked = Result<(), NetworkError>;
 
 fn misfit(key: &'static str, found: impl ToString, allowed: impl ToString) -> Checked {
@@ -37,6 +39,7 @@ pub(super) fn check(network: &NetworkSpec, hardware: &Hardware) -> Checked {
     tables(network, hardware)?;
     rule(network, hardware)?;
     activations(network)?;
+    homeostasis::check(network, hardware)?;
     wiring(network)?;
     batches(network, hardware)?;
     routes(network)?;

@@ -1,12 +1,15 @@
 use super::*;
+use crate::chip::crossbar::kernel::ConvShape;
 use crate::chip::engine::Phase;
 use crate::chip::hardware::{Adc, AdcRange, HardwareSpec, Subtract, WriteScheme};
-use crate::chip::layer::{DrivenBy, Homeostasis, Pool};
+use crate::chip::layer::{DrivenBy, Gain, Homeostasis, Pool};
 use crate::chip::ledger::Event;
 use crate::chip::population::Wiring;
 use crate::learn::rule::Readout;
 use crate::num::fixed::{AdcBits, ResidualBits};
 use crate::num::tables::Activation;
+
+const MIDDLE: Homeostasis = Homeostasis { threshold: true, ..Homeostasis::OFF };
 
 /// 5 to 4 to 3 units by error diffusion: as plain as can be.
 fn plain() -> NetworkSpec {
@@ -73,7 +76,7 @@ fn refused(network: &NetworkSpec) -> NetworkError {
 #[test]
 fn everything_that_does_not_fit_together_is_refused_with_its_key() {
     type Change = fn(&mut NetworkSpec);
-    let cases: [(&str, &str, Change); 46] = [
+    let cases: [(&str, &str, Change); 53] = [
         ("network.hidden", "0 layers", |n| n.layers.clear()),
         ("network.hidden", "a layer of 0 units", |n| n.layers[1].units = 0),
         ("network.hidden", "a layer of 0 inputs", |n| n.layers[0].inputs = 0),
@@ -179,6 +182,23 @@ fn everything_that_does_not_fit_together_is_refused_with_its_key() {
             n.optimisers[1] = Optimiser::Sign { dead_zone: false };
             n.rates[1] = Positive::new(1.0 / 65_536.0).unwrap();
         }),
+        ("network.gain", "have to be found", |n| n.layers[0].activation = Activation::Ramp),
+        ("network.gain", "which is no ramp", |n| n.layers[0].homeostasis.gain = Gain::Tracking),
+        ("network.threshold", "layer 1, the output", |n| n.layers[1].homeostasis = MIDDLE),
+        ("network.threshold", "layer 0, which is normalised", |n| {
+            n.layers[0].activation = Activation::Rms;
+            n.layers[0].homeostasis = MIDDLE;
+        }),
+        ("network.gain_spread", "of layer 0 is 3", |n| {
+            n.layers[0].activation = Activation::Ramp;
+            n.layers[0].homeostasis.gain = Gain::Fixed { spread: 3 };
+        }),
+        ("network.homeostasis_window", "of layer 0 is 4 samples", |n| {
+            n.layers[0].homeostasis = Homeostasis { window_log2: 2, ..MIDDLE };
+        }),
+        ("network.homeostasis_window", "is 2^25 samples", |n| {
+            n.layers[0].homeostasis = Homeostasis { window_log2: 25, ..MIDDLE };
+        }),
         ("learning.rate", "layer 0 a k of -2", |n| n.rates[0] = Positive::new(1e5).unwrap()),
     ];
     for (key, words, change) in cases {
@@ -191,9 +211,39 @@ fn everything_that_does_not_fit_together_is_refused_with_its_key() {
 }
 
 #[test]
+fn sums_of_a_batch_that_64_bits_may_not_hold_are_refused() {
+    // 2^16 - 2^12 rows of 255 x 255 with 8 fractional bits are 2^40 or a little less; so many reads as 2^12 x 2^10
+    let shape =
+        ConvShape { channels: 4096 - 256, height: 35, width: 35, side: 4, stride: 1, pad: 0 };
+    let mut network = plain();
+    let [hidden, last] = &mut network.layers[..] else { panic!("two layers") };
+    (hidden.inputs, hidden.convolution) = (16 * shape.channels, Some(shape));
+    hidden.homeostasis = Homeostasis { window_log2: 12, ..MIDDLE };
+    last.inputs = hidden.sample_outputs();
+    network.batch = Batch::new(4096).unwrap();
+    let error = network.check(&Hardware::reference()).unwrap_err();
+    let words = error.to_string();
+    assert!(error.key() == "network.threshold" && words.contains("adds up to 2^62"), "{error}");
+    network.batch = Batch::new(2048).unwrap();
+    let error = network.check(&Hardware::reference()).err();
+    assert!(error.is_none_or(|error| error.key() == "learning.rate"));
+}
+
+#[test]
 fn what_lies_at_the_edge_is_built() {
     let cases = [
         NetworkSpec { route: modulo(3, Some(16)), ..plain() },
+        {
+            let mut network = plain();
+            network.layers[0].homeostasis = Homeostasis { window_log2: 3, ..MIDDLE };
+            network
+        },
+        {
+            let mut network = NetworkSpec { rates: vec![Positive::ONE; 2], ..plain() };
+            network.layers[0].activation = Activation::Ramp;
+            network.layers[0].homeostasis.gain = Gain::Fixed { spread: 2 };
+            network
+        },
         NetworkSpec { route: Some(Route::RandomSparse), ..plain() },
         NetworkSpec { route: Some(Route::ScalarBroadcast), ..plain() },
         NetworkSpec { mode: UpdateMode::Online, centre: Centre::Running, ..plain() },
