@@ -53,7 +53,7 @@ impl Engine {
         }
         let phase = self.phase;
         self.set_phase(Phase::Calibration);
-        let inputs = self.layers[0].spec.inputs;
+        let inputs = self.layers[0].spec.sample_inputs();
         self.execute(&Operation::LoadDrives {
             codes: &codes[..codes.len().min(CALIBRATION_SAMPLES * inputs)],
         });

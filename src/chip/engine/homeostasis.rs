@@ -188,7 +188,7 @@ impl Engine {
             return;
         }
         let (wiring, units) = (this.spec.wiring, this.spec.units);
-        let reads = (self.samples * this.spec.positions()) as u64;
+        let reads = self.reads(layer) as u64;
         if notes != Notes::default() {
             let mut readings = Readings { reads, ..Readings::default() };
             let mut deviations = 0;

@@ -3,6 +3,7 @@
 
 use crate::chip::crossbar::kernel::Backend;
 use crate::chip::hardware::Hardware;
+use crate::chip::layer::LayerSpec;
 use crate::learn::driver::Driver;
 use crate::learn::network::{NetworkError, NetworkPlace, NetworkSpec};
 
@@ -62,7 +63,9 @@ impl Experiment {
             return Err(NetworkError::misfit("learning.centred", found, allowed));
         }
         match self.augment {
-            Some(augment) => augment.check(self.network.layers.first().map_or(0, |l| l.inputs)),
+            Some(augment) => {
+                augment.check(self.network.layers.first().map_or(0, LayerSpec::sample_inputs))
+            }
             None => Ok(()),
         }
     }

@@ -4,6 +4,7 @@
 use super::examples::Examples;
 use super::experiment::{Augment, Experiment, Seeded};
 use crate::chip::engine::{Calibration, Currents, Engine, Phase};
+use crate::chip::layer::LayerSpec;
 use crate::chip::state::{Piece, Section, State, StateError, Visitor};
 use crate::learn::driver::Driver;
 use crate::learn::error;
@@ -100,7 +101,7 @@ impl Trainer {
     /// When they do not.
     pub fn fits(&self, examples: &Examples) -> Result<(), NetworkError> {
         let layers = &self.experiment.network.layers;
-        let inputs = layers.first().map_or(0, |layer| layer.inputs);
+        let inputs = layers.first().map_or(0, LayerSpec::sample_inputs);
         let outputs = layers.last().map_or(0, |layer| layer.units);
         let (features, classes) = (examples.features(), examples.classes());
         if features != inputs {
