@@ -8,8 +8,9 @@
 //!
 //! The first 256 training samples are read with ideal converters in the whole network, and every current that a
 //! finite converter would have seen is noted. A conversion is on the rail when its code is the greatest one
-//! (or, of a difference, the least). A layer whose units keep to a middle is read again with its converters, before the
-//! layer above: see `homeostasis`. See docs/MODEL.md, 2.
+//! (or, of a difference, the least). Where units keep to a middle this is done layer by layer upward, each with
+//! what was found below: a layer's converters, then its thresholds and step (see `homeostasis`), and what the layer above is
+//! driven with is read as the chip reads it. See docs/MODEL.md, 2.
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
 use super::read::Mode;
@@ -86,8 +87,11 @@ impl Engine {
             }
             calibration.shifts.push(self.layers[layer].adc_shifts.clone());
             calibration.code_max.push(code_max);
+            // with something to find above, everything is read as the chip reads it
             if on {
                 self.balance(layer);
+            } else if balance && layer + 1 < layers {
+                self.forward(layer);
             }
         }
         self.set_phase(phase);

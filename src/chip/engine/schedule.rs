@@ -234,6 +234,12 @@ impl Schedule {
         cycles.engage(layer, Part::Lanes, reads * t.beat * t.groups(lines));
     }
 
+    /// The error unit looks so many entries up, one a beat.
+    pub(super) fn look_up_outputs(&mut self, cycles: &mut Cycles, look_ups: u64) {
+        self.settle(cycles);
+        cycles.pass(Interval::Centre, self.timing.beat * look_ups);
+    }
+
     /// The error unit takes the mean over a batch.
     pub(super) fn centre(&mut self, cycles: &mut Cycles, samples: usize, words: usize) {
         self.settle(cycles);

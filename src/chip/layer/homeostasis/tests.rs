@@ -1,9 +1,11 @@
 use super::*;
 use proptest::prelude::*;
 
-/// Mean square of a deviation of a table of so many bits, times 2: what a first step may be off by.
-fn squares_max(lut_bits: u32, shift: i32) -> f64 {
-    2.0 * 4f64.powi(lut_bits as i32 - 3 + shift)
+/// Whether squares are fewer than those of `count` numbers of twice the mean square of a deviation, of a table of so many bits.
+fn hold(squares: u128, count: u64, lut_bits: u32, shift: i32) -> bool {
+    // in 2^-17, so that every power is whole; 2^107 is more than all squares here
+    let log2 = 2 * (lut_bits as i32 + shift) - 5 + 17;
+    log2 >= 107 || squares << 17 < u128::from(count) << log2
 }
 
 proptest! {
@@ -33,11 +35,8 @@ proptest! {
         squares in prop_oneof![0u128..1 << 20, 0u128..1 << 90], count in 1u64..1 << 20, bits in 2u32..=14,
     ) {
         let shift = first_shift(squares, count, bits);
-        let mean = squares as f64 / count as f64;
-        // floats of the mean may be off by a bit at the edge
-        let near = 1e-9;
-        prop_assert!(shift == 47 || mean < squares_max(bits, shift) * (1.0 + near));
-        prop_assert!(shift == -8 || mean >= squares_max(bits, shift - 1) * (1.0 - near));
+        prop_assert!(shift == 47 || hold(squares, count, bits, shift));
+        prop_assert!(shift == -8 || !hold(squares, count, bits, shift - 1));
     }
 
     #[test]
