@@ -69,7 +69,7 @@ pub fn record(
     after.keep_tape();
     after.updates(look.update)?;
     let tape = after.take_tape();
-    let samples = samples_of(&tape, before.engines()[0].layers()[0].spec.inputs);
+    let samples = samples_of(&tape, before.engines()[0].layers()[0].spec.sample_inputs());
 
     let engine = before.engines()[0];
     let mut network = Network::new(&config.hardware, config.seed, engine.layers(), samples);
