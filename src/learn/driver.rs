@@ -79,7 +79,7 @@ impl Driver {
     /// once that sample has been read: it is handed the engine, the first sample's number in the batch and the
     /// list to extend.
     pub fn learn(&mut self, codes: &[u8], mut errors: impl FnMut(&Engine, usize, &mut Vec<i32>)) {
-        let inputs = self.engine.layers()[0].spec.inputs;
+        let inputs = self.engine.layers()[0].spec.sample_inputs();
         self.engine.begin_update();
         match self.learning.mode {
             UpdateMode::Accumulate | UpdateMode::Replay => {

@@ -161,6 +161,7 @@ impl NetworkSpec {
             rate,
             of: rate_of(spec, *optimiser),
             batch: self.batch,
+            positions: spec.positions(),
             mantissa,
             error_bits: hardware.digital.error_bits,
             activation: spec.activation,

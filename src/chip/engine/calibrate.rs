@@ -37,7 +37,7 @@ impl Engine {
         let Adc::Finite { range, .. } = self.hardware.adc else { return None };
         let phase = self.phase;
         self.set_phase(Phase::Calibration);
-        let inputs = self.layers[0].spec.inputs;
+        let inputs = self.layers[0].spec.sample_inputs();
         self.execute(&Operation::LoadDrives { codes: &codes[..codes.len().min(SAMPLES * inputs)] });
         let mut calibration = Calibration { shifts: vec![], code_max: vec![] };
         for layer in 0..self.layers.len() {

@@ -71,8 +71,7 @@ impl Engine {
 
     /// Reads a layer and loads the next one's drives. Returns histograms by target when probing.
     pub(super) fn forward_in(&mut self, layer: usize, mode: Mode) -> Vec<Histogram> {
-        let samples = self.samples;
-        if samples == 0 {
+        if self.samples == 0 {
             let wiring = self.layers[layer].spec.wiring;
             return vec![Histogram::new(); wiring.targets().len()];
         }
@@ -81,17 +80,20 @@ impl Engine {
             Units::Normalised(hand_on) => self.normalised(layer, mode, hand_on),
             Units::Table(_) | Units::Kept => self.put_out(layer, mode),
         };
+        self.hand_on(layer);
         self.load_constant(layer + 1);
         self.note_currents(layer);
         self.note_said(layer);
         self.charge_forward(layer);
+        let samples = self.samples;
         self.time(|schedule, cycles| schedule.read(cycles, layer, samples));
         self.charge_seen(layer, seen)
     }
 
     /// Gives registers the sizes of what a read of the loaded samples puts out.
     fn make_room(&mut self, layer: usize) {
-        let samples = self.samples;
+        let samples = self.reads(layer);
+        let direct = self.hands_on_directly(layer);
         let this = &self.layers[layer];
         let size = this.layout.columns.div_ceil(BLOCK_ROWS) * samples * BLOCK_ROWS;
         let (head, tail) = self.registers.split_at_mut(layer + 1);
@@ -100,6 +102,10 @@ impl Engine {
             let at = target.index();
             own.derivatives[at].resize(size, 0);
             match tail.first_mut() {
+                Some(next) if !direct => {
+                    assert!(next.pending == 0, "sums wait to be programmed");
+                    own.maps[at].resize(size, 0);
+                }
                 Some(next) => {
                     assert!(next.pending == 0, "sums wait to be programmed");
                     let rows = self.layers[layer + 1].layout.rows_padded();
@@ -120,7 +126,8 @@ impl Engine {
 
     /// Reads a layer whose units need nothing but their own accumulators. What was seen, by target.
     fn put_out(&mut self, layer: usize, mode: Mode) -> Vec<Seen> {
-        let samples = self.samples;
+        let samples = self.reads(layer);
+        let direct = self.hands_on_directly(layer);
         let (head, tail) = self.registers.split_at_mut(layer + 1);
         let own = &mut head[layer];
         let this = &self.layers[layer];
@@ -132,7 +139,8 @@ impl Engine {
             .map(|&target| Reader::new(this, &self.hardware, target, samples, mode, drives))
             .collect();
         let mut values: [&mut [u8]; 2] = match tail.first_mut() {
-            Some(next) => next.drives.each_mut().map(|drives| &mut drives[..]),
+            Some(next) if direct => next.drives.each_mut().map(|drives| &mut drives[..]),
+            Some(_) => own.maps.each_mut().map(|map| &mut map[..]),
             None => own.activities.each_mut().map(|activities| &mut activities[..]),
         };
         // empty where a layer only hands on
@@ -194,7 +202,7 @@ impl Engine {
         let [down, across] = this.tiles(&self.hardware).map(|n| n as u64);
         let (rows, columns) = (this.layout.rows as u64, this.layout.columns as u64);
         let slices = u64::from(self.hardware.slices());
-        let samples = self.samples as u64;
+        let samples = self.reads(layer) as u64;
         let dac_bits = u64::from(self.hardware.drive.dac_bits);
         let wiring = this.spec.wiring;
         let at_difference =

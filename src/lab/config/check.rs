@@ -308,7 +308,7 @@ fn classify(file: &mut ExperimentFile, hardware: &Hardware) -> Result<Learnt, Co
         learnt.error,
         style,
     )?;
-    let mantissas = mantissas(learning, &learnt, &made, hardware)?;
+    let mantissas = mantissas(learning, &learnt, &made, &convolutions, hardware)?;
     let (outputs, policy) = (network.outputs, None);
     let network = made;
     Ok(Learnt {
@@ -344,29 +344,33 @@ fn mantissas(
     file: &mut LearningFile,
     learning: &Learning,
     network: &Network,
+    convolutions: &[Convolved],
     hardware: &Hardware,
 ) -> Result<Vec<RateMantissa>, ConfigError> {
+    let positions = convolutions.iter().map(|one| one.shape.positions()).chain(iter::repeat(1));
     let layers = network.activations.iter().zip(&network.weight_max_log2);
     let below = iter::once(None).chain(network.activations.iter().map(Some));
-    let asked = learning.rates.iter().zip(layers).zip(below.map(full_drive));
-    let asked = asked.map(|((&rate, (&activation, &weight_max_log2)), full_drive)| Rate {
-        rate,
-        of: match learning.optimiser {
-            Optimiser::Sign { .. } => RateOf::Pulses,
-            Optimiser::AdamFx { .. } => RateOf::Requests,
-            _ => RateOf::Sums,
-        },
-        batch: learning.batch,
-        mantissa: RateMantissa::new(1).expect("in range"),
-        error_bits: hardware.digital.error_bits,
-        activation,
-        unit: Unit {
-            weight_max_log2,
-            level_bits: hardware.cell.level_bits,
-            drive_bits: hardware.drive.bits,
-            full_drive,
-        },
-    });
+    let asked = learning.rates.iter().zip(layers).zip(below.map(full_drive)).zip(positions);
+    let asked =
+        asked.map(|(((&rate, (&activation, &weight_max_log2)), full_drive), positions)| Rate {
+            rate,
+            of: match learning.optimiser {
+                Optimiser::Sign { .. } => RateOf::Pulses,
+                Optimiser::AdamFx { .. } => RateOf::Requests,
+                _ => RateOf::Sums,
+            },
+            batch: learning.batch,
+            positions,
+            mantissa: RateMantissa::new(1).expect("in range"),
+            error_bits: hardware.digital.error_bits,
+            activation,
+            unit: Unit {
+                weight_max_log2,
+                level_bits: hardware.cell.level_bits,
+                drive_bits: hardware.drive.bits,
+                full_drive,
+            },
+        });
     learning::mantissas(file, &asked.collect::<Vec<_>>())
 }
 

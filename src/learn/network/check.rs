@@ -39,6 +39,7 @@ pub(super) fn check(network: &NetworkSpec, hardware: &Hardware) -> Checked {
     activations(network)?;
     wiring(network)?;
     batches(network, hardware)?;
+    convolutions(network, hardware)?;
     routes(network)?;
     optimisers(network, hardware)?;
     rates(network, hardware)
@@ -239,6 +240,50 @@ fn batches(network: &NetworkSpec, hardware: &Hardware) -> Checked {
         let allowed = "trains write one sample at a time; with hw.write.scheme = \"rank1\" use mode = \"replay\" or \
                        \"online\"";
         return misfit("learning.mode", "is \"accumulate\"", allowed);
+    }
+    Ok(())
+}
+
+/// Reads of a sum that 32 bits hold: 65,536 products of a drive and a gate.
+const READS_MAX: u64 = 65_536;
+
+/// What layers whose windows move over an image can do.
+fn convolutions(network: &NetworkSpec, hardware: &Hardware) -> Checked {
+    for (at, layer) in network.layers.iter().enumerate() {
+        if layer.convolution.is_none() {
+            continue;
+        }
+        let positions = layer.positions() as u64;
+        let reads = u64::from(network.batch.get()).saturating_mul(positions);
+        if reads > READS_MAX {
+            let found = format!("is {}", network.batch.get());
+            let allowed = format!(
+                "layer {at} has {positions} positions, and a sum runs over {READS_MAX} reads at most: use a batch of {} or \
+                 fewer",
+                READS_MAX / positions
+            );
+            return misfit("learning.batch", found, allowed);
+        }
+        if network.rule == Rule::Bp {
+            let allowed = "back-propagation through convolutions is not built; use another rule, or leave network.channels out";
+            return misfit("learning.rule", "is \"bp\" beside convolutions", allowed);
+        }
+        if hardware.write.scheme != WriteScheme::Rounded {
+            let allowed = "a train writes one read of one sample, and a sample of a convolution has many: use \"rounded\"";
+            return misfit("hw.write.scheme", "is \"rank1\" beside convolutions", allowed);
+        }
+        let wide = matches!(
+            network.optimisers.get(at),
+            Some(Optimiser::Momentum { .. } | Optimiser::AdamFx { .. })
+        );
+        if wide && reads > crate::chip::crossbar::SHORT_READS as u64 {
+            let found = format!("keeps words of layer {at} that are for sums of few reads");
+            let allowed = format!(
+                "with momentum or adam_fx a sum runs over {} reads at most: use \"rms\", \"sign\" or \"plain\"",
+                crate::chip::crossbar::SHORT_READS
+            );
+            return misfit("learning.optimiser", found, allowed);
+        }
     }
     Ok(())
 }

@@ -173,7 +173,7 @@ pub(super) fn resolve(
     };
     let mantissas = match evolution {
         true => vec![RateMantissa::new(1).expect("in range"); layers],
-        false => mantissas(learning, &learnt, &made.network, hardware)?,
+        false => mantissas(learning, &learnt, &made.network, &[], hardware)?,
     };
     let policy = PolicySettings {
         environment: spec,

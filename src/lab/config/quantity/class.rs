@@ -61,6 +61,10 @@ impl CostClass {
             | Event::RowMeans
             | Event::SumSquares
             | Event::OptimiserSteps
+            | Event::Pooled
+            | Event::ThresholdSubtractions
+            | Event::StatisticAdds
+            | Event::SoftmaxLookUps
             | Event::SaturatedLookUps
             | Event::SaturatedErrors
             | Event::SaturatedGates
