@@ -220,3 +220,7 @@ fn pools(file: &mut NetworkFile, windows: usize) -> Result<Vec<Pool>, ConfigErro
     });
     Ok(pools.collect())
 }
+
+#[cfg(test)]
+#[path = "window_tests.rs"]
+mod tests;
