@@ -205,6 +205,10 @@ impl Task for Classify {
         Ok(())
     }
 
+    fn middles(&self) -> Vec<u8> {
+        self.trainer.middles().to_vec()
+    }
+
     fn examples(&self) -> Option<&Examples> {
         Some(&self.test)
     }

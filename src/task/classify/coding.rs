@@ -3,22 +3,20 @@
 //! ```text
 //! values   code(x)                                                                        in the order of the file
 //! pixels   code(x)                                                                        y, x, channel
-//! on_off   on_c  = floor( (2 max(x - m_c, 0) (2^drive_bits - 1) + s_c) / (2 s_c) )        y, x, on of each channel, then off
-//!          off_c = the same of max(m_c - x, 0);     s_c = max(m_c, M - m_c)               M the full scale
-//!          m_c   = floor( (2 sum + n) / (2n) )                                            over the n pixels of a channel of the
-//!                                                                                         training part
+//! on_off   on_c  = floor( (2 max(x - m_c, 0) 255 + r) / (2 r) ),  r = M - m_c              y, x, on of each channel, then off
+//!          off_c = floor( (2 max(m_c - x, 0) 255 + r) / (2 r) ),  r = m_c                  0 where r is 0;  M the full scale
+//!          m_c   = floor( (2 sum + n) / (2n) )                                             over the n pixels of a channel of the
+//!                                                                                          training part
 //! white    src/task/classify/coding/white.rs                                              y, x, on of each filter, then off
 //! ```
 //!
-//! `code` is that of [`Examples::codes`]. Images lie plane by plane in the file; what a convolution reads lies y, x, channel.
-//! On and off have one scale, so that the two together are what `x - m` is. Fewer drive bits than eight round a white code
-//! as they round an activity. See docs/MODEL.md, 1.
+//! `code` is that of [`Examples::codes`]; what `on_off` and `white` give are values of full scale 255 whose code is on a row.
+//! Images lie plane by plane in the file; what a convolution reads lies y, x, channel. See docs/MODEL.md, 1.
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
 mod white;
 
-use super::examples::Examples;
-use crate::chip::periphery;
+use super::examples::{Examples, codes_of};
 use crate::learn::network::NetworkError;
 use crate::num::fixed::{DriveBits, narrow};
 
@@ -133,25 +131,29 @@ impl Coding {
 
     /// What codes examples like these, whose means are those of the training part.
     pub(super) fn of(self, train: &Examples, bits: DriveBits) -> Coder {
-        let codes = train.codes(bits);
+        let (codes, drives) = (train.codes(bits), codes_of(255, bits));
+        let middles = match self {
+            Self::OnOff { image: [height, width, channels] } => {
+                middles(train, height * width, channels)
+            }
+            _ => vec![],
+        };
         let way = match self {
             Self::Values => Way::Values,
             Self::Pixels { image: [.., channels] } => Way::Tables(vec![codes; channels]),
-            Self::OnOff { image: [height, width, channels] } => {
-                let middles = middles(train, height * width, channels);
-                let middle = |at| move |middle: &u8| sides(*middle, train.full_scale(), bits)[at];
-                let on = middles.iter().map(middle(0));
-                Way::Tables(on.chain(middles.iter().map(middle(1))).collect())
+            Self::OnOff { .. } => {
+                let table = |middle: &u8, side: usize| {
+                    sides(*middle, train.full_scale())[side].map(|value| drives[usize::from(value)])
+                };
+                let on = middles.iter().map(|middle| table(middle, 0));
+                Way::Tables(on.chain(middles.iter().map(|middle| table(middle, 1))).collect())
             }
             Self::White { image: [height, width, _] } => {
                 let eight = train.codes(DriveBits::new(8).expect("in range"));
-                let drives = std::array::from_fn(|code| {
-                    periphery::drive(narrow(code, "a byte has 256 values"), bits)
-                });
                 Way::White(Box::new(White::new([height, width], eight, drives)))
             }
         };
-        Coder { way, codes, image: self.image() }
+        Coder { way, codes, image: self.image(), middles }
     }
 }
 
@@ -172,17 +174,17 @@ pub(super) fn middles(train: &Examples, pixels: usize, channels: usize) -> Vec<u
     sums.into_iter().map(mean).collect()
 }
 
-/// The code of each value above a middle, and below it.
-fn sides(middle: u8, full_scale: u8, bits: DriveBits) -> [[u8; 256]; 2] {
-    let (middle, most, code_max) =
-        (u32::from(middle), u32::from(full_scale), u32::from(bits.code_max()));
-    let scale = middle.max(most - middle);
-    let code =
-        |apart: u32| narrow((2 * apart * code_max + scale) / (2 * scale), "at most full code");
+/// The value of each value above a middle, and below it, each of full scale 255.
+fn sides(middle: u8, full_scale: u8) -> [[u8; 256]; 2] {
+    let (middle, most) = (u32::from(middle), u32::from(full_scale));
+    let scaled = |apart: u32, range: u32| match range {
+        0 => 0,
+        range => narrow((2 * apart * 255 + range) / (2 * range), "no more than its range"),
+    };
     let value = |at: usize| (at as u32).min(most);
     [
-        std::array::from_fn(|x| code(value(x).saturating_sub(middle))),
-        std::array::from_fn(|x| code(middle.saturating_sub(value(x)))),
+        std::array::from_fn(|x| scaled(value(x).saturating_sub(middle), most - middle)),
+        std::array::from_fn(|x| scaled(middle.saturating_sub(value(x)), middle)),
     ]
 }
 
@@ -193,6 +195,8 @@ pub(super) struct Coder {
     /// The drive code of each value.
     codes: [u8; 256],
     image: Option<[usize; 3]>,
+    /// Mean of each channel that inputs lie above and below.
+    middles: Vec<u8>,
 }
 
 #[derive(Debug, Clone)]
@@ -204,9 +208,14 @@ enum Way {
 }
 
 impl Coder {
+    /// Mean of each channel, where inputs lie above and below it.
+    pub(super) fn middles(&self) -> &[u8] {
+        &self.middles
+    }
+
     /// Appends the drive codes of an example.
     pub(super) fn code(&mut self, values: &[u8], out: &mut Vec<u8>) {
-        let Self { way, codes, image } = self;
+        let Self { way, codes, image, .. } = self;
         match (way, *image) {
             (Way::Tables(tables), Some([height, width, channels])) => {
                 let pixels = height * width;

@@ -96,6 +96,12 @@ impl Trainer {
         self.epoch
     }
 
+    /// Mean of each channel over what is learnt from, where inputs lie above and below it; else nothing.
+    #[must_use]
+    pub fn middles(&self) -> &[u8] {
+        self.coder.middles()
+    }
+
     /// Statistics of every pathway now.
     #[must_use]
     pub fn pathways(&self) -> Vec<PathwayRecord> {

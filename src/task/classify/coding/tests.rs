@@ -59,12 +59,17 @@ fn above_and_below_the_mean_are_what_the_law_says() {
             }
             let middle = (2 * sum + n) / (2 * n);
             assert!(middle > 0 && middle < u64::from(scale));
-            let s = middle.max(u64::from(scale) - middle);
             for (example, codes) in found.iter().enumerate() {
                 for (pixel, &x) in plane(example, channel).iter().enumerate() {
                     let x = u64::from(x);
-                    let law = |d: u64| (2 * d * code_max + s) / (2 * s);
-                    let wanted = [law(x.saturating_sub(middle)), law(middle.saturating_sub(x))];
+                    let law = |d: u64, r: u64| {
+                        let value = (2 * d * 255 + r) / (2 * r);
+                        (2 * value * code_max + 255) / 510
+                    };
+                    let wanted = [
+                        law(x.saturating_sub(middle), u64::from(scale) - middle),
+                        law(middle.saturating_sub(x), middle),
+                    ];
                     let at = 6 * pixel + channel;
                     assert_eq!([codes[at], codes[at + 3]].map(u64::from), wanted);
                 }
@@ -80,7 +85,7 @@ fn a_channel_that_never_changes_has_codes_of_nothing() {
         let codes = coded(Coding::OnOff { image }, &set(vec![value; 6], 2, 255), 8);
         assert_eq!(codes, vec![vec![0; 4]; 3]);
         // another value than all of the training part is the greatest difference there is
-        let sides = super::sides(value, 255, DriveBits::new(8).unwrap());
+        let sides = super::sides(value, 255);
         assert_eq!(sides.map(|side| side[usize::from(other)]).iter().max(), Some(&255));
     }
     let none = Examples::new(vec![], vec![], 2, 9, 2).unwrap();
@@ -118,11 +123,7 @@ fn white(values: &[u8], [height, width]: [usize; 2], scale: u8, bits: u32) -> Ve
                 sum
             });
             let round = |v: i64| ((v + (1 << 13)) >> 14).clamp(0, 255);
-            let drive = |a: i64| {
-                let s = 8 - bits;
-                let rounded = if s == 0 { a } else { (a + (1 << (s - 1))) >> s };
-                rounded.min((1 << bits) - 1) as u8
-            };
+            let drive = |a: i64| ((2 * a * ((1 << bits) - 1) + 255) / 510) as u8;
             out.extend(f.map(|f| drive(round(f))));
             out.extend(f.map(|f| drive(round(-f))));
         }

@@ -113,7 +113,7 @@ pub(super) struct White {
     size: [usize; 2],
     /// Each value in 0..=255.
     eight: [u8; 256],
-    /// The drive of each code.
+    /// The drive code of each value that is put out.
     drives: [u8; 256],
     /// Taps of each filter: offset in the padded planes, factor.
     taps: [Vec<(usize, i16)>; FILTERS],
