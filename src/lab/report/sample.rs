@@ -176,6 +176,7 @@ fn receipt(records: &[EpochRecord], classes: usize) -> Receipt {
             classes,
             image: None,
             names: vec![],
+            middles: vec![],
         },
         tables: "e0".into(),
         metrics: "f0".into(),

@@ -60,10 +60,12 @@ impl Experiment {
     /// When something does not, with the key that says it.
     pub fn check(&self) -> Result<(), NetworkError> {
         self.network.check(&self.hardware)?;
-        if self.network.centred.contains(&true) {
+        let (_, hidden) = self.network.layers.split_last().expect("a network that was checked");
+        let thresholds = hidden.iter().all(|layer| layer.homeostasis.threshold);
+        if self.network.centred.contains(&true) && !thresholds {
             let found = "is true of a layer";
-            let allowed = "an error of one class against all others takes its mean off in the output alone, and such a \
-                           network does not learn without thresholds, which are not built; leave it out";
+            let allowed = "where an error is that of one class against all others, centred updates do not learn without \
+                           thresholds: use network.threshold = true, or leave it out";
             return Err(NetworkError::misfit("learning.centred", found, allowed));
         }
         let rows = self.network.layers.first().map_or(0, LayerSpec::sample_inputs);

@@ -58,6 +58,9 @@ fn set(key: &KeyShown, value: &str) -> Result<Config, String> {
     if key.full() == "learning.centre" && value == "\"batch\"" {
         settings.push("learning.batch=2".into());
     }
+    if key.full() == "learning.centred" {
+        settings.push("network.threshold=true".into());
+    }
     if key.full() == "learning.batch" && value == "1" {
         settings.push("learning.centre=running".into());
     }
