@@ -13,6 +13,7 @@
 //!            a layer are formed before its ERR, while nothing else happens
 //! writes     UPD(write) on different layers side by side:  1 + max_l T_write(l)
 //! loads      LOADW, a row a cycle
+//! moves      of thresholds and steps after the writes, side by side:  max_l beat NG(l)
 //! ```
 //!
 //! Where a later operation would see what an earlier one of another sample has still to do (a second UPD(now) of a
@@ -233,6 +234,12 @@ impl Schedule {
         cycles.engage(layer, Part::Lanes, reads * t.beat * t.groups(lines));
     }
 
+    /// The error unit looks so many entries up, one a beat.
+    pub(super) fn look_up_outputs(&mut self, cycles: &mut Cycles, look_ups: u64) {
+        self.settle(cycles);
+        cycles.pass(Interval::Centre, self.timing.beat * look_ups);
+    }
+
     /// The error unit takes the mean over a batch.
     pub(super) fn centre(&mut self, cycles: &mut Cycles, samples: usize, words: usize) {
         self.settle(cycles);
@@ -373,6 +380,19 @@ impl Schedule {
             written[layer] = sample + 1;
             *last = sample;
         }
+    }
+
+    /// Thresholds and steps of these layers move, after the writes.
+    pub(super) fn balance(&mut self, cycles: &mut Cycles, layers: &[usize]) {
+        self.settle(cycles);
+        let mut longest = 0;
+        for &layer in layers {
+            let one = self.timing.beat * self.timing.groups(self.shapes[layer].columns);
+            cycles.occupy(layer, During::Update, one);
+            cycles.engage(layer, Part::Lanes, one);
+            longest = longest.max(one);
+        }
+        cycles.pass(Interval::Program, longest);
     }
 
     /// Ends the segment in progress: its time has passed.

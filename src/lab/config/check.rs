@@ -15,7 +15,7 @@ use super::{ConfigError, Sources, chip, data};
 use crate::chip::hardware::{ConverterKind, Hardware};
 use crate::chip::layer::{Homeostasis, Optimiser};
 use crate::lab::near;
-use crate::learn::error::Centre;
+use crate::learn::error::{Centre, OutputError};
 use crate::learn::route::Route;
 use crate::learn::rule::{Rule, UpdateMode};
 use crate::num::fixed::{Batch, OutOfRange, RateMantissa};
@@ -29,7 +29,6 @@ mod style;
 mod window;
 
 use learning::Learning;
-pub(crate) use learning::OutputError;
 use network::Network;
 use style::{PRESETS, Preset, Style};
 pub(crate) use window::{Convolved, ImageInput};

@@ -126,7 +126,7 @@ impl Config {
                 None => (sizes[layer - windows], sizes[layer - windows + 1]),
             };
             let activation = self.activations[layer];
-            let wiring = self.rule.wiring(last.then(|| Readout::of(activation)));
+            let wiring = self.rule.wiring(last.then(|| Readout::of(activation, self.error)));
             LayerSpec {
                 inputs,
                 units,
@@ -149,6 +149,7 @@ impl Config {
             layers: layers.collect(),
             rule: self.rule,
             mode: self.mode,
+            error: self.error,
             centre: self.centre,
             route: self.route,
             batch: self.batch,

@@ -212,6 +212,8 @@ keys! {
         decay: String,
         /// What the error of an output is.
         error: String,
+        /// Error `softmax`: what outputs are divided by before they share.
+        temperature: f64,
         /// What is subtracted from errors.
         centre: String,
         /// How errors reach hidden units.

@@ -127,6 +127,7 @@ fn experiment(s: &Value) -> Experiment {
         layers: layers.iter().enumerate().map(|(l, a)| layer(l, l == last, a)).collect(),
         rule: Rule::Ed,
         mode: mode(s),
+        error: OutputError::OneVsAll,
         centre: centre(s),
         route: Some(Route::Modulo { taps, shift }),
         batch: Batch::new(int(&s["batch"])).unwrap(),

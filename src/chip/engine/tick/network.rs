@@ -15,6 +15,7 @@ use crate::chip::layer::Layer;
 use crate::chip::ledger::{Cycles, During, Event, Interval, Ledger, Part};
 use crate::chip::population::Stream;
 
+mod balance;
 mod layer;
 mod normalise;
 mod segment;
@@ -103,8 +104,10 @@ impl Network {
         self.unlooked = self.unlooked.map(|_| unlooked);
     }
 
-    /// Writes are done: where converters track, ranges are looked at after those of a batch, or of 64 samples.
+    /// Writes are done: thresholds and steps move and, where converters track, ranges are looked at after those of a batch, or
+    /// of 64 samples.
     pub fn written(&mut self, written: WritesDone) {
+        self.balance();
         let Some(unlooked) = &mut self.unlooked else { return };
         *unlooked += u64::from(written == WritesDone::Sample);
         if written == WritesDone::Batch || *unlooked == 64 {
@@ -289,6 +292,8 @@ impl Network {
     /// `FWD(rows)` of layers in a pipeline.
     fn reads(&mut self, layers: Range<usize>, samples: usize) {
         let count = self.layers.len();
+        let learns = self.phase == Phase::Training;
+        layers.clone().for_each(|layer| self.layers[layer].note(learns));
         // samples that commands were given for, that lanes have seen, and that were handed on
         let (mut issued, mut seen, mut done) = (vec![0; count], vec![0; count], vec![0; count]);
         // cycles for which the next command has been offered
@@ -569,7 +574,7 @@ impl Network {
         ]
     }
 
-    fn counts(&self, e: &TileEvents) -> [(Event, u64); 7] {
+    fn counts(&self, e: &TileEvents) -> [(Event, u64); 9] {
         [
             (Event::LookUps, e.look_ups),
             (Event::SaturatedLookUps, e.saturated_look_ups),
@@ -577,6 +582,8 @@ impl Network {
             (Event::Multiplies, e.multiplies),
             (Event::SaturatedGates, e.saturated_gates),
             (Event::RowPulses, e.row_pulses),
+            (Event::ThresholdSubtractions, e.threshold_subtractions),
+            (Event::StatisticAdds, e.statistic_adds),
             (Event::SramBits, 32 * e.look_ups + 8 * e.multiplies),
         ]
     }

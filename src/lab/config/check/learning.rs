@@ -6,7 +6,7 @@ use crate::chip::layer::Optimiser;
 use crate::lab::config::ConfigError;
 use crate::lab::config::defaults::policy;
 use crate::lab::config::file::{LearningFile, MantissaFile};
-use crate::learn::error::Centre;
+use crate::learn::error::{Centre, OutputError};
 use crate::learn::route::Route;
 use crate::learn::rule::{Rule, UpdateMode};
 use crate::num::fixed::{Batch, RateMantissa};
@@ -74,18 +74,11 @@ const OPTIMISERS: [(&str, Optimiser); 5] = [
     ("adam_fx", Optimiser::AdamFx { first_decay: 3, second_decay: 8 }),
 ];
 
-/// What the error of an output is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum OutputError {
-    /// The target less its own activity.
-    OneVsAll,
-    /// The target less its share of all outputs.
-    Softmax,
-}
-
 /// `learning.error`.
-pub(super) const ERRORS: [(&str, OutputError); 2] =
-    [("one_vs_all", OutputError::OneVsAll), ("softmax", OutputError::Softmax)];
+const ERRORS: [(&str, OutputError); 2] = [
+    ("one_vs_all", OutputError::OneVsAll),
+    ("softmax", OutputError::Softmax { temperature: Positive::ONE }),
+];
 
 /// Rate of optimisers whose rate is a step of weights, of nets that keep to middles; and of `plain`, whose rate is one of
 /// slopes of 1.
@@ -167,8 +160,7 @@ pub(super) fn resolve(
         (false, false) => "batch",
     };
     let centre = word("learning.centre", &mut file.centre, default, &CENTRES)?;
-    let default = if style.keeps_middles() { "softmax" } else { "one_vs_all" };
-    let error = word("learning.error", &mut file.error, default, &ERRORS)?;
+    let error = output_error(file, if style.keeps_middles() { "softmax" } else { "one_vs_all" })?;
     Ok(Learning {
         kind,
         mode,
@@ -186,6 +178,25 @@ pub(super) fn resolve(
         train_on,
         select,
     })
+}
+
+/// What the error of an output is, with a key that belongs to one of them.
+fn output_error(file: &mut LearningFile, default: &str) -> Result<OutputError, ConfigError> {
+    const KEY: &str = "learning.temperature";
+    match word("learning.error", &mut file.error, default, &ERRORS)? {
+        OutputError::Softmax { .. } => {
+            let temperature = positive(KEY, *file.temperature.get_or_insert(1.0))?;
+            Ok(OutputError::Softmax { temperature })
+        }
+        other => match file.temperature {
+            None => Ok(other),
+            Some(found) => {
+                let allowed =
+                    "it belongs to learning.error = \"softmax\": say that, or take it out";
+                Err(wrong(KEY, format!("is {found}"), allowed))
+            }
+        },
+    }
 }
 
 /// What makes requests of sums, with keys that belong to one of them.

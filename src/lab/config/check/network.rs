@@ -1,11 +1,12 @@
 //! `[network]`: units and what they are made of.
 
-use super::learning::{Kind, OutputError};
+use super::learning::Kind;
 use super::style::Style;
 use super::{Bias, between, per_layer, positive, word, wrong};
 use crate::chip::layer::{Gain, Homeostasis};
 use crate::lab::config::ConfigError;
 use crate::lab::config::file::{NetworkFile, PerLayer};
+use crate::learn::error::OutputError;
 use crate::learn::network::{GAIN_64THS, WEIGHT_MAX_LOG2};
 use crate::num::tables::Activation;
 
@@ -129,7 +130,7 @@ fn activations(
 ) -> Result<Vec<Activation>, ConfigError> {
     let hidden =
         word("network.activation", &mut file.activation, style.activation(), &ACTIVATIONS)?;
-    let sums = error == OutputError::Softmax;
+    let sums = matches!(error, OutputError::Softmax { .. });
     let sigmoid = (hidden.is_none() && layers > 1) || !sums;
     if let (false, Some(_)) = (sigmoid, &file.alpha) {
         let allowed = "it is the width of a sigmoid, and no layer has one: take it out (--set network.alpha=default)";

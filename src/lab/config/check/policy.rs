@@ -90,6 +90,11 @@ fn refused_here(file: &ExperimentFile) -> Result<(), ConfigError> {
             "what came of acting makes the errors of a policy: take the key out",
         ),
         (
+            "learning.temperature",
+            learning.is_some_and(|l| l.temperature.is_some()),
+            "what came of acting makes the errors of a policy: take the key out",
+        ),
+        (
             "learning.flip",
             learning.is_some_and(|l| l.flip.is_some()),
             "a policy is shown no images: take the key out",

@@ -413,6 +413,9 @@ const LEARNING: &[KeyEntry] = &[
     )
     .default("\"one_vs_all\"")
     .otherwise("\"softmax\" with convolutions, but with preset = \"paper\"; policies have errors of their own"),
+    real("temperature", 1e-6, 1e6)
+        .default("1.0")
+        .only("with error = \"softmax\"", &["learning.error=softmax"]),
     words(
         "centre",
         &[
