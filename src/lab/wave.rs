@@ -88,7 +88,8 @@ pub fn record(
     let writer = Rc::new(RefCell::new(vcd::Writer::new(timing.clock_khz, look.all)));
     let sink = Rc::clone(&writer);
     network.watch_tile(place, move |cycle, tile: &Tile| {
-        sink.borrow_mut().cycle(cycle, &tile.registers());
+        let most = if look.all { usize::MAX } else { NUMBERS_MAX };
+        sink.borrow_mut().cycle(cycle, &tile.registers_within(most));
     });
     network.play_tape(&tape);
 

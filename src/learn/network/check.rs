@@ -272,6 +272,11 @@ fn convolutions(network: &NetworkSpec, hardware: &Hardware) -> Checked {
         if layer.convolution.is_none() {
             continue;
         }
+        let below = at.checked_sub(1).map(|below| network.layers[below].activation);
+        if layer.activation == Activation::Rms || below == Some(Activation::Rms) {
+            let allowed = "a read of a convolution is not normalised, and does not follow what is: give it a table";
+            return misfit("network.activation", format!("normalises around layer {at}"), allowed);
+        }
         let positions = layer.positions() as u64;
         let reads = u64::from(network.batch.get()).saturating_mul(positions);
         if reads > READS_MAX {
