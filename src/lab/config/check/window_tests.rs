@@ -208,3 +208,19 @@ fn what_means_nothing_or_does_not_fit_is_refused_with_its_key() {
         assert!(error.contains("no images") || error.contains("holds none"), "{error}");
     }
 }
+
+#[test]
+fn the_examples_are_what_they_say() {
+    for (text, image, cells) in [
+        (include_str!("../../../../examples/cifar10_conv.toml"), [32, 32, 3], 1_674_720),
+        (include_str!("../../../../examples/mnist_conv.toml"), [28, 28, 1], 401_560),
+    ] {
+        let made = load(&Sources { experiment: Some(("example", text)), ..Sources::default() });
+        let features = image.iter().product();
+        let made = made.unwrap().experiment(features, 10, Some(image)).unwrap();
+        let all = made.network.layers.iter();
+        let found: usize =
+            all.map(|one| one.inputs * one.units * one.wiring.pathways().len()).sum();
+        assert_eq!(found, cells);
+    }
+}
