@@ -142,7 +142,7 @@ fn what_a_name_of_a_run_says_is_what_was_said() {
     let name = |settings: &[&str]| config(settings).unwrap().run_name();
     assert_eq!(name(&["network.channels=[4, 8]"]), "optdigits-ed-channels4x8-seed1");
     let paper = name(&["network.channels=[4]", "preset=paper"]);
-    assert_eq!(paper, "optdigits-ed-preset-paper-channels4-seed1");
+    assert_eq!(paper, "optdigits-ed-channels4-preset-paper-seed1");
     let plain = name(&["network.channels=[4]", "learning.optimiser=plain"]);
     assert_eq!(plain, "optdigits-ed-channels4-optimiser-plain-seed1");
 }
@@ -160,7 +160,11 @@ fn what_means_nothing_or_does_not_fit_is_refused_with_its_key() {
             "network.channels",
             "wider than the border",
         ),
-        (&["network.channels=[4]", "network.kernel=99"], "network.channels", "fits the image"),
+        (
+            &["network.channels=[4]", "network.kernel=9", "network.padding=0"],
+            "network.channels",
+            "fits the image",
+        ),
         (&["network.channels=[4]", "network.kernel=0"], "network.padding", "odd"),
         (&["network.channels=[4]", "network.stride=0"], "network.channels", "every size"),
         (&["network.channels=[0]"], "network.channels", "at least 1"),
