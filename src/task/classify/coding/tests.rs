@@ -191,25 +191,3 @@ fn a_coding_fits_its_layer_or_is_refused() {
     let huge = Coding::Pixels { image: [usize::MAX, 2, 1] };
     assert_eq!(refused(huge, usize::MAX).key(), "network.input");
 }
-
-/// `cargo test --release -- --ignored --nocapture speed`
-#[test]
-#[ignore = "a measurement"]
-fn speed_of_codings() {
-    let image = [32, 32, 3];
-    let all = set(noise(3072 * 500, 5), 3072, 255);
-    for coding in
-        [Coding::Values, Coding::Pixels { image }, Coding::OnOff { image }, Coding::White { image }]
-    {
-        let mut coder = coding.of(&all, DriveBits::new(8).unwrap());
-        let mut out = vec![];
-        #[expect(clippy::disallowed_methods, reason = "a measurement")]
-        let start = std::time::Instant::now();
-        for example in 0..all.len() {
-            out.clear();
-            coder.code(all.values(example), &mut out);
-        }
-        let seconds = start.elapsed().as_secs_f64();
-        println!("{coding:?}: {:.2} s an epoch of 45,000", seconds * 90.0);
-    }
-}
