@@ -31,11 +31,16 @@ impl Engine {
                 let sum: i64 = blocks
                     .zip(levels[at].chunks(BLOCK_ROWS))
                     .map(|(codes, levels)| {
-                        let mut sums = [0u32; BLOCK_ROWS];
-                        for codes in codes.as_chunks::<BLOCK_ROWS>().0 {
-                            sums.iter_mut().zip(codes).for_each(|(s, &x)| *s += u32::from(x));
+                        let mut sums = [0i64; BLOCK_ROWS];
+                        // 257 bytes add up within 16 bits, where lanes are many
+                        for codes in codes.chunks(256 * BLOCK_ROWS) {
+                            let mut part = [0u16; BLOCK_ROWS];
+                            for codes in codes.as_chunks::<BLOCK_ROWS>().0 {
+                                part.iter_mut().zip(codes).for_each(|(s, &x)| *s += u16::from(x));
+                            }
+                            sums.iter_mut().zip(part).for_each(|(s, part)| *s += i64::from(part));
                         }
-                        levels.iter().zip(sums).map(|(&l, x)| l * i64::from(x)).sum::<i64>()
+                        levels.iter().zip(sums).map(|(&l, x)| l * x).sum::<i64>()
                     })
                     .sum();
                 self.currents[layer][target.index()][bank] += sum;

@@ -172,6 +172,9 @@ fn pool(
                 });
                 let pooled = match spec.pool {
                     Pool::None => codes[y * across + x],
+                    Pool::Average { side: 2 } => {
+                        average_of_four(codes, y * 2 * across + x * 2, across)
+                    }
                     Pool::Average { .. } => average(square, side),
                     Pool::Max { .. } => greatest(square),
                 };
@@ -179,6 +182,17 @@ fn pool(
             }
         }
     }
+}
+
+/// The same of a square of two, whose first code lies at `at`: `(sum + 2) >> 2`, in 16 bits.
+fn average_of_four(codes: &[[u8; BLOCK_ROWS]], at: usize, across: usize) -> [u8; BLOCK_ROWS] {
+    let [a, b, c, d] = [at, at + 1, at + across, at + across + 1].map(|at| &codes[at]);
+    let mut out = [0; BLOCK_ROWS];
+    for i in 0..BLOCK_ROWS {
+        let sum = [a[i], b[i], c[i], d[i]].map(u16::from).iter().sum::<u16>();
+        out[i] = ((sum + 2) >> 2) as u8;
+    }
+    out
 }
 
 /// `floor((2 sum + q^2) / (2 q^2))` of each of 64 channels.
@@ -191,9 +205,6 @@ fn average<'a>(
         sums.iter_mut().zip(codes).for_each(|(sum, &code)| *sum += u32::from(code));
     }
     let cells = u32::try_from(side * side).expect("a square of a map");
-    if cells == 4 {
-        return sums.map(|sum| ((sum + 2) >> 2) as u8);
-    }
     sums.map(|sum| u8::try_from((2 * sum + cells) / (2 * cells)).expect("a mean of bytes"))
 }
 
