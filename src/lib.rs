@@ -88,7 +88,7 @@ pub mod network {
     pub use crate::chip::population::Wiring;
     pub use crate::learn::error::Centre;
     pub use crate::learn::route::Route;
-    pub use crate::learn::rule::{Rule, UpdateMode};
+    pub use crate::learn::rule::{Control, Rule, UpdateMode};
     pub use crate::num::fixed::{Batch, RateMantissa};
     pub use crate::num::tables::{Activation, Decay, Positive};
     pub use crate::task::classify::Augment;

@@ -18,7 +18,7 @@ use crate::chip::layer::Optimiser;
 use crate::lab::near;
 use crate::learn::error::Centre;
 use crate::learn::route::Route;
-use crate::learn::rule::{Rule, UpdateMode};
+use crate::learn::rule::{Control, Rule, UpdateMode};
 use crate::num::fixed::{Batch, OutOfRange, RateMantissa};
 use crate::num::tables::{Activation, Decay, FullDrive, Positive, Rate, RateOf, Unit};
 
@@ -98,6 +98,8 @@ pub struct Config {
     pub(crate) mode: UpdateMode,
     /// What is subtracted from errors.
     pub(crate) centre: Centre,
+    /// What is taken from a network, to see whether it is needed.
+    pub(crate) control: Control,
     /// How errors reach hidden layers; `None` with back-propagation.
     pub(crate) route: Option<Route>,
     /// Samples of an update.
@@ -213,7 +215,8 @@ pub(super) fn config(mut file: ExperimentFile, model: &UnderModel) -> Result<Con
         TaskKind::Policy => policy::resolve(&mut file, &hardware)?,
     };
     let Network { activations, weight_max_log2, bias, gain_64ths } = network;
-    let Learning { kind, mode, centre, route, batch, rates, decay, optimiser, .. } = learning;
+    let Learning { kind, mode, centre, control, route, batch, rates, decay, optimiser, .. } =
+        learning;
     let Learning { epochs, shift_pixels, train_on, select, .. } = learning;
     #[cfg(feature = "grown")]
     file.learning.get_or_insert_default().grown.get_or_insert(0);
@@ -229,6 +232,7 @@ pub(super) fn config(mut file: ExperimentFile, model: &UnderModel) -> Result<Con
         rule: kind.rule,
         mode,
         centre,
+        control,
         route,
         batch,
         mantissas,

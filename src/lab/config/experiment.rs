@@ -103,6 +103,7 @@ impl Config {
             decay: self.decay,
             optimisers: vec![self.optimiser; hidden.len() + 1],
             centred: vec![false; hidden.len() + 1],
+            control: self.control,
         }
     }
 

@@ -178,6 +178,8 @@ keys! {
         decay: String,
         /// What is subtracted from errors.
         centre: String,
+        /// What is taken away, to see whether it is needed.
+        control: String,
         /// How errors reach hidden units.
         route: String,
         /// Words a hidden unit adds.

@@ -14,7 +14,7 @@ use crate::chip::layer::{DrivenBy, InitialLevels, LayerSpec, Optimiser};
 use crate::learn::error::Centre;
 use crate::learn::network::NetworkSpec;
 use crate::learn::route::Route;
-use crate::learn::rule::{Rule, UpdateMode};
+use crate::learn::rule::{Control, Rule, UpdateMode};
 use crate::num::tables::{Activation, Decay};
 use crate::task::classify::Experiment;
 use crate::task::policy::{Evaluating, Evolution, InputCoding, Method, PolicyExperiment, Ppo};
@@ -73,6 +73,9 @@ const FROZEN: &[(&str, &str)] = &[
     ("layer.mantissa", "1"),
     ("layer.optimiser", "plain"),
     ("layer.centred", "false"),
+    ("learning.control", "none"),
+    ("actor.control", "none"),
+    ("critic.control", "none"),
 ];
 
 /// Key and word.
@@ -227,6 +230,7 @@ impl List {
             decay,
             optimisers,
             centred,
+            control,
         } = network;
         for (number, (layer, rate)) in (first..).zip(layers.iter().zip(rates)) {
             self.layer(number, layer);
@@ -272,6 +276,13 @@ impl List {
             Some(Route::ScalarBroadcast) => "scalar_broadcast".into(),
             Some(Route::RandomDense { shift }) => format!("random_dense{}", shifted(shift)),
         };
+        let control = match control {
+            Control::None => "none",
+            Control::FrozenHidden => "frozen_hidden",
+            Control::SameSignHidden => "same_sign_hidden",
+            Control::SameSign => "same_sign",
+        };
+        self.put(&format!("{head}.control"), control);
         self.put(&format!("{head}.rule"), rule);
         self.put(&format!("{head}.mode"), mode);
         self.put(&format!("{head}.centre"), centre);

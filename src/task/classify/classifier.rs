@@ -12,8 +12,8 @@ use crate::learn::network::NetworkError;
 /// A network on a chip, and the examples it learns from.
 ///
 /// ```
-/// use dalean::network::{Activation, Centre, Decay, DrivenBy, InitialLevels, LayerSpec, Wiring};
-/// use dalean::network::{Batch, Optimiser, Positive, RateMantissa, Route, Rule, UpdateMode};
+/// use dalean::network::{Activation, Centre, Control, Decay, DrivenBy, InitialLevels, LayerSpec};
+/// use dalean::network::{Batch, Optimiser, Positive, RateMantissa, Route, Rule, UpdateMode, Wiring};
 /// use dalean::{Backend, Classifier, Examples, Experiment, Hardware, NetworkSpec};
 ///
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -45,6 +45,7 @@ use crate::learn::network::NetworkError;
 ///     decay: Decay::Constant,
 ///     optimisers: vec![Optimiser::Plain; 2],
 ///     centred: vec![false; 2],
+///     control: Control::None,
 /// };
 /// let hardware = Hardware::reference();
 /// let experiment = Experiment { seed: 1, hardware, network, epochs: 3, augment: None };

@@ -15,7 +15,7 @@ use crate::chip::state::{Piece, Seen, State, Visitor};
 use crate::learn::error::Centre;
 use crate::learn::network::{NetworkPlace, NetworkSpec};
 use crate::learn::route::Route;
-use crate::learn::rule::{Rule, UpdateMode};
+use crate::learn::rule::{Control, Rule, UpdateMode};
 use crate::num::fixed::{Batch, RateMantissa};
 use crate::num::tables::{Activation, Decay, Positive};
 use crate::task::environment::{self, EnvSource, EnvSpec, Replaying};
@@ -112,6 +112,7 @@ fn network(inputs: usize, outputs: usize, rule: Rule) -> NetworkSpec {
         decay: Decay::Linear,
         optimisers: vec![Optimiser::Sign { dead_zone: true }; 2],
         centred: vec![outputs > 1, false],
+        control: Control::None,
     }
 }
 

@@ -11,13 +11,15 @@ use dalean::hardware::{
     SliceTimes, Subtract, TileSpec, Timing, Window, WriteScheme, WriteSpec,
 };
 use dalean::network::{
-    Activation, Augment, Batch, Centre, Decay, DrivenBy, InitialLevels, LayerSpec, Optimiser,
-    Positive, RateMantissa, Route, Rule, UpdateMode, Wiring,
+    Activation, Augment, Batch, Centre, Control, Decay, DrivenBy, InitialLevels, LayerSpec,
+    Optimiser, Positive, RateMantissa, Route, Rule, UpdateMode, Wiring,
 };
 use dalean::{
     Backend, Classifier, Config, Data, DataRoot, Examples, Experiment, Hardware, HardwareSpec,
     ImageShape, Machine, NetworkSpec, Session, Sources, Split,
 };
+
+const CONTROLS: [Control; 3] = [Control::FrozenHidden, Control::SameSign, Control::SameSignHidden];
 
 /// What bytes are turned into; zeros follow the last one.
 struct Choices<'a>(&'a [u8]);
@@ -249,6 +251,7 @@ fn network(c: &mut Choices<'_>, inputs: usize, outputs: usize) -> NetworkSpec {
         decay: c.of(&[Decay::Constant, Decay::Cosine, Decay::Linear]),
         optimisers: (0..count).map(|_| c.of(&optimisers)).collect(),
         centred: (0..count).map(|_| c.one_in(16)).collect(),
+        control: if c.one_in(8) { c.of(&CONTROLS) } else { Control::None },
     }
 }
 

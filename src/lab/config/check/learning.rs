@@ -7,7 +7,7 @@ use crate::lab::config::defaults::{SetDefaults, policy};
 use crate::lab::config::file::{LearningFile, MantissaFile};
 use crate::learn::error::Centre;
 use crate::learn::route::Route;
-use crate::learn::rule::{Rule, UpdateMode};
+use crate::learn::rule::{Control, Rule, UpdateMode};
 use crate::num::fixed::{Batch, RateMantissa};
 use crate::num::tables::{Decay, Positive, Rate};
 
@@ -61,6 +61,13 @@ pub(super) const MODES: [(&str, UpdateMode); 3] = [
 /// `learning.centre`.
 pub(super) const CENTRES: [(&str, Centre); 3] =
     [("none", Centre::None), ("batch", Centre::Batch), ("running", Centre::Running)];
+/// `learning.control`.
+pub(super) const CONTROLS: [(&str, Control); 4] = [
+    ("none", Control::None),
+    ("frozen_hidden", Control::FrozenHidden),
+    ("same_sign_hidden", Control::SameSignHidden),
+    ("same_sign", Control::SameSign),
+];
 /// `learning.decay`.
 pub(super) const DECAYS: [(&str, Decay); 3] =
     [("cosine", Decay::Cosine), ("linear", Decay::Linear), ("constant", Decay::Constant)];
@@ -78,6 +85,7 @@ pub(super) struct Learning {
     pub(super) kind: Kind,
     pub(super) mode: UpdateMode,
     pub(super) centre: Centre,
+    pub(super) control: Control,
     pub(super) route: Option<Route>,
     pub(super) batch: Batch,
     pub(super) rates: Vec<Positive>,
@@ -96,6 +104,7 @@ impl Learning {
             kind: Kind { rule: Rule::Ed, seeded: false },
             mode: UpdateMode::Accumulate,
             centre: Centre::None,
+            control: Control::None,
             route: Some(Route::Modulo { taps: 1, shift: None }),
             batch: Batch::new(1).expect("in range"),
             rates: vec![],
@@ -144,6 +153,7 @@ pub(super) fn resolve(
         kind,
         mode,
         centre,
+        control: word("learning.control", &mut file.control, "none", &CONTROLS)?,
         route: route::resolve(file, kind.rule, defaults.taps)?,
         batch,
         rates: rates(file, hidden, defaults)?,

@@ -256,7 +256,6 @@ const LEARNING: &[KeyEntry] = &[
         &[
             ("ed", "error diffusion under Dale's law"),
             ("ed_seed", "the same as the paper's seed rule: width 1, raw errors, symmetric gains"),
-            ("ed_non_dalean", "error diffusion on pathways of differential pairs: what Dale's law costs"),
             ("ed_non_dalean", "the same on differential pairs in two populations: what Dale's law costs"),
             ("kaneko", "Kaneko's original, which only potentiates: one output, two classes"),
             ("dfa", "direct feedback alignment on differential pairs"),
@@ -335,6 +334,16 @@ const LEARNING: &[KeyEntry] = &[
         "\"running\" with a batch of one or mode = \"online\"; \"none\" with rule = \"kaneko\" or \"ed_seed\", and of \
          policies",
     ),
+    words(
+        "control",
+        &[
+            ("none", "nothing"),
+            ("frozen_hidden", "hidden layers hear no error and are not written: outputs alone learn"),
+            ("same_sign_hidden", "in hidden layers stream n hears errors as stream p does, not negated"),
+            ("same_sign", "the same in all layers"),
+        ],
+    )
+    .default("\"none\""),
     words(
         "route",
         &[
