@@ -94,6 +94,21 @@ pub mod network {
     pub use crate::task::classify::Augment;
 }
 
+/// Policies that are trained from outside: a [`PolicyLearner`](policy::PolicyLearner) is shown what environments of one's own
+/// show, and says what they are to do.
+pub mod policy {
+    pub use crate::task::environment::{
+        Actions, EnvError, EnvSpec, Observations, Outcomes, Real, Shown, Taken,
+    };
+    pub use crate::task::policy::{
+        Evaluating, Evolution, InputCoding, Method, PolicyEpoch, PolicyError, PolicyExperiment,
+        PolicyLearner, PolicyProgress, PolicyTurn, Ppo, Share, SumOf,
+    };
+
+    #[cfg(feature = "lab")]
+    pub use crate::lab::data::{FloatDoor, FloatOutcomes};
+}
+
 #[cfg(feature = "lab")]
 pub use crate::lab::{
     config::{Config, ConfigError, Sources},

@@ -71,7 +71,7 @@ fn refused(network: &NetworkSpec) -> NetworkError {
 #[test]
 fn everything_that_does_not_fit_together_is_refused_with_its_key() {
     type Change = fn(&mut NetworkSpec);
-    let cases: [(&str, &str, Change); 46] = [
+    let cases: [(&str, &str, Change); 50] = [
         ("network.hidden", "0 layers", |n| n.layers.clear()),
         ("network.hidden", "a layer of 0 units", |n| n.layers[1].units = 0),
         ("network.hidden", "a layer of 0 inputs", |n| n.layers[0].inputs = 0),

@@ -129,6 +129,11 @@ impl Agent {
         Ok(())
     }
 
+    /// Steps of each environment since the start.
+    pub(super) const fn steps(&self) -> u64 {
+        self.steps
+    }
+
     /// Whether it is time to learn.
     pub(super) fn is_full(&self) -> bool {
         self.rollout.len() == self.settings.environments * self.settings.horizon
@@ -183,8 +188,9 @@ impl State for Agent {
         };
         if let Some(going) = visitor.numbers(&piece, &going)? {
             self.going = going.as_chunks::<2>().0.to_vec();
+            // a state is put back as it was between rollouts; who looks alone forgets nothing
+            self.rollout.clear();
         }
-        self.rollout.clear();
         Ok(())
     }
 }

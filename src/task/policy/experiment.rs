@@ -100,6 +100,23 @@ impl PolicyExperiment {
         }
     }
 
+    /// The same on another environment: what is acted on, inputs of the first layers and outputs of the actor are as that has
+    /// them.
+    #[must_use]
+    pub fn facing(mut self, spec: &EnvSpec) -> Self {
+        self.environment = spec.id.to_string();
+        let (rows, outputs) = (self.rows(spec), Self::outputs(spec));
+        for (network, units) in [(&mut self.actor, outputs), (&mut self.critic, 1)] {
+            if let Some(first) = network.layers.first_mut() {
+                first.inputs = rows;
+            }
+            if let Some(last) = network.layers.last_mut() {
+                last.units = units;
+            }
+        }
+        self
+    }
+
     /// Checks that everything fits together, on the chip, and with the environment.
     ///
     /// # Errors

@@ -20,6 +20,8 @@ use crate::num::fixed::{Batch, RateMantissa};
 use crate::num::tables::{Activation, Decay, Positive};
 use crate::task::environment::{self, EnvSource, EnvSpec, Replaying};
 
+mod outside;
+
 /// Everything that a state shows, as text; and, where it is told to, what a state is to be replaced by.
 #[derive(Default)]
 struct Book {
@@ -77,7 +79,7 @@ impl Visitor for Book {
     }
 }
 
-fn book(trainer: &mut PolicyTrainer) -> Book {
+fn book(trainer: &mut dyn State) -> Book {
     let mut book = Book::default();
     trainer.visit(&mut book).expect("nothing is replaced");
     book

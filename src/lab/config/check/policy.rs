@@ -123,7 +123,7 @@ pub(super) fn resolve(
         }
         Named::Rule(_) => {
             refuse(&[("es", file.es.is_some(), "it belongs to learning.rule = \"es\"")])?;
-            let defaults = PolicyDefaults::of(spec.id);
+            let defaults = PolicyDefaults::of(&spec.id);
             Method::Ppo(ppo(file.ppo.get_or_insert_default(), continuous, defaults)?)
         }
     };
