@@ -166,6 +166,10 @@ keys! {
         optimiser: String,
         /// Optimiser `sign`: sums below the root mean square of their layer ask for nothing.
         dead_zone: bool,
+        /// Optimiser `momentum`: what an accumulator forgets of itself at a write, as 2^-shift.
+        momentum_shift: i64,
+        /// Optimiser `adam_fx`: what the mean of sums and the mean of their squares forget of themselves at a write, as 2^-shift.
+        adam_shifts: [i64; 2],
         /// Policies: whether hidden layers of the network that acts learn from what differs from the mean of each row.
         centred: bool,
         /// Rate, before multipliers; of the optimiser `sign` the probability of a pulse, of `rms` and `adam_fx` a step of weights.
@@ -225,6 +229,8 @@ keys! {
         log_sigma: f64,
         /// Continuous actions: how far that logarithm moves in an update for a mean error of 1.
         log_sigma_rate: f64,
+        /// Continuous actions: steps for which what was drawn stands.
+        noise_steps: i64,
     }
     /// `[es]`: policies by evolution.
     EvolutionFile {

@@ -76,6 +76,7 @@ const FROZEN: &[(&str, &str)] = &[
     ("learning.control", "none"),
     ("actor.control", "none"),
     ("critic.control", "none"),
+    ("ppo.noise_steps", "1"),
 ];
 
 /// Key and word.
@@ -168,8 +169,17 @@ fn policy(experiment: &PolicyExperiment) -> Vec<Given> {
     list.network("actor", 0, actor);
     match method {
         Method::Ppo(ppo) => {
-            let Ppo { passes, discount, lambda, clip, entropy, log_sigma_start, log_sigma_rate } =
-                ppo;
+            let Ppo {
+                passes,
+                discount,
+                lambda,
+                clip,
+                entropy,
+                log_sigma_start,
+                log_sigma_rate,
+                noise_steps,
+            } = ppo;
+            list.put("ppo.noise_steps", noise_steps);
             list.network("critic", actor.layers.len(), critic);
             list.put("ppo.passes", passes);
             // as the core has them: units of 2^-31

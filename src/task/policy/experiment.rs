@@ -132,7 +132,13 @@ impl PolicyExperiment {
         }
         let sizes =
             [("environment.horizon", self.horizon), ("environment.rollouts", self.rollouts)];
-        if let Some((key, _)) = sizes.into_iter().find(|(_, size)| *size == 0) {
+        let noise_steps = match self.method {
+            Method::Ppo(ppo) => ppo.noise_steps,
+            Method::Evolution(_) => 1,
+        };
+        if let Some((key, _)) =
+            sizes.into_iter().chain([("ppo.noise_steps", noise_steps)]).find(|(_, size)| *size == 0)
+        {
             return Err(NetworkError::misfit(key, "is 0", "give at least 1"));
         }
         let epoch = self.steps_per_epoch();
@@ -189,6 +195,8 @@ pub struct Ppo {
     pub log_sigma_start: i32,
     /// Continuous actions: how far `ln sigma` moves in an update for a mean error of 1.
     pub log_sigma_rate: Share,
+    /// Continuous actions: steps for which what was drawn stands, so that what is tried lasts.
+    pub noise_steps: u32,
 }
 
 /// Antithetic evolution strategies with ranks (Salimans et al. 2017), in integers.

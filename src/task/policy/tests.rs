@@ -128,6 +128,7 @@ fn experiment(id: &str, rule: Rule, method: Option<Method>) -> PolicyExperiment 
         entropy: Share::from_num(0.01),
         log_sigma_start: 0,
         log_sigma_rate: Share::from_num(0.01),
+        noise_steps: 1,
     };
     let hardware = Hardware::reference().with(|chip| chip.tile.transposed_read = true).unwrap();
     let outputs = PolicyExperiment::outputs(&spec);

@@ -1,6 +1,8 @@
 //! `[learning]`: rule, batches, rates, and which state is kept.
 
-use super::{Select, TrainOn, one_a_layer, per_layer, positive, range, route, word, wrong};
+use super::{
+    Select, TrainOn, between, one_a_layer, per_layer, positive, range, route, word, wrong,
+};
 use crate::chip::layer::Optimiser;
 use crate::lab::config::ConfigError;
 use crate::lab::config::defaults::{SetDefaults, policy};
@@ -172,20 +174,47 @@ pub(super) fn optimiser(
     default: &str,
     dead_zone: bool,
 ) -> Result<Optimiser, ConfigError> {
-    match word("learning.optimiser", &mut file.optimiser, default, &OPTIMISERS)? {
-        Optimiser::Sign { .. } => {
-            let dead_zone = *file.dead_zone.get_or_insert(dead_zone);
-            Ok(Optimiser::Sign { dead_zone })
+    let chosen = word("learning.optimiser", &mut file.optimiser, default, &OPTIMISERS)?;
+    let refused = |key: &str, optimiser: &str, found: Option<String>| match found {
+        None => Ok(()),
+        Some(found) => {
+            let allowed = format!(
+                "it belongs to optimiser = \"{optimiser}\": take the key out (--set {key}=default), or choose that optimiser"
+            );
+            Err(wrong(key, format!("is {found}"), allowed))
         }
-        other => match file.dead_zone {
-            None => Ok(other),
-            Some(found) => {
-                let allowed = "it belongs to optimiser = \"sign\": take the key out (--set learning.dead_zone=default), or \
-                               choose that optimiser";
-                Err(wrong("learning.dead_zone", format!("is {found}"), allowed))
-            }
-        },
+    };
+    if !matches!(chosen, Optimiser::Sign { .. }) {
+        refused("learning.dead_zone", "sign", file.dead_zone.map(|found| found.to_string()))?;
     }
+    if !matches!(chosen, Optimiser::Momentum { .. }) {
+        let found = file.momentum_shift.map(|found| found.to_string());
+        refused("learning.momentum_shift", "momentum", found)?;
+    }
+    if !matches!(chosen, Optimiser::AdamFx { .. }) {
+        let found = file.adam_shifts.map(|found| format!("{found:?}"));
+        refused("learning.adam_shifts", "adam_fx", found)?;
+    }
+    let shift = |key, found| {
+        let shift = between(key, found, 1, 8)?;
+        Ok::<_, ConfigError>(u32::try_from(shift).expect("its range was checked"))
+    };
+    Ok(match chosen {
+        Optimiser::Sign { .. } => {
+            Optimiser::Sign { dead_zone: *file.dead_zone.get_or_insert(dead_zone) }
+        }
+        Optimiser::Momentum { decay } => {
+            let found = *file.momentum_shift.get_or_insert(decay.into());
+            Optimiser::Momentum { decay: shift("learning.momentum_shift", found)? }
+        }
+        Optimiser::AdamFx { first_decay, second_decay } => {
+            let [first, second] =
+                *file.adam_shifts.get_or_insert([first_decay, second_decay].map(i64::from));
+            let first_decay = shift("learning.adam_shifts", first)?;
+            Optimiser::AdamFx { first_decay, second_decay: shift("learning.adam_shifts", second)? }
+        }
+        other => other,
+    })
 }
 
 /// Rate times multiplier, of each layer.

@@ -178,7 +178,7 @@ fn learns(file: &mut LearningFile, rule: Rule, layers: usize) -> Result<Learning
     }
     let batch = *file.batch.get_or_insert(defaults::BATCH);
     let optimiser = learning::optimiser(file, "sign", true)?;
-    let rate = *file.rate.get_or_insert(defaults::rate(optimiser));
+    let rate = *file.rate.get_or_insert(defaults::rate_of(optimiser, rule));
     let rate = positive("learning.rate", rate)?;
     file.rate_multipliers.get_or_insert_with(|| defaults::multipliers(optimiser, layers));
     let factors = per_layer(MULTIPLIERS, &mut file.rate_multipliers, 1.0, layers)?;
@@ -207,6 +207,8 @@ fn evolves(file: &mut LearningFile, layers: usize) -> Result<Learning, ConfigErr
         ("learning.centred", file.centred.is_some(), WHY),
         ("learning.optimiser", file.optimiser.is_some(), WHY),
         ("learning.dead_zone", file.dead_zone.is_some(), WHY),
+        ("learning.momentum_shift", file.momentum_shift.is_some(), WHY),
+        ("learning.adam_shifts", file.adam_shifts.is_some(), WHY),
         ("learning.rate", file.rate.is_some(), WHY),
         ("learning.rate_multipliers", file.rate_multipliers.is_some(), WHY),
         ("learning.rate_mantissa", file.rate_mantissa.is_some(), WHY),
@@ -286,7 +288,7 @@ fn ppo(
 ) -> Result<Ppo, ConfigError> {
     let entropy = if continuous { defaults::ENTROPY_OF_NUMBERS } else { defaults.entropy };
     let passes = between("ppo.passes", *file.passes.get_or_insert(10), 1, 1000)?;
-    let (mut log_sigma_start, mut log_sigma_rate) = (0, Share::ZERO);
+    let (mut log_sigma_start, mut log_sigma_rate, mut noise_steps) = (0, Share::ZERO, 1);
     if continuous {
         let start = *file.log_sigma.get_or_insert(defaults::LOG_SIGMA);
         if !(-4.0..=1.0).contains(&start) {
@@ -295,12 +297,15 @@ fn ppo(
         log_sigma_start = Real::from_num(start).to_bits();
         let rate = *file.log_sigma_rate.get_or_insert(defaults::LOG_SIGMA_RATE);
         log_sigma_rate = share("ppo.log_sigma_rate", rate, 0.0, 1.0)?;
+        let steps = *file.noise_steps.get_or_insert(defaults::NOISE_STEPS);
+        noise_steps = small(between("ppo.noise_steps", steps, 1, 1024)?);
     } else {
         const WHY: &str =
             "the environment takes one of some actions, which have no spread: take the key out";
         refuse(&[
             ("ppo.log_sigma", file.log_sigma.is_some(), WHY),
             ("ppo.log_sigma_rate", file.log_sigma_rate.is_some(), WHY),
+            ("ppo.noise_steps", file.noise_steps.is_some(), WHY),
         ])?;
     }
     Ok(Ppo {
@@ -311,6 +316,7 @@ fn ppo(
         entropy: share("ppo.entropy", *file.entropy.get_or_insert(entropy), 0.0, 1.0)?,
         log_sigma_start,
         log_sigma_rate,
+        noise_steps,
     })
 }
 

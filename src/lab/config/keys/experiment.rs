@@ -287,8 +287,8 @@ const LEARNING: &[KeyEntry] = &[
             ("plain", "the sum over the batch, shifted"),
             ("sign", "one pulse in the direction of the sum, by chance"),
             ("rms", "the sum, scaled by the root mean square over the layer"),
-            ("momentum", "an accumulator a cell that forgets an eighth at a write"),
-            ("adam_fx", "the mean sum of a cell in units of its root mean square, over 8 and 256 writes"),
+            ("momentum", "an accumulator a cell that forgets a part of itself at a write, an eighth by default"),
+            ("adam_fx", "the mean sum of a cell in units of its root mean square, over 8 and 256 writes by default"),
         ],
     )
     .default("\"plain\"")
@@ -297,10 +297,18 @@ const LEARNING: &[KeyEntry] = &[
         .default("false")
         .otherwise("true with task = \"policy\"")
         .only("with optimiser = \"sign\"", &["learning.optimiser=sign"]),
+    whole("momentum_shift", 1, 8)
+        .unit("bits")
+        .default("3")
+        .only("with optimiser = \"momentum\"", &["learning.optimiser=momentum"]),
+    other("adam_shifts", "two whole numbers, each 1..=8")
+        .unit("bits")
+        .default("[3, 8]")
+        .only("with optimiser = \"adam_fx\"", &["learning.optimiser=adam_fx"]),
     flag("centred").default("true").only(ON_POLICY, POLICY),
     real("rate", 1e-6, 1e6).default("18.0").otherwise(
         "20.0 with other data than the built-in digits; with a batch below the default one less, in proportion; 0.25 \
-         with optimiser = \"sign\", 0.002 with \"rms\" and \"adam_fx\"; 1.0 of policies with others",
+         with optimiser = \"sign\" (0.5 of policies with rule = \"dfa\" or \"bp\"), 0.002 with \"rms\" and \"adam_fx\"; 1.0 of policies with others",
     ),
     real("rate_multipliers", 1e-6, 1e6).layers().default("[1.0, 0.25]").otherwise(
         "1 in every layer, 0.25 in the last one of the built-in digits (1.0 with other data); behind more than 256 \
@@ -425,6 +433,7 @@ const PPO: &[KeyEntry] = &[
         .otherwise("0.0 where actions are numbers, 0.03 of Foray-v0")
         .only(ON_POLICY, POLICY),
     other("log_sigma", "a number, -4 to 1").default("0.0").only(ON_CONTINUOUS, CONTINUOUS),
+    whole("noise_steps", 1, 1024).unit("steps").default("1").only(ON_CONTINUOUS, CONTINUOUS),
     other("log_sigma_rate", "a number, 0 to 1").default("0.003").only(ON_CONTINUOUS, CONTINUOUS),
 ];
 
