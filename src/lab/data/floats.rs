@@ -122,7 +122,7 @@ impl FloatDoor {
         values: &[F],
         width: usize,
     ) -> Result<Vec<Real>, EnvError> {
-        let wanted = self.count * width;
+        let wanted = self.count.saturating_mul(width);
         if values.len() != wanted {
             let found =
                 format!("has {width} numbers as its {what}, but {} are given", values.len());

@@ -22,6 +22,9 @@ pub enum InputCoding {
     Offset,
 }
 
+/// Steps of a run, at most.
+const STEPS_MAX: u64 = 1 << 40;
+
 /// Everything that decides a result.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PolicyExperiment {
@@ -85,7 +88,7 @@ impl PolicyExperiment {
     #[must_use]
     pub const fn rows(&self, spec: &EnvSpec) -> usize {
         match (spec.shown, self.input) {
-            (Shown::Dense(values), InputCoding::Split) => 2 * values,
+            (Shown::Dense(values), InputCoding::Split) => values.saturating_mul(2),
             (Shown::Dense(values), InputCoding::Offset) => values,
             (Shown::Sparse { lines, .. }, _) => lines,
         }
@@ -132,21 +135,18 @@ impl PolicyExperiment {
         }
         let sizes =
             [("environment.horizon", self.horizon), ("environment.rollouts", self.rollouts)];
-        let noise_steps = match self.method {
-            Method::Ppo(ppo) => ppo.noise_steps,
-            Method::Evolution(_) => 1,
-        };
-        if let Some((key, _)) =
-            sizes.into_iter().chain([("ppo.noise_steps", noise_steps)]).find(|(_, size)| *size == 0)
-        {
+        if let Some((key, _)) = sizes.into_iter().find(|(_, size)| *size == 0) {
             return Err(NetworkError::misfit(key, "is 0", "give at least 1"));
         }
         let epoch = self.steps_per_epoch();
-        if self.steps == 0 || self.steps.div_ceil(epoch) > u64::from(u32::MAX) || epoch > 1 << 24 {
+        let few = self.steps > STEPS_MAX || self.steps.div_ceil(epoch) > u64::from(u32::MAX);
+        if self.steps == 0 || few || epoch > 1 << 24 {
             let found = format!("is {}, in epochs of {epoch}", self.steps);
-            let allowed = "give 1 step or more, in 2^32 epochs at most of 2^24 steps at most";
+            let allowed =
+                "give 1 step or more, 2^40 at most, in 2^32 epochs at most of 2^24 steps at most";
             return Err(NetworkError::misfit("environment.steps", found, allowed));
         }
+        self.method.check()?;
         let networks = [(&self.actor, Self::outputs(spec)), (&self.critic, 1)];
         for (network, outputs) in networks {
             network.check(&self.hardware)?;
@@ -176,6 +176,53 @@ pub enum Method {
     Ppo(Ppo),
     /// Evolution strategies: no error reaches a layer.
     Evolution(Evolution),
+}
+
+impl Method {
+    /// Checks that every number is one that it can be.
+    fn check(self) -> Result<(), NetworkError> {
+        let wrong = |key, found: &dyn std::fmt::Display, allowed: &str| {
+            Err(NetworkError::misfit(key, format_args!("is {found}"), allowed))
+        };
+        match self {
+            Self::Ppo(ppo) => {
+                let shares = [
+                    ("ppo.gamma", ppo.discount),
+                    ("ppo.lambda", ppo.lambda),
+                    ("ppo.clip", ppo.clip),
+                    ("ppo.entropy", ppo.entropy),
+                    ("ppo.log_sigma_rate", ppo.log_sigma_rate),
+                ];
+                if let Some((key, share)) =
+                    shares.into_iter().find(|(_, share)| *share > Share::ONE)
+                {
+                    return wrong(key, &share, "it must lie in 0..=1");
+                }
+                if !(1..=1000).contains(&ppo.passes) {
+                    return wrong("ppo.passes", &ppo.passes, "it must lie in 1..=1000");
+                }
+                if !(-4 << 16..=1 << 16).contains(&ppo.log_sigma_start) {
+                    let allowed = "in units of 2^-16 it must lie in -4..=1";
+                    return wrong("ppo.log_sigma", &ppo.log_sigma_start, allowed);
+                }
+                if !(1..=1024).contains(&ppo.noise_steps) {
+                    return wrong("ppo.noise_steps", &ppo.noise_steps, "it must lie in 1..=1024");
+                }
+            }
+            Self::Evolution(Evolution { pairs, step, shift }) => {
+                if !(1..=4096).contains(&pairs) {
+                    return wrong("es.pairs", &pairs, "it must lie in 1..=4096");
+                }
+                if !(1..=4095).contains(&step) {
+                    return wrong("es.step", &step, "it must lie in 1..=4095");
+                }
+                if shift > 16 {
+                    return wrong("es.shift", &shift, "it must lie in 0..=16");
+                }
+            }
+        }
+        Ok(())
+    }
 }
 
 /// Proximal policy optimisation (Schulman et al. 2017). The minibatch is the batch of both networks.

@@ -21,6 +21,9 @@ use dalean::{
 
 const CONTROLS: [Control; 3] = [Control::FrozenHidden, Control::SameSign, Control::SameSignHidden];
 
+#[path = "outside.rs"]
+mod outside;
+
 /// What bytes are turned into; zeros follow the last one.
 struct Choices<'a>(&'a [u8]);
 
@@ -469,6 +472,7 @@ pub(super) fn play(bytes: &[u8]) {
     let mut c = Choices(bytes);
     match c.byte() % 8 {
         0 => configure(&mut c),
+        4 => outside::policy(&mut c),
         1..=3 => run(&mut c),
         _ => classify(&mut c),
     }
