@@ -433,8 +433,8 @@ const PPO: &[KeyEntry] = &[
         .otherwise("0.0 where actions are numbers, 0.03 of Foray-v0")
         .only(ON_POLICY, POLICY),
     other("log_sigma", "a number, -4 to 1").default("0.0").only(ON_CONTINUOUS, CONTINUOUS),
-    whole("noise_steps", 1, 1024).unit("steps").default("1").only(ON_CONTINUOUS, CONTINUOUS),
     other("log_sigma_rate", "a number, 0 to 1").default("0.003").only(ON_CONTINUOUS, CONTINUOUS),
+    whole("noise_steps", 1, 1024).unit("steps").default("1").only(ON_CONTINUOUS, CONTINUOUS),
 ];
 
 const EVOLUTION: &[KeyEntry] = &[
