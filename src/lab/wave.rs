@@ -73,7 +73,7 @@ pub fn record(
     let (which, first_layer) = network_of(look.tile.layer, counts);
     let tape = after.take_tape(which);
     let engine = before.engines()[which];
-    let samples = samples_of(&tape, engine.layers()[0].spec.inputs);
+    let samples = samples_of(&tape, engine.layers()[0].spec.sample_inputs());
 
     let mut network = Network::new(&config.hardware, config.seed, engine.layers(), samples);
     network.set_learning(engine.mantissas(), engine.potentiation_only());
@@ -92,7 +92,8 @@ pub fn record(
     let writer = Rc::new(RefCell::new(vcd::Writer::new(timing.clock_khz, look.all)));
     let sink = Rc::clone(&writer);
     network.watch_tile(place, move |cycle, tile: &Tile| {
-        sink.borrow_mut().cycle(cycle, &tile.registers());
+        let most = if look.all { usize::MAX } else { NUMBERS_MAX };
+        sink.borrow_mut().cycle(cycle, &tile.registers_within(most));
     });
     network.play_tape(&tape);
 

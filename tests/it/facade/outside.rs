@@ -52,6 +52,7 @@ pub(super) fn policy(c: &mut Choices<'_>) {
     let policy = |outputs| NetworkSpec {
         rule: Rule::Ed,
         mode: UpdateMode::Accumulate,
+        error: OutputError::OneVsAll,
         centre: Centre::None,
         route: Some(Route::Modulo { taps: 1, shift: None }),
         batch: Batch::new(16).expect("inside"),
@@ -72,6 +73,9 @@ pub(super) fn policy(c: &mut Choices<'_>) {
                 weight_max_log2: 0,
                 initial: InitialLevels::AbsGaussian { gain: [1, 1] },
                 constant_row: inputs == 1,
+                convolution: None,
+                pool: Pool::None,
+                homeostasis: Homeostasis::OFF,
             })
             .collect(),
     };
