@@ -94,7 +94,7 @@ pub mod network {
     pub use crate::learn::rule::{Control, Rule, UpdateMode};
     pub use crate::num::fixed::{Batch, RateMantissa};
     pub use crate::num::tables::{Activation, Decay, Positive};
-    pub use crate::task::classify::Augment;
+    pub use crate::task::classify::{Augment, Coding};
 }
 
 /// Policies that are trained from outside: a [`PolicyLearner`](policy::PolicyLearner) is shown what environments of one's own
