@@ -84,9 +84,12 @@ pub mod hardware {
 
 /// The parts of a network: what a [`NetworkSpec`] is made of. [`Classifier`] shows one put together.
 pub mod network {
-    pub use crate::chip::layer::{DrivenBy, InitialLevels, LayerSpec, Optimiser, PlanError};
+    pub use crate::chip::crossbar::kernel::ConvShape;
+    pub use crate::chip::layer::{
+        DrivenBy, Gain, Homeostasis, InitialLevels, LayerSpec, Optimiser, PlanError, Pool,
+    };
     pub use crate::chip::population::Wiring;
-    pub use crate::learn::error::Centre;
+    pub use crate::learn::error::{Centre, OutputError};
     pub use crate::learn::route::Route;
     pub use crate::learn::rule::{Rule, UpdateMode};
     pub use crate::num::fixed::{Batch, RateMantissa};

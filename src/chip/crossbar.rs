@@ -26,7 +26,7 @@ mod words;
 mod write;
 
 pub use initial::{InitialLaw, initial_levels, initial_scale};
-pub use optimise::{Adam, Asks, Form, Momentum};
+pub use optimise::{Adam, Asks, Form, LongSums, Momentum, SHORT_READS};
 pub use pulses::{Collect, Collected, RowPeaks};
 pub use trains::ColumnTrain;
 pub use write::{WriteRequest, Written};

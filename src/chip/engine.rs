@@ -21,7 +21,7 @@ use super::crossbar::Collect;
 use super::crossbar::kernel::{Backend, Team};
 use super::crossbar::layout::BLOCK_ROWS;
 use super::hardware::Hardware;
-use super::layer::{DrivenBy, Layer};
+use super::layer::{DrivenBy, Layer, Readings};
 use super::ledger::{Cycles, During, Event, Ledger, coded};
 use super::population::{Stream, Wiring};
 use crate::num::tables::Scales;
@@ -32,6 +32,7 @@ mod currents;
 mod each;
 mod error;
 mod forward;
+mod homeostasis;
 mod mute;
 mod normalise;
 mod optimise;
@@ -49,13 +50,13 @@ mod track;
 mod trains;
 mod unit;
 mod update;
+mod window;
 mod words;
 
-use each::{MOVE, each};
 use forward::Units;
 use schedule::Schedule;
 
-pub use calibrate::Calibration;
+pub use calibrate::{CALIBRATION_SAMPLES, Calibration};
 pub use pulses::{Pulses, TilePeaks, active};
 pub use tape::Recorded;
 pub use track::WritesDone;
@@ -176,8 +177,14 @@ struct Registers {
     gates: [Lines<i8>; 2],
     /// Drives by source stream as an update takes them: `[block][64 rows][stride]`.
     turned: [Lines<u8>; 2],
+    /// Codes of units by target stream, where a window, a pool or another order lies between them and what they drive.
+    maps: [Lines<u8>; 2],
+    /// What windows move over, by set of drives; or what goes in another order into a dense layer.
+    images: [Lines<u8>; 2],
     /// Sums by target stream, where units are normalised: they lie here until all of a stream are known.
     unscaled: [Lines<i32>; 2],
+    /// What units that keep to a middle learnt from what was read last.
+    readings: Readings,
     /// Accumulators by target stream, of the last layer.
     accumulators: [Vec<i64>; 2],
     /// Activities by target stream, of the last layer where it has some.
@@ -484,7 +491,7 @@ impl Engine {
 
     fn load_drives(&mut self, codes: &[u8]) {
         let layer = &self.layers[0];
-        let (inputs, blocks) = (layer.spec.inputs, layer.layout.blocks());
+        let (inputs, blocks) = (layer.spec.sample_inputs(), layer.layout.blocks());
         assert!(codes.len().is_multiple_of(inputs), "codes come in whole samples");
         assert!(self.registers.iter().all(|r| r.pending == 0), "sums wait to be programmed");
         let greatest = codes.iter().fold(0, |most, &code| most.max(code));
@@ -492,20 +499,13 @@ impl Engine {
         self.samples = codes.len() / inputs;
         let samples = self.samples;
         self.loaded[self.phase as usize] += samples as u64;
-        let drives = &mut self.registers[0].drives[Stream::P.index()];
-        drives.resize(blocks * samples * BLOCK_ROWS, 0);
-        let parts = drives.chunks_exact_mut((samples * BLOCK_ROWS).max(1)).enumerate();
-        let parts = parts.map(|(block, drives)| (block, (block * BLOCK_ROWS, drives))).collect();
-        each(&mut self.team, codes.len() * MOVE, blocks, parts, |_, (first, drives)| {
-            let last = (first + BLOCK_ROWS).min(inputs);
-            for (row, codes) in drives.chunks_exact_mut(BLOCK_ROWS).zip(codes.chunks_exact(inputs))
-            {
-                // a block may hold the constant row alone
-                let codes = &codes[first.min(last)..last];
-                row[..codes.len()].copy_from_slice(codes);
-                row[codes.len()..].fill(0);
-            }
-        });
+        if let Some(shape) = layer.spec.convolution {
+            self.load_image(shape, codes);
+        } else {
+            let drives = &mut self.registers[0].drives[Stream::P.index()];
+            drives.resize(blocks * samples * BLOCK_ROWS, 0);
+            window::flatten(&mut self.team, codes, samples, inputs, drives);
+        }
         self.load_constant(0);
     }
 
@@ -516,7 +516,7 @@ impl Engine {
         };
         let (inputs, code) = (this.spec.inputs, self.hardware.drive.bits.code_max());
         let (block, row) = (inputs / BLOCK_ROWS, inputs % BLOCK_ROWS);
-        let size = self.samples * BLOCK_ROWS;
+        let size = self.reads(layer) * BLOCK_ROWS;
         for drives in &mut self.registers[layer].drives {
             if let Some(drives) = drives.get_mut(block * size..(block + 1) * size) {
                 for sample in drives.chunks_exact_mut(BLOCK_ROWS) {

@@ -8,7 +8,7 @@
 use std::ops::Range;
 
 use super::crossbar::Crossbar;
-use super::crossbar::kernel::LookUp;
+use super::crossbar::kernel::{ConvShape, LookUp};
 use super::crossbar::layout::Layout;
 use super::hardware::{Adc, AdcRange, Hardware};
 use super::periphery;
@@ -17,11 +17,15 @@ use crate::num::fixed::DriveBits;
 use crate::num::tables::{Activation, FullDrive, Lut, Unit};
 
 mod delivery;
+pub mod homeostasis;
 pub mod requests;
+mod stage;
 mod state;
 
 pub use delivery::{Delivery, Taps, WordSource};
+pub use homeostasis::{Balance, Readings};
 pub use requests::{Followed, Optimiser, Requests};
+pub use stage::{Gain, Homeostasis, Pool};
 
 /// Whose codes are on the rows of an array.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -50,9 +54,9 @@ impl DrivenBy {
 /// kind there is.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LayerSpec {
-    /// Units of the layer below, or features; without the constant row.
+    /// Units of the layer below, or features; of a convolution the codes of its window. Without the constant row.
     pub inputs: usize,
-    /// Units of each target stream.
+    /// Units of each target stream; of a convolution its channels.
     pub units: usize,
     /// How the arrays are wired.
     pub wiring: Wiring,
@@ -66,6 +70,12 @@ pub struct LayerSpec {
     pub initial: InitialLevels,
     /// Whether a constant row is driven at full code.
     pub constant_row: bool,
+    /// The window that moves over the image below; none of a dense layer.
+    pub convolution: Option<ConvShape>,
+    /// What lies between its units and what they drive.
+    pub pool: Pool,
+    /// What its units do beside their table.
+    pub homeostasis: Homeostasis,
 }
 
 /// How the levels of a new layer are drawn.
@@ -103,11 +113,21 @@ impl LayerSpec {
         }
     }
 
+    /// Whether what a sample of `below` hands on is what one of this layer takes.
+    pub(crate) fn meets(&self, below: &Self) -> bool {
+        match self.convolution {
+            None => self.inputs == below.sample_outputs(),
+            Some(shape) => {
+                shape.channels == below.units && [shape.height, shape.width] == below.pooled()
+            }
+        }
+    }
+
     /// Whether the units of `below` can drive this array.
     #[must_use]
     pub fn follows(&self, below: &Self) -> bool {
         let given = below.wiring.targets();
-        self.inputs == below.units && self.drive_sets().iter().all(|set| given.contains(set))
+        self.meets(below) && self.drive_sets().iter().all(|set| given.contains(set))
     }
 }
 
@@ -185,6 +205,8 @@ pub struct Layer {
     /// Of converters that track, by target stream and slice: codes on the rail, and all codes, of training since ranges
     /// were last looked at. Empty where none track.
     pub rails: Vec<Vec<[u64; 2]>>,
+    /// Thresholds and step of its units.
+    pub balance: Balance,
     /// How its sums become requests.
     pub requests: Requests,
 }
@@ -221,7 +243,20 @@ impl Layer {
         let rails = if tracks { adc_shifts.iter().map(no_rail).collect() } else { vec![] };
         let writes = vec![0; arrays.len()];
         let requests = Requests::PLAIN;
-        Self { index, spec, layout, lut, delivery, arrays, writes, adc_shifts, rails, requests }
+        let balance = Balance::new(&spec, hardware.digital.lut_bits, lut.shift);
+        Self {
+            index,
+            spec,
+            layout,
+            lut,
+            delivery,
+            arrays,
+            writes,
+            adc_shifts,
+            rails,
+            balance,
+            requests,
+        }
     }
 
     /// The table as kernels take it: what a unit hands on is its activity or, with `drive_bits`, the drive code of

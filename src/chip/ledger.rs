@@ -113,9 +113,17 @@ coded! {
         SumSquares = 26, "sum_squares";
         /// An optimiser looked at a cell: what is asked of it was computed, and a word of its own renewed if it has one.
         OptimiserSteps = 27, "optimiser_steps";
+        /// A code of a unit went into a pool.
+        Pooled = 28, "pooled";
+        /// A unit took its threshold off an accumulator.
+        ThresholdSubtractions = 29, "threshold_subtractions";
+        /// An accumulator, or the square of its table index, was added to a statistic of thresholds or gains.
+        StatisticAdds = 30, "statistic_adds";
+        /// A table of the softmax of outputs was looked up.
+        SoftmaxLookUps = 31, "softmax_look_ups";
         /// What a later program counts and no run of this one ever does.
         #[cfg(feature = "grown")]
-        Grown = 28, "grown";
+        Grown = 32, "grown";
     }
 }
 

@@ -79,7 +79,7 @@ impl Driver {
     /// once that sample has been read: it is handed the engine, the first sample's number in the batch and the
     /// list to extend.
     pub fn learn(&mut self, codes: &[u8], mut errors: impl FnMut(&Engine, usize, &mut Vec<i32>)) {
-        let inputs = self.engine.layers()[0].spec.inputs;
+        let inputs = self.engine.layers()[0].spec.sample_inputs();
         self.engine.begin_update();
         match self.learning.mode {
             UpdateMode::Accumulate | UpdateMode::Replay => {
@@ -145,7 +145,9 @@ mod tests {
     use crate::chip::crossbar::kernel::Backend;
     use crate::chip::engine::Phase;
     use crate::chip::hardware::{DitherBits, Hardware};
-    use crate::chip::layer::{Delivery, DrivenBy, InitialLevels, Layer, LayerSpec};
+    use crate::chip::layer::{
+        Delivery, DrivenBy, Homeostasis, InitialLevels, Layer, LayerSpec, Pool,
+    };
     use crate::chip::ledger::{During, Event};
     use crate::chip::population::Wiring;
     use crate::learn::error::Centre;
@@ -173,6 +175,9 @@ mod tests {
             weight_max_log2: 2,
             initial: InitialLevels::Uniform { gain_64ths: [64, 64] },
             constant_row: false,
+            convolution: None,
+            pool: Pool::None,
+            homeostasis: Homeostasis::OFF,
         };
         let dense = Route::RandomDense { shift: Some(0) };
         let first = match rule {

@@ -167,7 +167,7 @@ mod tests {
     use crate::chip::crossbar::kernel::Backend;
     use crate::chip::crossbar::layout::Layout;
     use crate::chip::hardware::{FloorKind, Window};
-    use crate::chip::layer::{DrivenBy, InitialLevels, Layer, LayerSpec, Taps};
+    use crate::chip::layer::{DrivenBy, Homeostasis, InitialLevels, Layer, LayerSpec, Pool, Taps};
     use crate::chip::population::Wiring;
     use crate::num::fixed::LevelBits;
     use crate::num::tables::Activation;
@@ -245,6 +245,9 @@ mod tests {
             weight_max_log2: 0,
             initial: InitialLevels::Uniform { gain_64ths: [64, 64] },
             constant_row: false,
+            convolution: None,
+            pool: Pool::None,
+            homeostasis: Homeostasis::OFF,
         };
         let layers = [Wiring::Dual, Wiring::DualReadout].into_iter().zip(0u16..);
         let layers = layers

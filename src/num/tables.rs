@@ -6,6 +6,7 @@
 //! lsh      = least shift >= 0 with 2^(lut_bits - 1 + lsh) units >= 4 alpha (sigmoid), 4 (ReLU, identity)
 //! exact    : units are rational, so tables of ReLU and identity, and their lsh, are computed in integers:
 //!            lut_a[i] = floor( (2 * 255 * i * 2^p + D) / (2 D) ),  p = lsh + log2(weight_max) - level_bits,  D = 2^drive_bits - 1
+//! softmax  of accumulators, by look-up: `softmax`
 //! k        of a rate: `rate`;  factors of a layer: `scales`
 //! ```
 //!
@@ -20,15 +21,17 @@ mod policy;
 pub(crate) mod precise;
 mod rate;
 mod scales;
+mod softmax;
 mod unit;
 
 pub use gaussian::half_gaussian;
 pub use policy::PolicyTables;
 pub use rate::{Decay, LEVELS_SHIFT_MAX, Rate, RateOf, SHIFT_MAX};
 pub use scales::{Factor, Scales};
+pub use softmax::SoftmaxTables;
 pub use unit::{FullDrive, Unit};
 
-use super::fixed::{LutBits, narrow};
+use super::fixed::{LutBits, narrow, rsh};
 
 /// A finite number above 0, given by the user: a width, a rate, a factor.
 ///
@@ -78,6 +81,9 @@ pub enum Activation {
     /// `max(z, 0)` over its root mean square in the stream: code 32 where they are equal, derivative 1 where `z > 0`. No
     /// table: `chip::periphery::normalise`. For layers whose units drive others.
     Rms,
+    /// `z / 3` in 0..=1 where a standard deviation is 1: a table in steps of a [gain](crate::chip::layer::Gain) that is found,
+    /// 2^(lut_bits - 3) of them a deviation. Derivative 1 where `0 < z < 3`.
+    Ramp,
     /// The accumulator itself, derivative 1 everywhere. No table: what is read out is `acc_p - acc_n`, or `acc_p` alone. For a
     /// last layer.
     Accumulator,
@@ -88,7 +94,7 @@ impl Activation {
     fn steepness(self) -> f64 {
         match self {
             Self::Sigmoid(alpha) => 2.0 * alpha.0,
-            Self::Relu | Self::Identity | Self::Rms | Self::Accumulator => 1.0,
+            Self::Relu | Self::Identity | Self::Rms | Self::Ramp | Self::Accumulator => 1.0,
         }
     }
 
@@ -118,6 +124,7 @@ impl Lut {
             Activation::Sigmoid(alpha) => Self::sigmoid(alpha, bits, unit),
             Activation::Relu => Self::linear(bits, unit, |i| i > 0),
             Activation::Identity => Self::linear(bits, unit, |_| true),
+            Activation::Ramp => Self::ramp(bits),
             Activation::Rms | Activation::Accumulator => {
                 Self { activity: vec![], derivative: vec![], shift: 0 }
             }
@@ -130,8 +137,22 @@ impl Lut {
         match activation {
             Activation::Sigmoid(alpha) => Self::sigmoid_shift(alpha, bits, unit),
             Activation::Relu | Activation::Identity => Self::linear_shift(bits, unit),
-            Activation::Rms | Activation::Accumulator => 0,
+            Activation::Rms | Activation::Ramp | Activation::Accumulator => 0,
         }
+    }
+
+    /// `clamp(rsh(85 i, lut_bits - 3), 0, 255)`: 255 at 3 deviations. The step is found, not made: its shift is 0 here.
+    fn ramp(bits: LutBits) -> Self {
+        let half = 1i64 << (bits.get() - 1);
+        let entry = |i: i64| {
+            // 2 bits have half an index a deviation
+            let scaled = if bits.get() < 3 { 2 * 85 * i } else { rsh(85 * i, bits.get() - 3) };
+            narrow::<u8>(scaled.clamp(0, 255), "clamped to a byte")
+        };
+        let activity: Vec<u8> = (-half..half).map(entry).collect();
+        let inside = |&a: &u8| if 0 < a && a < 255 { 255 } else { 0 };
+        let derivative = activity.iter().map(inside).collect();
+        Self { activity, derivative, shift: 0 }
     }
 
     fn sigmoid_shift(alpha: Positive, bits: LutBits, unit: Unit) -> u32 {

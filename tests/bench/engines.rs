@@ -19,7 +19,7 @@ use dalean::chip::crossbar::kernel::Backend;
 use dalean::chip::engine::tick::{Command, More, Network, TileAdc, TileConfig};
 use dalean::chip::engine::{Engine, Operation, Phase, Side, Write};
 use dalean::chip::hardware::{Hardware, PulseCode, Timing};
-use dalean::chip::layer::{DrivenBy, InitialLevels, Layer, LayerSpec, Taps};
+use dalean::chip::layer::{DrivenBy, Homeostasis, InitialLevels, Layer, LayerSpec, Pool, Taps};
 use dalean::chip::population::Wiring;
 use dalean::num::draw::{Place, Site};
 use dalean::num::fixed::*;
@@ -77,6 +77,9 @@ fn layer(hardware: &Hardware) -> Layer {
         weight_max_log2: 2,
         initial: InitialLevels::Uniform { gain_64ths: [64, 64] },
         constant_row: false,
+        convolution: None,
+        pool: Pool::None,
+        homeostasis: Homeostasis::OFF,
     };
     let words = (0..SIDE).map(|unit| u16::try_from(unit % WORDS).unwrap()).collect();
     Layer::new(0, spec, Taps { width: WORDS, per_unit: 1, words, shift: 0 }, hardware)

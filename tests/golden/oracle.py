@@ -442,8 +442,10 @@ class Net:
         return (q + r) >> D
 
     def write(self, l, p, total):
+        self.program(l, p, self.stochastic(total * self.s["mantissa"], self.k[l] - self.s["residual_bits"], l, p))
+
+    def program(self, l, p, inc):
         s, F, dm = self.s, self.s["residual_bits"], self.s["d_max"]
-        inc = self.stochastic(total * s["mantissa"], self.k[l] - F, l, p)
         self.writes[l, p] += 1
         before, dead = self.level[l, p], self.pruned[l, p].copy()
         if F:

@@ -16,7 +16,9 @@ pub use adam::Adam;
 pub use momentum::Momentum;
 
 use super::StripMut;
-use super::kernel::{Draws, Half, Kernel, SignLaw, WriteCounts, WriteLaw, is_driven, joined};
+use super::kernel::{
+    Draws, Half, Kernel, MEAN_BITS, SignLaw, WriteCounts, WriteLaw, is_driven, joined,
+};
 use super::layout::{BLOCK_ROWS, HALF_CELLS, HALF_COLUMNS, PANEL_COLUMNS};
 use super::pulses::Collector;
 use super::words::Words;
@@ -30,13 +32,22 @@ pub struct Form<'a> {
     pub means: Option<&'a [i32]>,
     /// Whether the squares of the sums are wanted.
     pub squares: bool,
+    /// Whether centred sums may be beyond 32 bits: those of more than [`SHORT_READS`] reads.
+    pub long: bool,
 }
+
+/// So many reads have centred sums of 32 bits, whatever they hold: 4096 x 4080 x 127 < 2^31.
+pub const SHORT_READS: usize = 4096;
+
+/// Sums of half blocks that 32 bits do not hold, with their places. Where they belong in the list of all, there is 0.
+pub type LongSums = Vec<(usize, Box<Half<i64>>)>;
 
 /// What is asked for by sums that were kept.
 #[derive(Debug)]
 pub enum Asks<'a> {
-    /// A pulse towards each that is loud, with a chance. Words are of 16 bits, whatever the chip rounds with.
-    Signs(SignLaw),
+    /// A pulse towards each that is loud, with a chance. Words are of 16 bits, whatever the chip rounds with. Beside it what is
+    /// loud among sums that 32 bits do not hold.
+    Signs(SignLaw, u64),
     /// Nothing.
     Nothing,
     /// As many pulses as they are rounded to. They may be 16 times as large as those of a batch.
@@ -53,16 +64,15 @@ impl Asks<'_> {
     /// Bits of a word.
     const fn bits(&self, rounding: DitherBits) -> DitherBits {
         match self {
-            Self::Signs(_) => DitherBits::Sixteen,
+            Self::Signs(..) => DitherBits::Sixteen,
             _ => rounding,
         }
     }
 
     /// What the sums of the half block at a place ask to be rounded, in 64 bits: a mantissa may take them beyond 32.
-    fn requests(&mut self, sums: &Half<i32>, at: usize) -> Half<i64> {
-        let mut requests = sums.map(i64::from);
+    fn requests(&mut self, mut requests: Half<i64>, at: usize) -> Half<i64> {
         match self {
-            Self::Signs(_) | Self::Nothing | Self::Narrow | Self::Sums => {}
+            Self::Signs(..) | Self::Nothing | Self::Narrow | Self::Sums => {}
             Self::Momentum(momentum, moments) => {
                 for (request, moment) in requests.iter_mut().zip(&mut moments[at..]) {
                     *moment = momentum.after(*moment, *request);
@@ -90,26 +100,34 @@ impl StripMut<'_> {
         gates: &[i8],
         form: Form<'_>,
         sums: &mut [i32],
-    ) -> u128 {
+    ) -> (u128, LongSums) {
         let blocks = self.layout.blocks();
-        let mut squares = 0;
+        let (mut squares, mut long) = (0, LongSums::new());
         if request.stride == 0 {
             sums.fill(0);
-            return squares;
+            return (squares, long);
         }
         for (half, gates) in gates.chunks_exact(HALF_COLUMNS * request.stride).enumerate() {
             let live = is_driven(gates);
             let centred = live && form.means.is_some();
             let totals = if centred { kernel.gate_totals(gates) } else { [0; _] };
             for (block, turned) in request.turned.iter().enumerate() {
-                let sums = half_of(sums, place(half, block, blocks));
+                let at = place(half, block, blocks);
+                let sums = half_of(sums, at);
                 match turned {
                     Some(turned) if live => kernel.accumulate(turned, request.stride, gates, sums),
                     _ => sums.fill(0),
                 }
                 if let (Some(means), true) = (form.means, live) {
                     let means = means[block * BLOCK_ROWS..].first_chunk().expect("whole blocks");
-                    kernel.centre(sums, means, &totals);
+                    if !form.long || stays_short(kernel, sums, &totals) {
+                        kernel.centre(sums, means, &totals);
+                    } else if let Some(beyond) = centre_long(sums, means, &totals) {
+                        let each = beyond.iter().map(|sum| u128::from(sum.unsigned_abs()).pow(2));
+                        squares += if form.squares { each.sum() } else { 0 };
+                        sums.fill(0);
+                        long.push((at, beyond));
+                    }
                 }
                 if form.squares && live {
                     let more = kernel.squares(sums, form.means.is_some());
@@ -117,7 +135,7 @@ impl StripMut<'_> {
                 }
             }
         }
-        squares
+        (squares, long)
     }
 
     /// Programs sums that were kept.
@@ -125,14 +143,14 @@ impl StripMut<'_> {
         &mut self,
         kernel: &Kernel,
         request: &WriteRequest<'_>,
-        sums: &[i32],
+        (sums, long): (&[i32], &LongSums),
         mut asks: Asks<'_>,
     ) -> Written {
         let Range { start, end } = self.panels();
         let columns = start * PANEL_COLUMNS..end * PANEL_COLUMNS;
         let mut collector = Collector::new(request.collect, self.layout, columns.clone());
         let mut counts = WriteCounts::default();
-        if matches!(asks, Asks::Nothing | Asks::Signs(SignLaw { chance: 0, .. })) {
+        if matches!(asks, Asks::Nothing | Asks::Signs(SignLaw { chance: 0, .. }, _)) {
             return Written { counts, collected: collector.finish(kernel) };
         }
         let bits = asks.bits(request.dither_bits);
@@ -144,10 +162,18 @@ impl StripMut<'_> {
             for half in 0..columns.len() / HALF_COLUMNS {
                 let (at, column) =
                     (place(half, block, blocks), columns.start + half * HALF_COLUMNS);
-                let sums = sums[at..].first_chunk().expect("a half block");
+                let mut sums: &Half<i32> = sums[at..].first_chunk().expect("a half block");
+                let beyond = long.iter().find(|(place, _)| *place == at).map(|(_, sums)| &**sums);
+                let held = beyond.map(|beyond| held(beyond, &asks));
+                if let Some(held) = &held {
+                    sums = held;
+                }
                 let mut cells = self.half(half, block);
                 cells.pulses = collector.half(kernel, (column, block));
-                let groups = if let Asks::Signs(law) = asks {
+                let groups = if let Asks::Signs(law, _) = asks {
+                    // what is held is loud, or 0
+                    let least = if beyond.is_some() { 1 } else { law.least };
+                    let law = SignLaw { least, ..law };
                     let groups = kernel.loud(sums, law.least);
                     if groups != 0 {
                         let law = SignLaw { groups, ..law };
@@ -160,7 +186,11 @@ impl StripMut<'_> {
                             kernel.program_signs(cells, sums, &law, words, request.write.ends());
                     }
                     groups
-                } else if let Asks::Narrow = asks {
+                } else if matches!(asks, Asks::Narrow)
+                    || (matches!(asks, Asks::Sums)
+                        && beyond.is_none()
+                        && fits(kernel, sums, &request))
+                {
                     let groups = kernel.may_move(sums, &request.write, bits.get());
                     if groups != 0 {
                         let law = WriteLaw { groups, ..request.write };
@@ -169,7 +199,8 @@ impl StripMut<'_> {
                     }
                     groups
                 } else {
-                    let requests = asks.requests(sums, at);
+                    let requests =
+                        asks.requests(beyond.map_or_else(|| sums.map(i64::from), |b| *b), at);
                     let groups = kernel.may_move(&requests, &request.write, bits.get());
                     if groups != 0 {
                         let law = WriteLaw { groups, ..request.write };
@@ -185,6 +216,54 @@ impl StripMut<'_> {
         }
         Written { counts, collected: collector.finish(kernel) }
     }
+}
+
+/// Whether centred sums are below 2^31 for certain: sums below 2^26 and gates that add up to little.
+fn stays_short(kernel: &Kernel, sums: &Half<i32>, totals: &[i32; HALF_COLUMNS]) -> bool {
+    let most = totals.iter().map(|total| total.unsigned_abs()).max().unwrap_or(0);
+    most <= TOTAL_SHORT && kernel.loud(sums, SUM_SHORT) == 0
+}
+
+/// Sums and totals of gates below which nothing centred goes beyond 32 bits: 16 x 2^26 + 4080 x 2^18 < 2^31.
+const SUM_SHORT: u32 = 1 << 26;
+const TOTAL_SHORT: u32 = 1 << 18;
+
+/// Takes means off in 64 bits; gives what 32 do not hold.
+fn centre_long(
+    sums: &mut Half<i32>,
+    means: &[i32; BLOCK_ROWS],
+    totals: &[i32; HALF_COLUMNS],
+) -> Option<Box<Half<i64>>> {
+    let mut centred = Box::new([0i64; _]);
+    let rows = sums.as_chunks::<HALF_COLUMNS>().0.iter().zip(means);
+    for ((sums, &mean), out) in rows.zip(centred.as_chunks_mut::<HALF_COLUMNS>().0) {
+        for ((out, &sum), &total) in out.iter_mut().zip(sums).zip(totals) {
+            *out = (i64::from(sum) << MEAN_BITS) - i64::from(mean) * i64::from(total);
+        }
+    }
+    // the least number of 32 bits has no opposite
+    let short = -i64::from(i32::MAX)..=i64::from(i32::MAX);
+    if centred.iter().any(|sum| !short.contains(sum)) {
+        return Some(centred);
+    }
+    for (sum, &centred) in sums.iter_mut().zip(centred.iter()) {
+        *sum = i32::try_from(centred).expect("just looked at");
+    }
+    None
+}
+
+/// What stands for sums beyond 32 bits where only their sign, and whether they are loud, is asked for.
+fn held(beyond: &Half<i64>, asks: &Asks<'_>) -> Half<i32> {
+    let least = if let Asks::Signs(_, least) = asks { *least } else { 0 };
+    beyond.map(|sum| match sum.unsigned_abs() >= least {
+        true => i32::try_from(sum.signum()).expect("-1..=1") * i32::MAX,
+        false => 0,
+    })
+}
+
+/// Whether sums times their mantissa fit 32 bits, and so does their shift.
+fn fits(kernel: &Kernel, sums: &Half<i32>, request: &WriteRequest<'_>) -> bool {
+    request.write.shift <= 31 && kernel.loud(sums, 1 << 27) == 0
 }
 
 /// Place of a half block of a strip of panels.

@@ -16,6 +16,7 @@ impl Engine {
         if self.phase != Phase::Evaluation {
             return;
         }
+        let reads = self.reads(layer);
         let this = &self.layers[layer];
         let levels = self.row_sums[layer]
             .get_or_insert_with(|| this.arrays.iter().map(|array| array.row_sums()).collect());
@@ -26,7 +27,7 @@ impl Engine {
                 let source = this.spec.drives_of(pathway.source);
                 let bank = usize::from(pathway.polarity == Polarity::Inhibits);
                 let drives = &self.registers[layer].drives[source.index()];
-                let blocks = drives.chunks_exact(self.samples * BLOCK_ROWS);
+                let blocks = drives.chunks_exact(reads * BLOCK_ROWS);
                 let sum: i64 = blocks
                     .zip(levels[at].chunks(BLOCK_ROWS))
                     .map(|(codes, levels)| {

@@ -44,7 +44,9 @@ impl Engine {
         assert!(samples.is_empty() || samples.start >= pending, "sums wait to be programmed");
         let bits = self.hardware.digital.error_bits;
         let registers = &mut self.registers[layer];
-        let stride = stride_of(self.samples);
+        let positions = this.spec.positions();
+        let (loaded, reads) = (self.samples * positions, samples.len() * positions);
+        let stride = stride_of(loaded);
         let blocks = units.div_ceil(BLOCK_ROWS);
         let (mut saturated_words, mut saturated_gates) = (0, [0; 2]);
         for &target in wiring.targets() {
@@ -55,7 +57,7 @@ impl Engine {
         let inside = i64::from(largest) <= rail(bits.get());
         let all = inside && samples == (0..self.samples);
         // [block] -> (target, derivatives, gates)
-        let size = self.samples * BLOCK_ROWS;
+        let size = loaded * BLOCK_ROWS;
         let mut parts: Vec<_> = (0..blocks).map(|block| (block, (block, Vec::new()))).collect();
         for (target, gates) in [Stream::P, Stream::N].into_iter().zip(&mut registers.gates) {
             let slopes = registers.derivatives[target.index()].chunks_exact(size.max(1));
@@ -66,10 +68,13 @@ impl Engine {
                 }
             }
         }
-        let work = samples.len() * units * wiring.targets().len() * MOVE;
+        let work = reads * units * wiring.targets().len() * MOVE;
         let seen = each(&mut self.team, work, blocks, parts, |kernel, (block, part)| {
             let mut errors = vec![0; samples.len() * BLOCK_ROWS];
             let saturated_words = latch(kernel, taps, bits, block, words, &mut errors);
+            if positions > 1 {
+                errors = repeated(&errors, positions);
+            }
             let mut saturated_gates = [0; 2];
             for (target, slopes, gates) in part {
                 let negate = target == Stream::N;
@@ -79,7 +84,8 @@ impl Engine {
                     continue;
                 }
                 let sign = if negate { -1 } else { 1 };
-                for (sample, errors) in samples.clone().zip(errors.chunks_exact(BLOCK_ROWS)) {
+                let reads = samples.start * positions..samples.end * positions;
+                for (sample, errors) in reads.zip(errors.chunks_exact(BLOCK_ROWS)) {
                     for (unit, &error) in errors.iter().enumerate() {
                         let slope = slopes[sample * BLOCK_ROWS + unit];
                         let (u, saturated) = periphery::gate(sign * error, slope, bits);
@@ -99,14 +105,24 @@ impl Engine {
             let code = Self::code_of(wiring, target);
             let during = During::Error;
             self.charge(layer, code, during, Event::BusWords, width * count);
-            self.charge(layer, code, during, Event::Multiplies, units as u64 * count);
-            self.charge(layer, code, during, Event::SramBits, units as u64 * count * 8);
+            let gates = (units * reads) as u64;
+            self.charge(layer, code, during, Event::Multiplies, gates);
+            self.charge(layer, code, during, Event::SramBits, gates * 8);
             let saturated = saturated_gates[target.index()];
             self.charge(layer, code, during, Event::SaturatedGates, saturated);
         }
         let code = Self::code_of(wiring, Stream::P);
         self.charge(layer, code, During::Error, Event::SaturatedErrors, saturated_words);
     }
+}
+
+/// Words of samples, `[sample][64]`, as every position of a sample hears them.
+fn repeated(errors: &[i16], positions: usize) -> Vec<i16> {
+    let mut all = Vec::with_capacity(errors.len() * positions);
+    for errors in errors.as_chunks::<BLOCK_ROWS>().0 {
+        (0..positions).for_each(|_| all.extend_from_slice(errors));
+    }
+    all
 }
 
 /// Gates of some samples of `loaded` ones, packed as an update of just these takes them.

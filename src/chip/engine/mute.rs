@@ -25,15 +25,20 @@ pub(super) struct Said {
 
 impl Engine {
     pub(super) fn note_said(&mut self, layer: usize) {
-        let said = &mut self.said[layer];
-        if self.phase != Phase::Evaluation || said.differs {
+        if self.phase != Phase::Evaluation || self.said[layer].differs {
             return;
         }
         let (samples, units) = (self.samples, self.layers[layer].layout.columns);
+        let positions = self.layers[layer].spec.positions();
+        let direct = self.hands_on_directly(layer);
+        let said = &mut self.said[layer];
         let (head, tail) = self.registers.split_at(layer + 1);
         for &target in self.layers[layer].spec.wiring.targets() {
             let (at, first) = (target.index(), &mut said.first[target.index()]);
             said.differs |= match (tail.first(), &self.units[layer]) {
+                (Some(_), _) if !direct => {
+                    differs_somewhere(first, &head[layer].maps[at], [samples, positions, units])
+                }
                 (Some(next), _) => differs(first, &next.drives[at], samples, units),
                 (None, Units::Kept) => {
                     differs(first, &head[layer].accumulators[at], samples, units)
@@ -50,6 +55,33 @@ impl Engine {
         let said = std::mem::replace(&mut self.said, fresh);
         said.iter().map(|said| said.samples > 1 && !said.differs).collect()
     }
+}
+
+/// Whether a map differs from the first one anywhere: `[block][sample][position][64]`.
+fn differs_somewhere(
+    first: &mut Vec<i64>,
+    all: &[u8],
+    [samples, positions, units]: [usize; 3],
+) -> bool {
+    let mut differs = false;
+    let size = positions * BLOCK_ROWS;
+    let mut from = 0;
+    for (block, maps) in all.chunks_exact(samples * size).enumerate() {
+        let live = (units - block * BLOCK_ROWS).min(BLOCK_ROWS);
+        for map in maps.chunks_exact(size) {
+            let codes = map.chunks_exact(BLOCK_ROWS).flat_map(|codes| &codes[..live]);
+            let codes = codes.map(|&code| i64::from(code));
+            if first.len() == from {
+                first.extend(codes.clone());
+            }
+            differs |= !codes.eq(first[from..from + positions * live].iter().copied());
+            if differs {
+                return true;
+            }
+        }
+        from += positions * live;
+    }
+    differs
 }
 
 /// Whether a sample differs from the first one, which is noted where there is none yet: `[block][sample][64]`.

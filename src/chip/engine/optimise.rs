@@ -16,11 +16,12 @@ use super::each::each;
 use super::update::{Ready, SUM_BITS, strips};
 use crate::chip::crossbar::kernel::{MEAN_BITS, SignLaw};
 use crate::chip::crossbar::layout::{BLOCK_ROWS, PANEL_COLUMNS};
-use crate::chip::crossbar::{Adam, Asks, Crossbar, Form, Momentum, Written};
+use crate::chip::crossbar::{Adam, Asks, Crossbar, Form, Momentum, SHORT_READS, Written};
 use crate::chip::layer::requests::{dead_zone, first_mean, next_mean};
 use crate::chip::layer::{Optimiser, Requests};
 use crate::chip::ledger::{During, Event};
 use crate::chip::population::Polarity;
+use crate::num::fixed::log2_ceil;
 use crate::num::tables::Scales;
 
 /// Bits of the mean of a row.
@@ -48,8 +49,7 @@ impl Engine {
     pub fn set_centred(&mut self, windows_log2: &[Option<u32>]) {
         assert_eq!(windows_log2.len(), self.layers.len(), "one window a layer");
         for (layer, &window) in self.layers.iter_mut().zip(windows_log2) {
-            let (sets, rows) = (layer.spec.drive_sets(), layer.layout.rows_padded());
-            layer.requests.set_window(window, sets, rows);
+            layer.requests.set_window(window, &layer.spec, layer.layout.rows_padded());
         }
     }
 
@@ -63,7 +63,10 @@ impl Engine {
         let first = self.layers[layer].writes[0] == 0;
         let codes = self.layers[layer].requests.window_log2.map(|_| self.codes(layer, ready));
         let this = &mut self.layers[layer];
-        let samples = ready.samples as i64;
+        // what a mean is taken over: samples, or the pixels below the windows of all of them
+        let pixels = this.spec.convolution.map_or(1, |shape| shape.height * shape.width);
+        let samples = (ready.samples / this.spec.positions() * pixels) as i64;
+        let pixels_log2 = log2_ceil(pixels as u64);
         if let (Some(codes), true) = (&codes, first) {
             move_means(&mut this.requests.means, codes, |_, codes| first_mean(codes, samples));
         }
@@ -72,6 +75,7 @@ impl Engine {
         let panels = this.layout.panels();
         let (requests, layout) = (&this.requests, this.layout);
         let window = requests.window_log2;
+        let row_means = requests.by_row(&this.spec, layout.rows_padded());
         let parts = strips(&mut this.arrays);
         let strip_cells = Crossbar::STRIP_PANELS * layout.panel_cells();
         kept.resize(ready.arrays.len() * layout.cells_padded(), 0);
@@ -81,25 +85,27 @@ impl Engine {
         let parts = parts.map(|((place, (array, strip)), sums)| (place, (array, strip, sums)));
         let formed = each(&mut self.team, work, panels, parts.collect(), |kernel, part| {
             let (array, strip, sums) = part;
-            let means = window.map(|_| &requests.means[ready.arrays[array].set][..]);
+            let means = window.map(|_| &row_means[ready.arrays[array].set][..]);
             let negate = ready.arrays[array].negate;
-            let form = Form { means, squares: looks_at(requests.optimiser, negate) };
+            let long = ready.samples > SHORT_READS;
+            let form = Form { means, squares: looks_at(requests.optimiser, negate), long };
             let gates = ready.gates(array, &strip);
-            let squares = strip.form(kernel, &ready.request(array), gates, form, sums);
-            (strip.panels().start, (array, strip, &*sums), squares)
+            let (squares, long) = strip.form(kernel, &ready.request(array), gates, form, sums);
+            (strip.panels().start, (array, strip, &*sums, long), squares)
         });
         let squares: u128 = formed.iter().map(|(.., squares)| squares).sum();
         let finer = if window.is_some() { MEAN_BITS } else { 0 };
         let pairs = this.spec.wiring.shift_extra();
         let chance = shift + pairs;
         let (mut shift, mut scale) = (shift + pairs + finer, self.mantissas[layer]);
-        let (mut least, mut silent) = (1, false);
+        let (mut least, mut silent) = (1u64, false);
         let Requests { optimiser, followed, words, .. } = &mut this.requests;
         let optimiser = *optimiser;
         match optimiser {
             Optimiser::Plain | Optimiser::Sign { dead_zone: false } => {}
             Optimiser::Sign { dead_zone: true } => {
-                least = 1 << dead_zone(squares, (layout.cells() * ready.arrays.len()) as u64);
+                let zone = dead_zone(squares, (layout.cells() * ready.arrays.len()) as u64);
+                least = 1u64 << zone;
             }
             Optimiser::Rms => {
                 let scales = self.scales.as_ref().expect("made with the optimiser");
@@ -121,7 +127,7 @@ impl Engine {
         let parts = formed.into_iter().zip(words);
         let parts = parts.map(|((place, part, _), words)| (place, (part, words))).collect();
         let written = each(&mut self.team, work, panels, parts, |kernel, part| {
-            let ((array, mut strip, sums), [one, two]) = part;
+            let ((array, mut strip, sums, long), [one, two]) = part;
             let mut request = ready.request(array);
             request.write.shift = shift;
             request.write.mantissa = i32::try_from(scale).expect("1..=15");
@@ -130,7 +136,8 @@ impl Engine {
                 Optimiser::Plain | Optimiser::Rms if finer == 0 && shift <= 31 => Asks::Narrow,
                 Optimiser::Plain | Optimiser::Rms => Asks::Sums,
                 Optimiser::Sign { .. } => {
-                    Asks::Signs(SignLaw::new(least, chance, request.write.negate))
+                    let short = u32::try_from(least).unwrap_or(u32::MAX);
+                    Asks::Signs(SignLaw::new(short, chance, request.write.negate), least)
                 }
                 Optimiser::Momentum { decay } => Asks::Momentum(Momentum { decay }, one),
                 Optimiser::AdamFx { first_decay, second_decay } => {
@@ -139,12 +146,12 @@ impl Engine {
                     Asks::Adam(adam, [one, two])
                 }
             };
-            let written = strip.write_kept(kernel, &request, sums, asks);
+            let written = strip.write_kept(kernel, &request, (sums, &long), asks);
             (array, strip.panels().start * PANEL_COLUMNS, written)
         });
         if let (Some(codes), Some(window), false) = (&codes, window, first) {
             let requests = &mut this.requests;
-            let next = |mean, codes| next_mean(mean, codes, samples, window);
+            let next = |mean, codes| next_mean(mean, codes, samples, window + pixels_log2);
             move_means(&mut requests.means, codes, next);
         }
         self.registers[layer].sums = kept;
@@ -154,7 +161,25 @@ impl Engine {
     /// Sums of the drive codes of each row, padded, by set of drives.
     fn codes(&mut self, layer: usize, ready: &Ready<'_>) -> [Vec<i64>; 2] {
         let mut codes = [vec![], vec![]];
-        let sets = self.layers[layer].spec.drive_sets();
+        let spec = &self.layers[layer].spec;
+        let sets = spec.drive_sets();
+        if let Some(shape) = spec.convolution {
+            let samples = ready.samples / shape.positions();
+            if samples == 0 {
+                // a write of nothing
+                let rows = shape.channels + usize::from(spec.constant_row);
+                sets.iter().for_each(|set| codes[set.index()] = vec![0; rows]);
+                return codes;
+            }
+            assert!(samples == self.samples, "means are taken of all that is loaded");
+            let pixels = (samples * shape.height * shape.width) as i64;
+            let constant = pixels * i64::from(self.hardware.drive.bits.code_max());
+            for set in sets {
+                codes[set.index()] = self.channel_sums(layer, set.index());
+                codes[set.index()].extend(spec.constant_row.then_some(constant));
+            }
+            return codes;
+        }
         let blocks: Vec<_> = ready.turned.iter().flatten().copied().collect();
         let sums = self.team.alone(blocks, |kernel, block| {
             block.map_or([0; BLOCK_ROWS], |turned| kernel.drive_totals(turned, ready.stride))
@@ -195,7 +220,9 @@ impl Engine {
             self.charge(layer, code, During::Update, Event::RowMeans, count);
             self.charge(layer, code, During::Update, Event::SramBits, MEAN_WIDTH * count);
         };
-        // used by every array in each pass that sees it, and kept once a set of drives
+        // used by every array in each pass that sees it, and kept once a set of drives, or a channel of it
+        let constant = usize::from(spec.constant_row);
+        let kept = spec.convolution.map_or(rows, |shape| (shape.channels + constant) as u64);
         let pathways = spec.wiring.pathways();
         for pathway in pathways {
             let looks = looks_at(optimiser, pathway.polarity == Polarity::Inhibits);
@@ -203,7 +230,7 @@ impl Engine {
         }
         for &set in spec.drive_sets() {
             let first = pathways.iter().find(|pathway| spec.drives_of(pathway.source) == set);
-            means(first.expect("drives drive an array").code, rows);
+            means(first.expect("drives drive an array").code, kept);
         }
     }
 }

@@ -5,7 +5,9 @@ use super::{Engine, Operation, Phase, Side, Write};
 use crate::chip::crossbar::kernel::Backend;
 use crate::chip::hardware::timing::{PulseCode, Timing};
 use crate::chip::hardware::{Adc, AdcRange, Hardware, Subtract};
-use crate::chip::layer::{Delivery, DrivenBy, InitialLevels, Layer, LayerSpec, Taps};
+use crate::chip::layer::{
+    Delivery, DrivenBy, Homeostasis, InitialLevels, Layer, LayerSpec, Pool, Taps,
+};
 use crate::chip::population::{Stream, Wiring};
 use crate::num::fixed::AdcBits;
 use crate::num::tables::Activation;
@@ -55,6 +57,9 @@ fn engine(adc: Adc, backend: Backend) -> Engine {
         weight_max_log2: 2,
         initial: InitialLevels::Uniform { gain_64ths: [64, 64] },
         constant_row: false,
+        convolution: None,
+        pool: Pool::None,
+        homeostasis: Homeostasis::OFF,
     };
     let words = (0..UNITS).map(|unit| (unit % 5) as u16).collect();
     let taps = Taps { width: 5, per_unit: 1, words, shift: 0 };

@@ -103,7 +103,7 @@ mod tests {
     use crate::chip::crossbar::kernel::Backend;
     use crate::chip::engine::{Operation, Side, Write};
     use crate::chip::hardware::Hardware;
-    use crate::chip::layer::{DrivenBy, InitialLevels, LayerSpec, Taps};
+    use crate::chip::layer::{DrivenBy, Homeostasis, InitialLevels, LayerSpec, Pool, Taps};
 
     use crate::chip::population::Wiring;
     use crate::num::tables::Activation;
@@ -134,6 +134,9 @@ mod tests {
             weight_max_log2: 2,
             initial: InitialLevels::Uniform { gain_64ths: [64, 64] },
             constant_row: false,
+            convolution: None,
+            pool: Pool::None,
+            homeostasis: Homeostasis::OFF,
         };
         let words = (0..150).map(|unit| unit % 10).collect();
         let taps = Taps { width: 10, per_unit: 1, words, shift: 0 };

@@ -33,9 +33,10 @@ impl Engine {
             Write::Add => {
                 assert_eq!(*pending, samples.start, "samples are added in order");
                 *pending = samples.end;
-                self.charge_accumulate(layer, samples.len());
+                let reads = self.reads_of(layer, &samples).len();
+                self.charge_accumulate(layer, reads);
                 // the sum of a cell is read and stored again
-                self.charge_cells(layer, Event::SramBits, 2 * SUM_BITS * samples.len() as u64);
+                self.charge_cells(layer, Event::SramBits, 2 * SUM_BITS * reads as u64);
                 self.time(|schedule, cycles| schedule.add(cycles, layer, &samples));
             }
             Write::Program => {
@@ -55,7 +56,13 @@ impl Engine {
                     self.row_sums[layer] = None;
                     return self.write_trains(layer, samples.start, shift, slots_log2);
                 }
-                self.charge_accumulate(layer, 1);
+                let reads = self.layers[layer].spec.positions();
+                self.charge_accumulate(layer, reads);
+                if reads > 1 {
+                    // sums of more than one product lie in memory until they are written
+                    let sums = 2 * SUM_BITS * (reads as u64 + 1);
+                    self.charge_cells(layer, Event::SramBits, sums);
+                }
                 self.program(layer, samples.clone(), shift);
                 self.charge_time(layer, write, &samples);
             }
@@ -125,6 +132,7 @@ impl Engine {
         samples: &Range<usize>,
         shift: u32,
     ) -> Vec<(usize, WriteCounts)> {
+        let samples = &self.reads_of(layer, samples);
         let stride = stride_of(samples.len());
         let sets = self.layers[layer].spec.drive_sets();
         // taken, so that cells can be written while they are read
@@ -173,7 +181,7 @@ impl Engine {
         let this = &self.layers[layer];
         let wiring = this.spec.wiring;
         let of = |target: Stream, polarity| {
-            let gates = gates_of(&registers[target.index()], self.samples, samples);
+            let gates = gates_of(&registers[target.index()], self.reads(layer), samples);
             if self.potentiation_only { rectified(&gates, polarity) } else { gates }
         };
         let gates =
@@ -235,10 +243,10 @@ impl Engine {
         turned: &mut AVec<u8>,
     ) -> Vec<bool> {
         let size = BLOCK_ROWS * stride_of(samples.len());
-        let blocks = self.layers[layer].layout.blocks();
+        let (blocks, reads) = (self.layers[layer].layout.blocks(), self.reads(layer));
         turned.resize(blocks * size, 0);
         let drives = &self.registers[layer].drives[set.index()];
-        let drives = drives.chunks_exact((self.samples * BLOCK_ROWS).max(1));
+        let drives = drives.chunks_exact((reads * BLOCK_ROWS).max(1));
         let turned = turned.chunks_exact_mut(size.max(1));
         let parts = drives.zip(turned).enumerate().collect();
         each(&mut self.team, blocks * size * MOVE, blocks, parts, |kernel, (codes, turned)| {

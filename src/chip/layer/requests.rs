@@ -14,8 +14,11 @@
 //! cell takes the sign of its own polarity, with `k + 1`. State: A. See docs/MODEL.md, 3.10.
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
+use std::borrow::Cow;
+
 use crate::chip::crossbar::kernel::MEAN_BITS;
 use crate::chip::crossbar::layout::{BLOCK_ROWS, HALF_CELLS, HALF_COLUMNS, Layout};
+use crate::chip::layer::LayerSpec;
 use crate::chip::population::{Stream, Wiring};
 use crate::chip::state::{Piece, Section, StateError, Visitor};
 use crate::num::fixed::rsh;
@@ -97,7 +100,8 @@ pub struct Requests {
     pub optimiser: Optimiser,
     /// `w`, where updates are centred: that many samples, as a power of two, move a mean by what it is off.
     pub window_log2: Option<u32>,
-    /// `A` by set of drives and row, padded; empty where updates are not centred.
+    /// `A` by set of drives and row, padded, or channel of what a window moves over, the constant row behind; empty where
+    /// updates are not centred.
     pub(crate) means: [Vec<i32>; 2],
     /// The scale of the layer, of `rms`.
     pub(crate) followed: Followed,
@@ -130,17 +134,32 @@ impl Requests {
         self.words = wiring.pathways().iter().map(|_| [plane(0), plane(1)]).collect();
     }
 
-    /// Centres updates with a window, over so many padded rows of these sets of drives.
-    pub(crate) fn set_window(&mut self, window_log2: Option<u32>, sets: &[Stream], rows: usize) {
+    /// Centres updates with a window, of a layer of so many padded rows.
+    pub(crate) fn set_window(&mut self, window_log2: Option<u32>, spec: &LayerSpec, rows: usize) {
         self.window_log2 = window_log2;
         self.means = [vec![], vec![]];
+        let channels = spec.convolution.map(|s| s.channels + usize::from(spec.constant_row));
         if window_log2.is_some() {
-            sets.iter().for_each(|set| self.means[set.index()] = vec![0; rows]);
+            let means = vec![0; channels.unwrap_or(rows)];
+            spec.drive_sets().iter().for_each(|set| self.means[set.index()] = means.clone());
         }
     }
 
-    /// Mean drives of the rows of a set, with 4 fractional bits; empty where updates are not centred. Rows that do not
-    /// exist have 0.
+    /// The mean drive of each row, padded, by set of drives; nothing where updates are not centred.
+    pub(crate) fn by_row(&self, spec: &LayerSpec, rows: usize) -> [Cow<'_, [i32]>; 2] {
+        self.means.each_ref().map(|means| match spec.convolution {
+            Some(shape) if !means.is_empty() => {
+                let windows = means[..shape.channels].iter().cycle().take(spec.inputs);
+                let mut by_row: Vec<_> = windows.chain(&means[shape.channels..]).copied().collect();
+                by_row.resize(rows, 0);
+                Cow::Owned(by_row)
+            }
+            _ => Cow::Borrowed(&means[..]),
+        })
+    }
+
+    /// Mean drives of the rows of a set, with 4 fractional bits, of a convolution those of the channels below it; empty where
+    /// updates are not centred. Rows that do not exist have 0.
     #[must_use]
     pub fn means(&self, set: Stream) -> &[i32] {
         &self.means[set.index()]
@@ -203,7 +222,9 @@ impl Requests {
             }
         }
         for (means, set) in self.means.iter_mut().zip(["p", "n"]) {
-            let Some(means) = means.get_mut(..layout.rows).filter(|means| !means.is_empty()) else {
+            // padded where they are of rows
+            let kept = means.len().min(layout.rows);
+            let Some(means) = means.get_mut(..kept).filter(|means| !means.is_empty()) else {
                 continue;
             };
             let piece = Piece {
@@ -246,8 +267,8 @@ pub fn next_mean(mean: i64, codes: i64, samples: i64, window_log2: u32) -> i64 {
 /// `t`: the least integer of at least 0 with `squares < cells 2^(2t+1)`.
 #[must_use]
 pub fn dead_zone(squares: u128, cells: u64) -> u32 {
-    // squares are at most cells 2^62
-    (0..32).find(|t| squares < u128::from(cells) << (2 * t + 1)).unwrap_or(32)
+    // sums are below 2^36
+    (0..40).find(|t| squares < u128::from(cells) << (2 * t + 1)).unwrap_or(40)
 }
 
 #[cfg(test)]

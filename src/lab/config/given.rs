@@ -6,12 +6,13 @@
 //! users get by saying nothing changes, the key is written into the resolved configuration instead.
 
 use super::{Config, ConfigError, Select, TrainOn};
+use crate::chip::crossbar::kernel::ConvShape;
 use crate::chip::hardware::{
     Adc, AdcRange, CellSpec, DigitalSpec, DitherBits, DitherPattern, DriveSpec, FloorKind,
     HardwareSpec, PulseCode, Subtract, TileSpec, Timing, WriteScheme, WriteSpec,
 };
-use crate::chip::layer::{DrivenBy, InitialLevels, LayerSpec, Optimiser};
-use crate::learn::error::Centre;
+use crate::chip::layer::{DrivenBy, Gain, Homeostasis, InitialLevels, LayerSpec, Optimiser, Pool};
+use crate::learn::error::{Centre, OutputError};
 use crate::learn::network::NetworkSpec;
 use crate::learn::route::Route;
 use crate::learn::rule::{Rule, UpdateMode};
@@ -73,6 +74,13 @@ const FROZEN: &[(&str, &str)] = &[
     ("layer.mantissa", "1"),
     ("layer.optimiser", "plain"),
     ("layer.centred", "false"),
+    ("layer.pool", "none"),
+    ("layer.threshold", "false"),
+    ("layer.gain", "table"),
+    ("layer.homeostasis_window_log2", "9"),
+    ("learning.error", "one_vs_all"),
+    ("actor.error", "one_vs_all"),
+    ("critic.error", "one_vs_all"),
 ];
 
 /// Key and word.
@@ -219,6 +227,7 @@ impl List {
             layers,
             rule,
             mode,
+            error,
             centre,
             route,
             batch,
@@ -274,6 +283,11 @@ impl List {
         };
         self.put(&format!("{head}.rule"), rule);
         self.put(&format!("{head}.mode"), mode);
+        let error = match error {
+            OutputError::OneVsAll => "one_vs_all".to_owned(),
+            OutputError::Softmax { temperature } => format!("softmax {}", temperature.get()),
+        };
+        self.put(&format!("{head}.error"), error);
         self.put(&format!("{head}.centre"), centre);
         self.put(&format!("{head}.route"), route);
         self.put(&format!("{head}.batch"), batch.get());
@@ -306,6 +320,9 @@ impl List {
             weight_max_log2,
             initial,
             constant_row,
+            convolution,
+            pool,
+            homeostasis,
         } = layer;
         let mut put = |key: &str, word: &dyn ToString| {
             self.put(&format!("layer{number}.{key}"), word.to_string());
@@ -326,6 +343,7 @@ impl List {
             Activation::Identity => "identity".into(),
             Activation::Rms => "rms".into(),
             Activation::Accumulator => "accumulator".into(),
+            Activation::Ramp => "ramp".into(),
         };
         put("activation", &activation);
         put("weight_max_log2", weight_max_log2);
@@ -336,6 +354,23 @@ impl List {
             }
         }
         put("constant_row", constant_row);
+        if let Some(ConvShape { channels, height, width, side, stride, pad }) = convolution {
+            let sizes = [channels, height, width, side, stride, pad].map(ToString::to_string);
+            put("convolution", &sizes.join(" "));
+        }
+        match pool {
+            Pool::None => put("pool", &"none"),
+            Pool::Average { side } => put("pool", &format!("average {side}")),
+            Pool::Max { side } => put("pool", &format!("max {side}")),
+        }
+        let Homeostasis { threshold, gain, window_log2 } = homeostasis;
+        put("threshold", threshold);
+        match gain {
+            Gain::Table => put("gain", &"table"),
+            Gain::Fixed { spread } => put("gain", &format!("fixed {spread}")),
+            Gain::Tracking => put("gain", &"tracking"),
+        }
+        put("homeostasis_window_log2", window_log2);
     }
 
     fn chip(&mut self, hardware: &HardwareSpec) {

@@ -5,7 +5,7 @@ use super::{NetworkError, NetworkSpec};
 use crate::chip::hardware::{Adc, Hardware, WriteScheme};
 use crate::chip::layer::{self, DrivenBy, InitialLevels, LayerSpec, Optimiser};
 use crate::chip::population::Wiring;
-use crate::learn::error::Centre;
+use crate::learn::error::{Centre, OutputError};
 use crate::learn::route::Route;
 use crate::learn::rule::{Readout, Rule, UpdateMode};
 use crate::num::fixed::OutOfRange;
@@ -24,6 +24,8 @@ const TAPS_MAX: usize = 4;
 /// Shift of a sum of words, at most: nothing is left of it beyond.
 const TAP_SHIFT_MAX: u32 = 16;
 
+mod homeostasis;
+
 type Checked = Result<(), NetworkError>;
 
 fn misfit(key: &'static str, found: impl ToString, allowed: impl ToString) -> Checked {
@@ -37,8 +39,10 @@ pub(super) fn check(network: &NetworkSpec, hardware: &Hardware) -> Checked {
     tables(network, hardware)?;
     rule(network, hardware)?;
     activations(network)?;
+    homeostasis::check(network, hardware)?;
     wiring(network)?;
     batches(network, hardware)?;
+    convolutions(network, hardware)?;
     routes(network)?;
     optimisers(network, hardware)?;
     rates(network, hardware)
@@ -52,9 +56,19 @@ fn sizes(network: &NetworkSpec) -> Checked {
     if network.layers.iter().any(|layer| layer.inputs == 0) {
         return misfit("network.hidden", "has a layer of 0 inputs", "give it at least 1 value");
     }
+    let last = network.layers.len().saturating_sub(1);
+    for (at, layer) in network.layers.iter().enumerate() {
+        if let Some((found, allowed)) = layer.misshapen() {
+            return misfit("network.channels", format!("makes layer {at}, which {found}"), allowed);
+        }
+        if layer.convolution.is_some() && at == last {
+            let allowed = "outputs are dense: give it a dense layer behind";
+            return misfit("network.channels", "makes the output a convolution", allowed);
+        }
+    }
     for (at, pair) in network.layers.windows(2).enumerate() {
-        let (units, inputs) = (pair[0].units, pair[1].inputs);
-        if units != inputs {
+        let (units, inputs) = (pair[0].sample_outputs(), pair[1].sample_inputs());
+        if units != inputs || !pair[1].meets(&pair[0]) {
             let found =
                 format!("gives layer {at} {units} units, and layer {} {inputs} inputs", at + 1);
             return misfit(
@@ -153,13 +167,28 @@ fn activations(network: &NetworkSpec) -> Checked {
                 let found = format!("keeps the accumulators of layer {at}");
                 return misfit("network.activation", found, allowed);
             }
-            Activation::Accumulator if network.centre != Centre::None => {
+            Activation::Accumulator
+                if network.error == OutputError::OneVsAll && network.centre != Centre::None =>
+            {
                 let allowed = "where accumulators are read out, the task hands the errors and nothing is subtracted: use \
                                learning.centre = \"none\"";
                 return misfit("learning.centre", "is not \"none\"", allowed);
             }
             _ => {}
         }
+    }
+    if network.error == OutputError::OneVsAll {
+        return Ok(());
+    }
+    if network.layers[last].activation != Activation::Accumulator {
+        let allowed =
+            "accumulators are looked up, and no activities: outputs of such a network keep theirs";
+        return misfit("learning.error", "is \"softmax\" beside outputs with a table", allowed);
+    }
+    if network.outputs() < 2 {
+        let allowed =
+            "a single output has nothing to share with; give it one a class, or use \"one_vs_all\"";
+        return misfit("learning.error", "is \"softmax\" of one output", allowed);
     }
     Ok(())
 }
@@ -168,7 +197,8 @@ fn activations(network: &NetworkSpec) -> Checked {
 fn wiring(network: &NetworkSpec) -> Checked {
     let last = network.layers.len() - 1;
     for (at, layer) in network.layers.iter().enumerate() {
-        let wanted = network.rule.wiring((at == last).then(|| Readout::of(layer.activation)));
+        let wanted =
+            network.rule.wiring((at == last).then(|| Readout::of(layer.activation, network.error)));
         if layer.wiring != wanted {
             let found =
                 format!("does not fit the arrays of layer {at}, which {}", wired(layer.wiring));
@@ -229,6 +259,55 @@ fn batches(network: &NetworkSpec, hardware: &Hardware) -> Checked {
         let allowed = "trains write one sample at a time; with hw.write.scheme = \"rank1\" use mode = \"replay\" or \
                        \"online\"";
         return misfit("learning.mode", "is \"accumulate\"", allowed);
+    }
+    Ok(())
+}
+
+/// Reads of a sum that 32 bits hold: 65,536 products of a drive and a gate.
+const READS_MAX: u64 = 65_536;
+
+/// What layers whose windows move over an image can do.
+fn convolutions(network: &NetworkSpec, hardware: &Hardware) -> Checked {
+    for (at, layer) in network.layers.iter().enumerate() {
+        if layer.convolution.is_none() {
+            continue;
+        }
+        let below = at.checked_sub(1).map(|below| network.layers[below].activation);
+        if layer.activation == Activation::Rms || below == Some(Activation::Rms) {
+            let allowed = "a read of a convolution is not normalised, and does not follow what is: give it a table";
+            return misfit("network.activation", format!("normalises around layer {at}"), allowed);
+        }
+        let positions = layer.positions() as u64;
+        let reads = u64::from(network.batch.get()).saturating_mul(positions);
+        if reads > READS_MAX {
+            let found = format!("is {}", network.batch.get());
+            let allowed = format!(
+                "layer {at} has {positions} positions, and a sum runs over {READS_MAX} reads at most: use a batch of {} or \
+                 fewer",
+                READS_MAX / positions
+            );
+            return misfit("learning.batch", found, allowed);
+        }
+        if network.rule == Rule::Bp {
+            let allowed = "back-propagation through convolutions is not built; use another rule, or leave network.channels out";
+            return misfit("learning.rule", "is \"bp\" beside convolutions", allowed);
+        }
+        if hardware.write.scheme != WriteScheme::Rounded {
+            let allowed = "a train writes one read of one sample, and a sample of a convolution has many: use \"rounded\"";
+            return misfit("hw.write.scheme", "is \"rank1\" beside convolutions", allowed);
+        }
+        let wide = matches!(
+            network.optimisers.get(at),
+            Some(Optimiser::Momentum { .. } | Optimiser::AdamFx { .. })
+        );
+        if wide && reads > crate::chip::crossbar::SHORT_READS as u64 {
+            let found = format!("keeps words of layer {at} that are for sums of few reads");
+            let allowed = format!(
+                "with momentum or adam_fx a sum runs over {} reads at most: use \"rms\", \"sign\" or \"plain\"",
+                crate::chip::crossbar::SHORT_READS
+            );
+            return misfit("learning.optimiser", found, allowed);
+        }
     }
     Ok(())
 }

@@ -1,7 +1,7 @@
 //! Rates: from what a user asks to shifts over the updates of a training.
 //!
 //! ```text
-//! sums      k* = -log2( rate / (B m) * 2^error_bits / ( (2^drive_bits - 1) (2^(error_bits-1) - 1) 255 * 2 alpha ) * L )
+//! sums      k* = -log2( rate / (B P m) * 2^error_bits / ( (2^drive_bits - 1) (2^(error_bits-1) - 1) 255 * 2 alpha ) * L )
 //! pulses    k* = -log2( rate )                                             L = 2^level_bits / weight_max
 //! requests  k* = 12 - log2( rate L / m )
 //! k(t)      = min( nearest( k* - log2 f(t) ), 30 );   f = 1,  (1 + cos(pi t / T)) / 2  or  1 - t / T
@@ -56,6 +56,8 @@ pub struct Rate {
     pub of: RateOf,
     /// Configured batch.
     pub batch: Batch,
+    /// Positions of a sample, over which sums run as over samples: 1 of a dense layer.
+    pub positions: usize,
     /// Small factor beside the shift.
     pub mantissa: RateMantissa,
     /// Bits of an error word.
@@ -78,6 +80,13 @@ impl Rate {
             / libm::exp2(f64::from(self.unit.weight_max_log2))
     }
 
+    /// Reads that a sum runs over.
+    fn reads(self) -> f64 {
+        #[expect(clippy::cast_precision_loss, reason = "positions of an image, below 2^30")]
+        let positions = self.positions as f64;
+        f64::from(self.batch.get()) * positions
+    }
+
     fn shift_exact(self) -> f64 {
         match self.of {
             RateOf::Sums => {}
@@ -97,7 +106,7 @@ impl Rate {
         let codes = self.unit.codes_of_one();
         let scale = libm::exp2(f64::from(self.error_bits.get()))
             / (codes * rail * 255.0 * self.activation.steepness());
-        let samples = f64::from(self.batch.get()) * f64::from(self.mantissa.get());
+        let samples = self.reads() * f64::from(self.mantissa.get());
         -libm::log2(self.rate.0 / samples * scale * self.levels())
     }
 
@@ -151,7 +160,7 @@ impl Rate {
         }
         let rail = f64::from((1u32 << (self.error_bits.get() - 1)) - 1);
         let codes = self.unit.codes_of_one();
-        let samples = f64::from(self.batch.get()) * f64::from(self.mantissa.get());
+        let samples = self.reads() * f64::from(self.mantissa.get());
         let log2 = self.unit.weight_max_log2;
         let bits = self.unit.level_bits.get() + self.error_bits.get() + k;
         let scale = libm::exp2(f64::from(log2) - f64::from(bits));
@@ -221,6 +230,7 @@ mod tests {
 
     fn rate(rate: f64, alpha: f64) -> Rate {
         Rate {
+            positions: 1,
             rate: Positive::new(rate).unwrap(),
             of: RateOf::Sums,
             batch: Batch::new(32).unwrap(),

@@ -136,6 +136,7 @@ mod tests {
         let step = |activation, full| Lut::step_shift(activation, bits, unit(2, 8, 8, full));
         let sigmoid = Activation::Sigmoid(Positive::new(4.0).unwrap());
         let rate = |full_drive| Rate {
+            positions: 1,
             rate: Positive::new(3.0).unwrap(),
             batch: Batch::new(32).unwrap(),
             mantissa: RateMantissa::new(1).unwrap(),

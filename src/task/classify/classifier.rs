@@ -12,8 +12,12 @@ use crate::learn::network::NetworkError;
 /// A network on a chip, and the examples it learns from.
 ///
 /// ```
-/// use dalean::network::{Activation, Centre, Decay, DrivenBy, InitialLevels, LayerSpec, Wiring};
-/// use dalean::network::{Batch, Optimiser, Positive, RateMantissa, Route, Rule, UpdateMode};
+/// use dalean::network::{
+///     Activation, Centre, Decay, DrivenBy, Homeostasis, InitialLevels, LayerSpec, Pool, Wiring,
+/// };
+/// use dalean::network::{
+///     Batch, Optimiser, OutputError, Positive, RateMantissa, Route, Rule, UpdateMode,
+/// };
 /// use dalean::{Backend, Classifier, Examples, Experiment, Hardware, NetworkSpec};
 ///
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -29,6 +33,9 @@ use crate::learn::network::NetworkError;
 ///     weight_max_log2: 2,
 ///     initial: InitialLevels::Uniform { gain_64ths: [96, 32] },
 ///     constant_row: true,
+///     convolution: None,
+///     pool: Pool::None,
+///     homeostasis: Homeostasis::OFF,
 /// };
 /// let network = NetworkSpec {
 ///     layers: vec![
@@ -37,6 +44,7 @@ use crate::learn::network::NetworkError;
 ///     ],
 ///     rule: Rule::Ed,
 ///     mode: UpdateMode::Accumulate,
+///     error: OutputError::OneVsAll,
 ///     centre: Centre::Batch,
 ///     route: Some(Route::Modulo { taps: 1, shift: None }),
 ///     batch: Batch::new(4)?,

@@ -4,6 +4,7 @@
 use super::examples::Examples;
 use super::experiment::{Augment, Experiment, Seeded};
 use crate::chip::engine::{Calibration, Currents, Engine, Phase};
+use crate::chip::layer::LayerSpec;
 use crate::chip::state::{Piece, Section, State, StateError, Visitor};
 use crate::learn::driver::Driver;
 use crate::learn::error;
@@ -100,7 +101,7 @@ impl Trainer {
     /// When they do not.
     pub fn fits(&self, examples: &Examples) -> Result<(), NetworkError> {
         let layers = &self.experiment.network.layers;
-        let inputs = layers.first().map_or(0, |layer| layer.inputs);
+        let inputs = layers.first().map_or(0, LayerSpec::sample_inputs);
         let outputs = layers.last().map_or(0, |layer| layer.units);
         let (features, classes) = (examples.features(), examples.classes());
         if features != inputs {
@@ -159,6 +160,7 @@ impl Trainer {
         let same = table.iter().zip(0..=u8::MAX).all(|(&code, value)| code == value);
         let (mut correct, mut done) = (0, 0);
         let mut codes = Vec::new();
+        let (mut sums, mut shares) = (Vec::new(), Vec::new());
         let mut shifts = shifts;
         self.driver.engine_mut().set_phase(Phase::Training);
         for batch in order.chunks(self.experiment.network.batch.get() as usize) {
@@ -183,8 +185,21 @@ impl Trainer {
                 for sample in 0..engine.samples() {
                     let label = train.labels()[batch[first + sample] as usize];
                     let outputs = outputs(engine);
-                    let activity = (0..outputs).map(|unit| engine.output_activity(sample, unit));
-                    error::errors(label, activity, errors);
+                    match engine.error_unit().softmax() {
+                        Some(tables) => {
+                            sums.clear();
+                            sums.extend(
+                                (0..outputs).map(|at| engine.output_accumulator(sample, at)),
+                            );
+                            tables.share_out(&sums, &mut shares);
+                            error::errors(label, shares.iter().copied(), errors);
+                        }
+                        None => {
+                            let activity =
+                                (0..outputs).map(|at| engine.output_activity(sample, at));
+                            error::errors(label, activity, errors);
+                        }
+                    }
                     correct += u64::from(predict(engine, sample).0 == usize::from(label));
                 }
             });

@@ -8,11 +8,11 @@ use super::*;
 use crate::chip::crossbar::kernel::Backend;
 use crate::chip::engine::{Phase, Recorded};
 use crate::chip::hardware::Hardware;
-use crate::chip::layer::{DrivenBy, InitialLevels, LayerSpec, Optimiser};
+use crate::chip::layer::{DrivenBy, Homeostasis, InitialLevels, LayerSpec, Optimiser, Pool};
 use crate::chip::ledger::Event;
 use crate::chip::population::Wiring;
 use crate::chip::state::{Piece, Seen, State, Visitor};
-use crate::learn::error::Centre;
+use crate::learn::error::{Centre, OutputError};
 use crate::learn::network::{NetworkPlace, NetworkSpec};
 use crate::learn::route::Route;
 use crate::learn::rule::{Rule, UpdateMode};
@@ -95,11 +95,15 @@ fn network(inputs: usize, outputs: usize, rule: Rule) -> NetworkSpec {
         weight_max_log2: -1,
         initial: gain(last),
         constant_row: first,
+        convolution: None,
+        pool: Pool::None,
+        homeostasis: Homeostasis::OFF,
     };
     NetworkSpec {
         layers: vec![layer(inputs, 10, true, false), layer(10, outputs, false, true)],
         rule,
         mode: UpdateMode::Accumulate,
+        error: OutputError::OneVsAll,
         centre: Centre::None,
         route: match rule {
             Rule::Bp => None,
@@ -348,12 +352,16 @@ fn a_policy_and_a_classifier_learn_by_lists_of_the_same_five_operations() {
         weight_max_log2: 2,
         initial: InitialLevels::Uniform { gain_64ths: [96, 32] },
         constant_row: false,
+        convolution: None,
+        pool: Pool::None,
+        homeostasis: Homeostasis::OFF,
     };
     let network = NetworkSpec {
         layers: vec![
             layer(4, 10, Wiring::Dual, DrivenBy::Shared),
             layer(10, 2, Wiring::DualReadout, DrivenBy::Streams),
         ],
+        error: OutputError::OneVsAll,
         centre: Centre::Batch,
         optimisers: vec![Optimiser::Plain; 2],
         centred: vec![false; 2],

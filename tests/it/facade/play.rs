@@ -11,8 +11,8 @@ use dalean::hardware::{
     SliceTimes, Subtract, TileSpec, Timing, Window, WriteScheme, WriteSpec,
 };
 use dalean::network::{
-    Activation, Augment, Batch, Centre, Decay, DrivenBy, InitialLevels, LayerSpec, Optimiser,
-    Positive, RateMantissa, Route, Rule, UpdateMode, Wiring,
+    Activation, Augment, Batch, Centre, Decay, DrivenBy, Homeostasis, InitialLevels, LayerSpec,
+    Optimiser, OutputError, Pool, Positive, RateMantissa, Route, Rule, UpdateMode, Wiring,
 };
 use dalean::{
     Backend, Classifier, Config, Data, DataRoot, Examples, Experiment, Hardware, HardwareSpec,
@@ -215,6 +215,9 @@ fn network(c: &mut Choices<'_>, inputs: usize, outputs: usize) -> NetworkSpec {
             gain_64ths: [c.near(1, 1024) as u32, c.near(1, 1024) as u32],
         },
         constant_row: c.one_in(2),
+        convolution: None,
+        pool: Pool::None,
+        homeostasis: Homeostasis::OFF,
     });
     let layers: Vec<_> = layers.collect();
     let shift = c.one_in(4).then(|| c.near(0, 16) as u32);
@@ -239,6 +242,10 @@ fn network(c: &mut Choices<'_>, inputs: usize, outputs: usize) -> NetworkSpec {
         layers,
         rule,
         mode: c.of(&[UpdateMode::Accumulate, UpdateMode::Replay, UpdateMode::Online]),
+        error: match c.one_in(8) {
+            true => OutputError::Softmax { temperature: Positive::ONE },
+            false => OutputError::OneVsAll,
+        },
         centre: c.of(&[Centre::None, Centre::Batch, Centre::Running]),
         route,
         batch: or(Batch::new(batch), Batch::new(4).expect("inside")),

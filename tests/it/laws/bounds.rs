@@ -7,7 +7,7 @@ use dalean::chip::crossbar::kernel::Backend;
 use dalean::chip::engine::{Engine, Operation, Side, Write, WritesDone};
 use dalean::chip::hardware::{Adc, AdcRange, DitherBits, Hardware, Subtract, Window};
 use dalean::chip::layer::{
-    CHUNK_BLOCKS, DrivenBy, InitialLevels, Layer, LayerSpec, SIDE_MAX, Taps,
+    CHUNK_BLOCKS, DrivenBy, Homeostasis, InitialLevels, Layer, LayerSpec, Pool, SIDE_MAX, Taps,
 };
 use dalean::chip::population::Wiring;
 use dalean::num::fixed::*;
@@ -37,6 +37,9 @@ fn engine(hardware: Hardware, backend: Backend, inputs: usize, units: usize) -> 
         weight_max_log2: 2,
         initial: InitialLevels::Uniform { gain_64ths: [64, 64] },
         constant_row: false,
+        convolution: None,
+        pool: Pool::None,
+        homeostasis: Homeostasis::OFF,
     };
     let taps = Taps { width: 1, per_unit: 1, words: vec![0; units], shift: 0 };
     let layer = Layer::new(0, spec, taps, &hardware);

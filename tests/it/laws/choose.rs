@@ -4,7 +4,9 @@ use dalean::chip::hardware::{
     Adc, AdcRange, ConverterKind, DitherBits, DitherPattern, FloorKind, Hardware, HardwareSpec,
     PulseCode, SliceTime, SliceTimes, Subtract, Timing, Window, WriteScheme, converter,
 };
-use dalean::chip::layer::{Delivery, DrivenBy, InitialLevels, LayerSpec, Taps, WordSource};
+use dalean::chip::layer::{
+    Delivery, DrivenBy, Homeostasis, InitialLevels, LayerSpec, Pool, Taps, WordSource,
+};
 use dalean::chip::population::Wiring;
 use dalean::learn::error::Centre;
 use dalean::num::fixed::*;
@@ -233,6 +235,9 @@ pub(crate) fn net(sides: impl Strategy<Value = Vec<usize>>) -> impl Strategy<Val
                     weight_max_log2,
                     initial: InitialLevels::Uniform { gain_64ths: [96, 32] },
                     constant_row,
+                    convolution: None,
+                    pool: Pool::None,
+                    homeostasis: Homeostasis::OFF,
                 });
                 let above = reads_backwards && last == Wiring::Single && at + 1 < count;
                 deliveries.push(delivery(&mut numbers, sides[at + 1], above));

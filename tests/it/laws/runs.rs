@@ -2,11 +2,11 @@
 
 use dalean::chip::crossbar::kernel::Backend;
 use dalean::chip::hardware::{Adc, AdcRange, HardwareSpec};
-use dalean::chip::layer::{DrivenBy, InitialLevels, LayerSpec, Optimiser};
+use dalean::chip::layer::{DrivenBy, Homeostasis, InitialLevels, LayerSpec, Optimiser, Pool};
 use dalean::chip::population::Wiring;
 use dalean::lab::store::checkpoint::{self, Identity};
 use dalean::lab::store::hash;
-use dalean::learn::error::Centre;
+use dalean::learn::error::{Centre, OutputError};
 use dalean::learn::network::NetworkSpec;
 use dalean::learn::route::Route;
 use dalean::learn::rule::{Rule, UpdateMode};
@@ -116,12 +116,16 @@ fn run() -> impl Strategy<Value = Run> {
                     weight_max_log2: weight,
                     initial: InitialLevels::Uniform { gain_64ths: [96, 32] },
                     constant_row: row,
+                    convolution: None,
+                    pool: Pool::None,
+                    homeostasis: Homeostasis::OFF,
                 }
             });
             let network = NetworkSpec {
                 layers: specs.collect(),
                 rule,
                 mode,
+                error: OutputError::OneVsAll,
                 centre,
                 route: route(raw, outputs, rule),
                 batch: Batch::new(batch).unwrap(),

@@ -62,6 +62,8 @@ pub(super) const OPS: Ops = Ops {
     may_move: fused::may_move,
     pulses,
     levels,
+    offset,
+    index_squares,
     centre,
     gate_totals,
     drive_totals,

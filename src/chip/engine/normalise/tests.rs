@@ -6,7 +6,9 @@ use crate::chip::crossbar::kernel::Backend;
 use crate::chip::crossbar::layout::BLOCK_ROWS;
 use crate::chip::hardware::timing::{PulseCode, Timing};
 use crate::chip::hardware::{Adc, AdcRange, Hardware, HardwareSpec, Subtract, Window};
-use crate::chip::layer::{Delivery, DrivenBy, InitialLevels, Layer, LayerSpec, Taps};
+use crate::chip::layer::{
+    Delivery, DrivenBy, Homeostasis, InitialLevels, Layer, LayerSpec, Pool, Taps,
+};
 use crate::chip::ledger::{During, Event, Interval};
 use crate::chip::population::{Polarity, Stream, Wiring};
 use crate::num::fixed::{AdcBits, DriveBits, LevelBits};
@@ -59,6 +61,9 @@ impl Net {
                 weight_max_log2: 0,
                 initial: InitialLevels::Uniform { gain_64ths: [64, 64] },
                 constant_row: self.rows,
+                convolution: None,
+                pool: Pool::None,
+                homeostasis: Homeostasis::OFF,
             };
             let words = (0..spec.units).map(|unit| (unit % WORDS) as u16).collect();
             let taps = Taps { width: WORDS, per_unit: 1, words, shift: 0 };

@@ -11,7 +11,9 @@ use crate::chip::engine::{Operation, Phase, Side, Write};
 use crate::chip::hardware::{
     DitherBits, DitherPattern, FloorKind, Hardware, PulseCode, Timing, Window,
 };
-use crate::chip::layer::{Delivery, DrivenBy, InitialLevels, Layer, LayerSpec, Taps};
+use crate::chip::layer::{
+    Delivery, DrivenBy, Homeostasis, InitialLevels, Layer, LayerSpec, Pool, Taps,
+};
 use crate::chip::population::{Polarity, Stream, Wiring};
 use crate::chip::state::State;
 use crate::num::draw::{Place, Site};
@@ -140,6 +142,9 @@ impl Case {
             weight_max_log2: 0,
             initial: InitialLevels::Uniform { gain_64ths: [64, 64] },
             constant_row: self.seed.is_multiple_of(2),
+            convolution: None,
+            pool: Pool::None,
+            homeostasis: Homeostasis::OFF,
         };
         let words = (0..hidden).map(|unit| (unit % outputs) as u16).collect();
         let taps = Taps { width: outputs, per_unit: 1, words, shift: 0 };

@@ -91,6 +91,10 @@ enum UpdPhase {
     Look,
     /// Until those of the whole layer have been.
     Wait,
+    /// Products of more than one read are added up before they are written.
+    Gather,
+    /// Until those of the whole layer have been.
+    Gathered,
 }
 
 /// Field of an update, as it is numbered in the register.
@@ -108,6 +112,8 @@ struct Upd {
     kind: UpdKind,
     row: usize,
     group: usize,
+    /// Read of the sample.
+    position: usize,
     phase: UpdPhase,
     pulse: i64,
     count: u64,
@@ -129,7 +135,7 @@ struct TreeStage {
 /// Accumulators on their way to the lanes of a network.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Launch {
-    /// Which sample.
+    /// Which read.
     pub slot: usize,
     /// A sum a line.
     pub sums: Vec<i64>,
@@ -331,6 +337,8 @@ impl Tile {
                 self.upd = update(UpdKind::Now, slot, shift);
                 if self.config.more.train_slots.is_some() {
                     self.upd.phase = UpdPhase::Set;
+                } else if self.config.more.positions > 1 {
+                    self.upd.phase = UpdPhase::Gather;
                 }
             }
             // the field is taken, and not used

@@ -38,27 +38,39 @@ impl ConvScratch {
             self.codes.resize(bytes, 0);
         }
         let codes = &mut self.codes[..bytes];
-        if let Some(offsets) = plan.offsets() {
-            for (offset, codes) in
-                offsets[blocks].iter().zip(codes.chunks_exact_mut(count * BLOCK_ROWS))
-            {
-                let (codes, _) = codes.as_chunks_mut::<BLOCK_ROWS>();
-                for (pixel, codes) in plan.shape().steps(positions.start).zip(codes) {
-                    let at = offset + pixel * BLOCK_ROWS;
-                    codes.copy_from_slice(&image.codes()[at..at + BLOCK_ROWS]);
-                }
-            }
-        } else {
-            self.line.resize(plan.blocks() * BLOCK_ROWS + COPY, 0);
-            for (i, pixel) in plan.shape().steps(positions.start).take(count).enumerate() {
-                rows_of(plan, image.codes(), pixel, &mut self.line);
-                for (to, block) in blocks.clone().enumerate() {
-                    codes[(to * count + i) * BLOCK_ROWS..][..BLOCK_ROWS]
-                        .copy_from_slice(&self.line[block * BLOCK_ROWS..][..BLOCK_ROWS]);
-                }
+        let mut rows: Vec<_> = codes.chunks_exact_mut(count * BLOCK_ROWS).collect();
+        assemble(image, blocks, positions, &mut self.line, &mut rows);
+        Drives::new(&self.codes[..bytes], count)
+    }
+}
+
+/// Puts together the drives of some blocks of rows at some positions, `[position][64]` of each block. `line` is kept from
+/// one call to the next.
+pub fn assemble(
+    image: Image<'_>,
+    blocks: Range<usize>,
+    positions: Range<usize>,
+    line: &mut Vec<u8>,
+    rows: &mut [&mut [u8]],
+) {
+    let plan = image.plan();
+    if let Some(offsets) = plan.offsets() {
+        for (offset, codes) in offsets[blocks].iter().zip(rows) {
+            let (codes, _) = codes.as_chunks_mut::<BLOCK_ROWS>();
+            for (pixel, codes) in plan.shape().steps(positions.start).zip(codes) {
+                let at = offset + pixel * BLOCK_ROWS;
+                codes.copy_from_slice(&image.codes()[at..at + BLOCK_ROWS]);
             }
         }
-        Drives::new(codes, count)
+        return;
+    }
+    line.resize(plan.blocks() * BLOCK_ROWS + COPY, 0);
+    for (i, pixel) in plan.shape().steps(positions.start).take(positions.len()).enumerate() {
+        rows_of(plan, image.codes(), pixel, line);
+        for (codes, block) in rows.iter_mut().zip(blocks.clone()) {
+            codes[i * BLOCK_ROWS..][..BLOCK_ROWS]
+                .copy_from_slice(&line[block * BLOCK_ROWS..][..BLOCK_ROWS]);
+        }
     }
 }
 

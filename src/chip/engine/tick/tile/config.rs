@@ -10,7 +10,7 @@ pub struct TileSize {
     pub rows: usize,
     /// Columns.
     pub columns: usize,
-    /// Samples it remembers.
+    /// Reads it remembers.
     pub slots: usize,
     /// Stages of the adder tree there are registers for.
     pub tree_max: usize,
@@ -148,6 +148,8 @@ pub struct More {
     pub centred: Option<u32>,
     /// Slots of a train, where writes are coincidences of trains.
     pub train_slots: Option<u64>,
+    /// Reads of a sample, one after the other in the slots: positions of a window.
+    pub positions: usize,
 }
 
 impl Default for More {
@@ -173,6 +175,7 @@ impl Default for More {
             adam: None,
             centred: None,
             train_slots: None,
+            positions: 1,
         }
     }
 }

@@ -100,6 +100,7 @@ pub(super) fn config(
                 WriteScheme::Rounded => None,
                 WriteScheme::Trains { slots_log2 } => Some(1 << slots_log2),
             },
+            positions: layer.spec.positions(),
         },
     }
 }

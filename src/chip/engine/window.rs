@@ -1,0 +1,231 @@
+//! What lies between the units of one layer and the rows of the next where either is a convolution: maps, pools, images
+//! and the windows that move over them.
+//!
+//! ```text
+//! map       [block of 64 channels][read][64]          codes of the units of a stream; read = sample P + position
+//! image     [sample][height + 2 pad][width + 2 pad][channels]                          pooled, with its border of 0
+//! drives    [block of 64 rows][read][64]              what a window meets: as the drives of a dense layer lie
+//! ```
+//!
+//! A read of a convolution is to its array what a sample is to a dense one, so everything before and behind, from
+//! converters to writes, is what dense layers have. Into a dense layer codes go in the order y, x, channel. See
+//! docs/MODEL.md, 1 and 2.4.
+#![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
+
+use std::ops::Range;
+
+use super::Engine;
+use super::each::{MOVE, each};
+use crate::chip::crossbar::kernel::{ConvPlan, ConvShape, Image, Pixels, Team, assemble};
+use crate::chip::crossbar::layout::BLOCK_ROWS;
+use crate::chip::layer::{LayerSpec, Pool};
+use crate::chip::ledger::Event;
+
+/// Samples whose windows one thread puts together before it looks for other work.
+const TOGETHER: usize = 4;
+
+impl Engine {
+    /// Reads of a layer of the loaded samples: positions of all of them.
+    pub(super) fn reads(&self, layer: usize) -> usize {
+        self.samples * self.layers[layer].spec.positions()
+    }
+
+    /// Reads of some samples of a layer.
+    pub(super) fn reads_of(&self, layer: usize, samples: &Range<usize>) -> Range<usize> {
+        let positions = self.layers[layer].spec.positions();
+        samples.start * positions..samples.end * positions
+    }
+
+    /// Whether units of a layer put their codes where the next one is driven from, as they are.
+    pub(super) fn hands_on_directly(&self, layer: usize) -> bool {
+        let next = self.layers.get(layer + 1);
+        self.layers[layer].spec.positions() == 1
+            && next.is_some_and(|next| next.spec.convolution.is_none())
+    }
+
+    /// Puts codes of data on the rows of the first layer, which is a convolution: `[sample][y][x][channel]`.
+    pub(super) fn load_image(&mut self, shape: ConvShape, codes: &[u8]) {
+        let inside = shape.height * shape.width * shape.channels;
+        let registers = &mut self.registers[0];
+        let image = &mut registers.images[0];
+        image.resize(self.samples * shape.pixels() * shape.channels, 0);
+        let size = shape.pixels() * shape.channels;
+        let parts = image.chunks_exact_mut(size).zip(codes.chunks_exact(inside)).enumerate();
+        each(&mut self.team, codes.len() * MOVE, self.samples, parts.collect(), |_, part| {
+            let (image, codes) = part;
+            let line = shape.width * shape.channels;
+            for (y, codes) in codes.chunks_exact(line).enumerate() {
+                let at = ((y + shape.pad) * shape.padded()[1] + shape.pad) * shape.channels;
+                image[at..at + line].copy_from_slice(codes);
+            }
+        });
+        self.assemble(0, 0);
+    }
+
+    /// What the units of a layer put out becomes drives of the next one.
+    pub(super) fn hand_on(&mut self, layer: usize) {
+        if layer + 1 == self.layers.len() || self.hands_on_directly(layer) {
+            return;
+        }
+        let samples = self.samples;
+        let spec = self.layers[layer].spec.clone();
+        let next = self.layers[layer + 1].spec.clone();
+        let (rows, [height, width]) = (self.layers[layer + 1].layout.rows_padded(), spec.pooled());
+        let pad = next.convolution.map_or(0, |shape| shape.pad);
+        let size = (height + 2 * pad) * (width + 2 * pad) * spec.units;
+        for target in next.drive_sets() {
+            let at = target.index();
+            let (head, tail) = self.registers.split_at_mut(layer + 1);
+            let (map, image) = (&head[layer].maps[at], &mut tail[0].images[at]);
+            image.resize(samples * size, 0);
+            let parts =
+                image.chunks_exact_mut(size).enumerate().map(|(at, image)| (at, (at, image)));
+            let work = map.len() * MOVE / 8;
+            each(&mut self.team, work, samples, parts.collect(), |_, (sample, image)| {
+                pool(&spec, map, (sample, samples), pad, image);
+            });
+            if next.convolution.is_some() {
+                self.assemble(layer + 1, at);
+            } else {
+                let to = &mut tail[0];
+                to.drives[at].resize(samples * rows, 0);
+                flatten(&mut self.team, &to.images[at], samples, next.inputs, &mut to.drives[at]);
+            }
+            let code = Self::code_of(spec.wiring, *target);
+            if spec.pool != Pool::None {
+                let pooled = (samples * spec.positions() * spec.units) as u64;
+                self.charge_read(layer, code, Event::Pooled, pooled);
+                // a code is stored and fetched
+                self.charge_read(layer, code, Event::SramBits, 16 * pooled);
+            }
+        }
+    }
+
+    /// Puts together what the windows of a convolution meet, of a set of drives.
+    fn assemble(&mut self, layer: usize, set: usize) {
+        let this = &self.layers[layer];
+        let shape = this.spec.convolution.expect("only windows are put together");
+        let (samples, positions) = (self.samples, shape.positions());
+        let reads = samples * positions;
+        let registers = &mut self.registers[layer];
+        registers.drives[set].resize(this.layout.rows_padded() * reads, 0);
+        if samples == 0 {
+            return;
+        }
+        let plan = ConvPlan::new(shape, samples, Pixels::Packed);
+        let image = Image::new(&plan, &registers.images[set]);
+        let mut parts: Vec<(usize, (usize, Vec<&mut [u8]>))> = (0..samples)
+            .step_by(TOGETHER)
+            .map(|sample| (sample, (sample, Vec::with_capacity(plan.blocks()))))
+            .collect();
+        for block in registers.drives[set].chunks_exact_mut(reads * BLOCK_ROWS).take(plan.blocks())
+        {
+            let groups = block.chunks_mut(TOGETHER * positions * BLOCK_ROWS);
+            parts.iter_mut().zip(groups).for_each(|((_, (_, rows)), group)| rows.push(group));
+        }
+        let work = reads * plan.blocks() * BLOCK_ROWS * MOVE / 8;
+        each(&mut self.team, work, samples, parts, |_, (sample, mut rows)| {
+            let last = (sample + TOGETHER).min(samples);
+            let mut line = Vec::new();
+            let positions = sample * positions..last * positions;
+            assemble(image, 0..plan.blocks(), positions, &mut line, &mut rows);
+        });
+    }
+
+    /// Sums of the codes below a convolution, by channel, of a set of drives; the border adds nothing.
+    pub(super) fn channel_sums(&self, layer: usize, set: usize) -> Vec<i64> {
+        let channels = self.layers[layer].spec.convolution.map_or(1, |shape| shape.channels);
+        let mut sums = vec![0i64; channels];
+        // rows of at most 2^24 codes are added in 32 bits
+        for rows in self.registers[layer].images[set].chunks(channels << 12) {
+            let mut part = vec![0u32; channels];
+            for pixel in rows.chunks_exact(channels) {
+                part.iter_mut().zip(pixel).for_each(|(sum, &code)| *sum += u32::from(code));
+            }
+            sums.iter_mut().zip(part).for_each(|(sum, part)| *sum += i64::from(part));
+        }
+        sums
+    }
+}
+
+/// Pools the map of a sample into its image, whose border stays 0.
+fn pool(
+    spec: &LayerSpec,
+    map: &[u8],
+    (sample, samples): (usize, usize),
+    pad: usize,
+    image: &mut [u8],
+) {
+    let [_, across] = spec.convolution.map_or([1, 1], ConvShape::output);
+    let ([height, width], side) = (spec.pooled(), spec.pool.side());
+    let (positions, channels) = (spec.positions(), spec.units);
+    for (block, first) in (0..channels).step_by(BLOCK_ROWS).enumerate() {
+        let live = (channels - first).min(BLOCK_ROWS);
+        let codes = &map[(block * samples + sample) * positions * BLOCK_ROWS..];
+        let (codes, _) = codes[..positions * BLOCK_ROWS].as_chunks::<BLOCK_ROWS>();
+        for y in 0..height {
+            for x in 0..width {
+                let at = ((y + pad) * (width + 2 * pad) + x + pad) * channels + first;
+                let square = (0..side).flat_map(|dy| {
+                    let row = (y * side + dy) * across + x * side;
+                    &codes[row..row + side]
+                });
+                let pooled = match spec.pool {
+                    Pool::None => codes[y * across + x],
+                    Pool::Average { .. } => average(square, side),
+                    Pool::Max { .. } => greatest(square),
+                };
+                image[at..at + live].copy_from_slice(&pooled[..live]);
+            }
+        }
+    }
+}
+
+/// `floor((2 sum + q^2) / (2 q^2))` of each of 64 channels.
+fn average<'a>(
+    square: impl Iterator<Item = &'a [u8; BLOCK_ROWS]>,
+    side: usize,
+) -> [u8; BLOCK_ROWS] {
+    let mut sums = [0u32; BLOCK_ROWS];
+    for codes in square {
+        sums.iter_mut().zip(codes).for_each(|(sum, &code)| *sum += u32::from(code));
+    }
+    let cells = u32::try_from(side * side).expect("a square of a map");
+    if cells == 4 {
+        return sums.map(|sum| ((sum + 2) >> 2) as u8);
+    }
+    sums.map(|sum| u8::try_from((2 * sum + cells) / (2 * cells)).expect("a mean of bytes"))
+}
+
+fn greatest<'a>(square: impl Iterator<Item = &'a [u8; BLOCK_ROWS]>) -> [u8; BLOCK_ROWS] {
+    let mut most = [0; BLOCK_ROWS];
+    for codes in square {
+        most.iter_mut().zip(codes).for_each(|(most, &code)| *most = (*most).max(code));
+    }
+    most
+}
+
+/// Lays codes `[sample][input]` as the drives of a dense layer lie, `[block of 64 rows][sample][64]`.
+pub(super) fn flatten(
+    team: &mut Team,
+    codes: &[u8],
+    samples: usize,
+    inputs: usize,
+    drives: &mut [u8],
+) {
+    let blocks = drives.len() / (samples * BLOCK_ROWS).max(1);
+    let parts = drives.chunks_exact_mut((samples * BLOCK_ROWS).max(1)).enumerate();
+    let parts = parts.map(|(block, drives)| (block, (block * BLOCK_ROWS, drives))).collect();
+    each(team, codes.len() * MOVE, blocks, parts, |_, (first, drives)| {
+        let last = (first + BLOCK_ROWS).min(inputs);
+        for (row, codes) in drives.chunks_exact_mut(BLOCK_ROWS).zip(codes.chunks_exact(inputs)) {
+            // a block may hold the constant row alone
+            let codes = &codes[first.min(last)..last];
+            row[..codes.len()].copy_from_slice(codes);
+            row[codes.len()..].fill(0);
+        }
+    });
+}
+
+#[cfg(test)]
+mod tests;
