@@ -210,6 +210,30 @@ unsafe fn dot<const KIND: u8, const N: usize, const H: usize>(
     }
 }
 
+/// [`dot`], or that of pairs that fit.
+///
+/// # Safety
+/// As [`dot`].
+#[inline]
+#[target_feature(enable = "avx2,popcnt")]
+unsafe fn either<const KIND: u8, const N: usize, const H: usize>(
+    fits: bool,
+    acc: &mut [[__m256i; H]; N],
+    x: *const u8,
+    stride: usize,
+    v: *const u8,
+    quad: usize,
+) {
+    match (fits, KIND) {
+        // SAFETY: what the caller says.
+        (false, _) => unsafe { dot::<KIND, N, H>(acc, x, stride, v, quad) },
+        // SAFETY: what the caller says.
+        (true, READ) => unsafe { narrow::dot::<true, N, H>(acc, x, stride, v, quad) },
+        // SAFETY: what the caller says.
+        (true, _) => unsafe { narrow::dot::<false, N, H>(acc, x, stride, v, quad) },
+    }
+}
+
 /// `out[i] = sum over runs and quads of dot4(stream i, vector)`, 16 lanes a vector and up to 4 streams. Of the 16, the upper 8
 /// are dark where H is 1.
 #[inline]
@@ -230,6 +254,8 @@ fn dots<const KIND: u8, const N: usize, const H: usize>(
     assert!(vectors.len() >= (runs - 1) * run + quads * 64, "every vector lies inside");
     assert!(out.len() >= (N - 1) * out_stride + 16, "every sum has its place");
     let mut acc = [[_mm256_setzero_si256(); H]; N];
+    // of what met levels that were taken 128 below what they are
+    let mut below = [_mm256_setzero_si256(); N];
     for r in 0..runs {
         for first in (0..quads).step_by(QUADS) {
             let count = (quads - first).min(QUADS);
@@ -238,7 +264,7 @@ fn dots<const KIND: u8, const N: usize, const H: usize>(
             // of the N streams, and the second 64 * count bytes of the vectors.
             let (x, v) = unsafe { (streams.as_ptr().add(x), vectors.as_ptr().add(v)) };
             if KIND != TURNED && count == QUADS {
-                let (mut lit, pair) = if pair_max > 0 {
+                let (lit, pair) = if pair_max > 0 {
                     // SAFETY: 64 bytes of each stream lie there, as above.
                     unsafe { narrow::look::<N>(x, stride) }
                 } else {
@@ -246,24 +272,24 @@ fn dots<const KIND: u8, const N: usize, const H: usize>(
                     (unsafe { lit_quads::<N>(x, stride) }, u16::MAX)
                 };
                 let fits = pair <= pair_max;
+                if fits && KIND == READ {
+                    // SAFETY: 64 bytes of each stream lie there, as above.
+                    unsafe { narrow::add_up::<N>(&mut below, x, stride) };
+                }
                 if lit.count_ones() <= FEW {
+                    let mut lit = lit;
                     while lit != 0 {
                         let quad = lit.trailing_zeros() as usize;
-                        if fits {
-                            // SAFETY: a quad below 16, whose bytes lie there, as above.
-                            unsafe { narrow::dot::<N, H>(&mut acc, x, stride, v, quad) };
-                        } else {
-                            // SAFETY: a quad below 16, whose bytes lie there, as above.
-                            unsafe { dot::<KIND, N, H>(&mut acc, x, stride, v, quad) };
-                        }
+                        // SAFETY: a quad below 16, whose bytes lie there, as above; pairs fit where that is said.
+                        unsafe { either::<KIND, N, H>(fits, &mut acc, x, stride, v, quad) };
                         lit &= lit - 1;
                     }
                     continue;
                 }
                 if fits {
                     for quad in 0..QUADS {
-                        // SAFETY: a quad below 16, whose bytes lie there, as above.
-                        unsafe { narrow::dot::<N, H>(&mut acc, x, stride, v, quad) };
+                        // SAFETY: as above.
+                        unsafe { either::<KIND, N, H>(true, &mut acc, x, stride, v, quad) };
                     }
                     continue;
                 }
@@ -274,9 +300,15 @@ fn dots<const KIND: u8, const N: usize, const H: usize>(
             }
         }
     }
-    for (i, acc) in acc.iter().enumerate() {
+    for (i, (acc, below)) in acc.iter().zip(below).enumerate() {
         for h in 0..2 {
-            let sum = acc.get(h).copied().unwrap_or(_mm256_setzero_si256());
+            let mut sum = _mm256_setzero_si256();
+            if h < H {
+                sum = acc[h];
+                if KIND == READ {
+                    sum = _mm256_add_epi32(sum, narrow::raised(below));
+                }
+            }
             // SAFETY: i < N and h < 2, so the third assertion above bounds these 8 sums, and `out` is borrowed for
             // writing.
             unsafe {
@@ -343,7 +375,10 @@ fn read(cells: &[u8], drives: Drives<'_>, samples: Range<usize>, out: &mut [i32]
         let known = if samples.len() < 4 {
             Vectors::ANY
         } else {
-            Vectors::of(narrow::greatest::<false>(vectors, (walk.runs, walk.run, walk.quads)))
+            Vectors::of_levels(narrow::greatest::<false>(
+                vectors,
+                (walk.runs, walk.run, walk.quads),
+            ))
         };
         dots_batch::<READ>(walk, samples.len(), known, streams, vectors, out);
     }
@@ -355,7 +390,7 @@ fn accumulate(turned: &[u8], stride: usize, gates: &[i8], sums: &mut Half<i32>) 
         Walk { runs: 1, quads: gates.len() / 64, run: 0, words: 0, stride, out: HALF_COLUMNS };
     // SAFETY: i8 and u8 have the same size and every bit pattern is valid for both.
     let gates = unsafe { std::slice::from_raw_parts(gates.as_ptr().cast::<u8>(), gates.len()) };
-    let known = Vectors::of(narrow::greatest::<true>(gates, (1, 0, walk.quads)));
+    let known = Vectors::of_gates(narrow::greatest::<true>(gates, (1, 0, walk.quads)));
     dots_batch::<GATES>(walk, BLOCK_ROWS, known, turned, gates, sums);
 }
 

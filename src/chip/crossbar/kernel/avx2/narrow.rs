@@ -2,13 +2,14 @@
 //! promise it, and vectors that are dark.
 //!
 //! ```text
-//! pair      x0 * v0 + x1 * v1,   |.| <= (x0 + x1) max |v|  <=  32,767       x a stream's bytes, unsigned; v signed: |v| <= 127
+//! gates     x0 g0 + x1 g1,      |.| <= (x0 + x1) max |g|  <=  32,767        x a stream's bytes, unsigned
+//! levels    w = (w - 128) + 128:  |x0 (w0 - 128) + x1 (w1 - 128)| <= 128 (x0 + x1)  <=  32,767;   128 sum x is added at the end
 //! dark      all bytes of the upper 8 columns, or of all 16, are 0
 //! ```
 //!
-//! Levels rarely lie in the upper half of their range, gates are mostly small, and drives next to one another are seldom both
-//! at their end. Vectors are looked at once a product, streams once for 16 words of four of them; where pairs do not fit,
-//! bytes are widened before.
+//! Gates are mostly small, and drives next to one another are seldom both at their end: never where two rows are a number
+//! above 0 and below. Vectors are looked at once a product, streams once for 16 words of four of them; where pairs do not
+//! fit, bytes are widened before.
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
 use std::arch::x86_64::*;
@@ -26,21 +27,30 @@ impl Vectors {
     /// Nothing is known.
     pub(super) const ANY: Self = Self { pair_max: 0, live: 2 };
 
-    /// Of vectors whose greatest sizes are these: of the first 8 columns, and of the others.
-    pub(super) const fn of(greatest: [u8; 2]) -> Self {
+    /// Of gates whose greatest sizes are these: of the first 8 columns, and of the others.
+    pub(super) const fn of_gates(greatest: [u8; 2]) -> Self {
         let [left, right] = greatest;
         let most = if left > right { left } else { right };
-        let live = match (left, right) {
-            (0, 0) => 0,
-            (_, 0) => 1,
-            _ => 2,
-        };
         let pair_max = match most {
             0 => u16::MAX,
             1..=127 => 32_767 / most as u16,
             _ => 0,
         };
-        Self { pair_max, live }
+        Self { pair_max, live: live(greatest) }
+    }
+
+    /// Of levels.
+    pub(super) const fn of_levels(greatest: [u8; 2]) -> Self {
+        Self { pair_max: 32_767 / 128, live: live(greatest) }
+    }
+}
+
+/// How many of two vectors are taken.
+const fn live(greatest: [u8; 2]) -> usize {
+    match greatest {
+        [0, 0] => 0,
+        [_, 0] => 1,
+        _ => 2,
     }
 }
 
@@ -94,13 +104,42 @@ pub(super) unsafe fn look<const N: usize>(from: *const u8, stride: usize) -> (u3
     (lit, !(_mm_cvtsi128_si32(least) as u16))
 }
 
-/// [`super::dot`] of pairs that fit.
+/// Adds the 64 bytes of each of N streams to its sum, which lies in four lanes of 64 bits.
+///
+/// # Safety
+/// As [`look`].
+#[inline]
+#[target_feature(enable = "avx2,popcnt")]
+pub(super) unsafe fn add_up<const N: usize>(
+    sums: &mut [__m256i; N],
+    from: *const u8,
+    stride: usize,
+) {
+    for (i, sum) in sums.iter_mut().enumerate() {
+        for h in 0..2 {
+            // SAFETY: the caller says that 64 bytes lie there; unaligned loads read half of them each.
+            let v = unsafe { _mm256_loadu_si256(from.add(i * stride + h * 32).cast()) };
+            *sum = _mm256_add_epi64(*sum, _mm256_sad_epu8(v, _mm256_setzero_si256()));
+        }
+    }
+}
+
+/// 128 times what [`add_up`] gave, in every lane of 32 bits; it fits.
+#[inline]
+#[target_feature(enable = "avx2,popcnt")]
+pub(super) fn raised(sum: __m256i) -> __m256i {
+    let v = _mm_add_epi64(_mm256_castsi256_si128(sum), _mm256_extracti128_si256::<1>(sum));
+    let v = _mm_add_epi64(v, _mm_unpackhi_epi64(v, v));
+    _mm256_broadcastd_epi32(_mm_slli_epi64::<7>(v))
+}
+
+/// [`super::dot`] of pairs that fit; of levels, 128 below what they are.
 ///
 /// # Safety
 /// As [`super::dot`].
 #[inline]
 #[target_feature(enable = "avx2,popcnt")]
-pub(super) unsafe fn dot<const N: usize, const H: usize>(
+pub(super) unsafe fn dot<const LEVELS: bool, const N: usize, const H: usize>(
     acc: &mut [[__m256i; H]; N],
     x: *const u8,
     stride: usize,
@@ -111,6 +150,9 @@ pub(super) unsafe fn dot<const N: usize, const H: usize>(
     for (h, w) in w.iter_mut().enumerate() {
         // SAFETY: the caller says that 64 bytes lie there; each load reads half of them.
         *w = unsafe { _mm256_loadu_si256(v.add(quad * 64 + h * 32).cast()) };
+        if LEVELS {
+            *w = _mm256_xor_si256(*w, _mm256_set1_epi8(i8::MIN));
+        }
     }
     for (i, acc) in acc.iter_mut().enumerate() {
         // SAFETY: the caller says that this word lies there; the read asks for no alignment.
@@ -130,14 +172,18 @@ mod tests {
 
     #[test]
     fn pairs_fit_up_to_the_greatest_lane_and_no_further() {
-        assert_eq!(Vectors::of([0, 0]), Vectors { pair_max: u16::MAX, live: 0 });
-        assert_eq!(Vectors::of([3, 0]), Vectors { pair_max: 10_922, live: 1 });
+        let of = |greatest| {
+            let Vectors { pair_max, live } = Vectors::of_gates(greatest);
+            (pair_max, live)
+        };
+        assert_eq!(of([0, 0]), (u16::MAX, 0));
+        assert_eq!(of([3, 0]), (10_922, 1));
         // a dark vector before a bright one is taken along
-        assert_eq!(Vectors::of([0, 64]), Vectors { pair_max: 511, live: 2 });
-        assert_eq!(Vectors::of([65, 64]), Vectors { pair_max: 504, live: 2 });
-        assert_eq!(Vectors::of([127, 1]), Vectors { pair_max: 258, live: 2 });
-        assert_eq!(Vectors::of([128, 1]), Vectors { pair_max: 0, live: 2 });
-        assert_eq!(Vectors::of([255, 255]), Vectors::ANY);
+        assert_eq!(of([0, 64]), (511, 2));
+        assert_eq!(of([65, 64]), (504, 2));
+        assert_eq!(of([127, 1]), (258, 2));
+        assert_eq!(of([128, 1]), (0, 2));
+        assert_eq!(Vectors::of_levels([255, 0]), Vectors { pair_max: 255, live: 1 });
     }
 
     #[test]
