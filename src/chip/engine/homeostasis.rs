@@ -9,7 +9,7 @@
 //!             variance, each by another read of the first training samples as the chip reads them
 //! ```
 //!
-//! See docs/MODEL.md, 2.4.
+//! See docs/MODEL.md, 2.5.
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
 #[cfg(test)]

@@ -18,7 +18,7 @@
 //! V        = floor( (sum i^2 << 4) / n )
 //! ```
 //!
-//! The plan proves that `sum acc << 8` and `n T` stay below 2^62. See docs/MODEL.md, 2.4.
+//! The plan proves that `sum acc << 8` and `n T` stay below 2^62. See docs/MODEL.md, 2.5.
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
 #[cfg(test)]

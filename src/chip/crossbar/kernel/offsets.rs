@@ -6,7 +6,7 @@
 //! squares    += i^2,   i = clamp( rsh(sum[b][j], shift), -half, half - 1 )              of the first `live` units
 //! ```
 //!
-//! The twin of each is written so that compilers make vectors of it. See docs/MODEL.md, 2.4.
+//! The twin of each is written so that compilers make vectors of it. See docs/MODEL.md, 2.5.
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
 use crate::chip::crossbar::layout::PANEL_COLUMNS;

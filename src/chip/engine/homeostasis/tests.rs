@@ -1,16 +1,18 @@
-//! Networks whose hidden layers keep to a middle, against plain loops.
+//! Networks whose hidden layers keep to a middle, against plain loops and against Tick; and the softmax of their outputs.
 
-use super::super::{Engine, Operation, Phase, Side, WritesDone};
+use super::super::tick::Network;
+use super::super::{Centre, Engine, ErrorUnit, Operation, Phase, Side, Write, WritesDone};
 use super::*;
 use crate::chip::crossbar::kernel::Backend;
-use crate::chip::hardware::{Hardware, Window};
+use crate::chip::hardware::timing::{PulseCode, Timing};
+use crate::chip::hardware::{Adc, AdcRange, Hardware, Subtract, Window};
 use crate::chip::layer::homeostasis::{first_shift, first_threshold, moved, shifted, stepped};
 use crate::chip::layer::{
     Delivery, DrivenBy, Homeostasis, InitialLevels, LayerSpec, Pool, Readings, Taps,
 };
 use crate::chip::population::{Polarity, Wiring};
-use crate::num::fixed::{DriveBits, LevelBits, LutBits, rsh};
-use crate::num::tables::Activation;
+use crate::num::fixed::{AdcBits, DriveBits, LevelBits, LutBits, rsh};
+use crate::num::tables::{Activation, Positive, SoftmaxTables};
 use proptest::prelude::*;
 
 /// The `at`-th of some numbers below `below`.
@@ -353,6 +355,142 @@ proptest! {
                 let bits = if law.threshold { 3 * 128 * net.sides[at + 1] as u64 } else { 0 };
                 prop_assert_eq!(count(During::Update, Event::SramBits), bits);
             }
+        }
+    }
+}
+
+/// When a batch is written.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Mode {
+    Accumulate,
+    Replay,
+    Online,
+}
+
+/// Reads some samples and writes what their errors ask for. What outputs share of the last ones, by softmax.
+fn learn(net: &Net, engine: &mut Engine, codes: &[u8], mode: Mode, salt: usize) -> Vec<Vec<u8>> {
+    net.read(engine, codes);
+    let (layers, samples) = (engine.layers().len(), engine.samples());
+    let mut shares = vec![];
+    let mut errors = vec![];
+    for sample in 0..samples {
+        let label = number(net.seed, 5000 + salt + sample, WORDS);
+        let out = |unit| engine.output_accumulator(sample, unit);
+        let sums: Vec<i64> = (0..WORDS).map(out).collect();
+        let mut own = vec![0; WORDS];
+        if let Some(tables) = engine.error_unit().softmax() {
+            tables.share_out(&sums, &mut own);
+        }
+        let error =
+            |(at, &share): (usize, &u8)| if at == label { 255 } else { 0 } - i32::from(share);
+        errors.extend(own.iter().enumerate().map(error));
+        shares.push(own);
+    }
+    let words = engine.output_words(&errors);
+    for layer in 0..layers {
+        let samples = 0..samples;
+        engine.execute(&Operation::Error { layer, samples, words: &words, shared: false });
+    }
+    let mut update = |write, samples: std::ops::Range<usize>| {
+        for layer in 0..layers {
+            engine.execute(&Operation::Update { layer, write, samples: samples.clone(), shift: 7 });
+        }
+    };
+    if mode == Mode::Accumulate {
+        update(Write::Add, 0..samples);
+        update(Write::Program, 0..0);
+    } else {
+        (0..samples).for_each(|sample| update(Write::Now, sample..sample + 1));
+    }
+    engine.settle();
+    engine.written(if mode == Mode::Online { WritesDone::Sample } else { WritesDone::Batch });
+    shares
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(64))]
+
+    #[test]
+    fn tick_agrees_cycle_by_cycle(
+        seed: u64,
+        sides in prop::collection::vec(1usize..=11, 2..=3),
+        laws in [law(), law()],
+        wiring in prop::sample::select(vec![Wiring::Dual, Wiring::DualPairs, Wiring::Single]),
+        samples in 1usize..=4,
+        bits in (1i64..=8, 3i64..=12),
+        tile in (1usize..=12, 1usize..=12),
+        adc in 0usize..5,
+        mode in prop::sample::select(vec![Mode::Accumulate, Mode::Replay, Mode::Online]),
+        unit in (any::<bool>(), prop::sample::select(vec![Centre::None, Centre::Batch, Centre::Running])),
+        times in (1u64..=9, 1u64..=3, 1u64..=6, any::<bool>(), 1u64..=12, 1u64..=3),
+    ) {
+        let (settle, convert, share, overlapped, lanes, beat) = times;
+        let timing = Timing {
+            clock_khz: 1, beat, settle, convert, share, overlapped, lanes, hops: 1, pulse: 2,
+            pulse_code: PulseCode::Unary, verify: false, active_max: None, slices: None,
+        };
+        let finite = |subtract, range| {
+            Adc::Finite { bits: AdcBits::new(5).unwrap(), subtract, range }
+        };
+        let (drive_bits, lut_bits) = bits;
+        let hardware = Hardware::reference().with(|h| {
+            h.drive.bits = DriveBits::new(drive_bits).unwrap();
+            h.drive.dac_bits = 1;
+            h.digital.lut_bits = LutBits::new(lut_bits).unwrap();
+            (h.tile.rows, h.tile.columns) = tile;
+            h.adc = [
+                Adc::Ideal,
+                finite(Subtract::Digital, AdcRange::Shift(3)),
+                finite(Subtract::Current, AdcRange::Shift(3)),
+                finite(Subtract::Digital, AdcRange::Tracking),
+                finite(Subtract::Current, AdcRange::Tracking),
+            ][adc];
+            h.timing = Some(timing);
+        }).unwrap();
+        let sides: Vec<usize> = sides.into_iter().chain([WORDS]).collect();
+        let laws = laws[..sides.len() - 2].to_vec();
+        let net = Net { seed, sides, laws, wiring, samples, hardware };
+        let mut engine = Engine::new(net.hardware.clone(), Backend::best(), seed, net.layers());
+        let _ = engine.calibrate(&net.codes(0));
+        let (softmax, centre) = unit;
+        let mut unit = ErrorUnit::new(centre, net.hardware.digital.error_bits, WORDS);
+        if softmax {
+            let tables = SoftmaxTables::new(engine.readout_unit(), Positive::ONE, WORDS);
+            unit = unit.with_softmax(tables);
+        }
+        let mut tick = Network::new(&net.hardware, seed, engine.layers(), samples);
+        tick.set_error_unit(&unit);
+        engine.set_error_unit(unit);
+        engine.record(true);
+        for batch in 1..=3 {
+            let codes = net.codes(batch);
+            let per = if mode == Mode::Online { net.sides[0] } else { codes.len() };
+            for (at, codes) in codes.chunks(per).enumerate() {
+                let shares = learn(&net, &mut engine, codes, mode, 100 * batch + at);
+                let tape = engine.record(true);
+                tick.play_tape(&tape);
+                if softmax {
+                    for (sample, shares) in shares.iter().enumerate() {
+                        prop_assert_eq!(&tick.shares(sample), shares);
+                    }
+                }
+            }
+            for (at, layer) in engine.layers().iter().enumerate() {
+                let balance = &layer.balance;
+                for &target in wiring.targets() {
+                    prop_assert_eq!(balance.thresholds(target), tick.thresholds(at, target));
+                }
+                if balance.law().is_on() {
+                    let variance = balance.tracks().then_some(balance.variance());
+                    prop_assert_eq!((balance.shift(), variance), tick.table_step(at));
+                }
+                for (array, cells) in layer.arrays.iter().enumerate() {
+                    prop_assert!(cells.levels().eq(tick.levels(at, array)), "{} {}", at, array);
+                }
+                prop_assert_eq!(&layer.adc_shifts[..], tick.adc_shifts(at));
+            }
+            prop_assert_eq!(engine.error_unit().means(), tick.means());
+            prop_assert_eq!(engine.ledger(Phase::Training), tick.ledger(Phase::Training));
         }
     }
 }

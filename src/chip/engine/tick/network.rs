@@ -15,6 +15,7 @@ use crate::chip::layer::Layer;
 use crate::chip::ledger::{Cycles, During, Event, Interval, Ledger, Part};
 use crate::chip::population::Stream;
 
+mod balance;
 mod layer;
 mod normalise;
 mod pipeline;
@@ -105,8 +106,10 @@ impl Network {
         self.unlooked = self.unlooked.map(|_| unlooked);
     }
 
-    /// Writes are done: where converters track, ranges are looked at after those of a batch, or of 64 samples.
+    /// Writes are done: thresholds and steps move and, where converters track, ranges are looked at after those of a batch, or
+    /// of 64 samples.
     pub fn written(&mut self, written: WritesDone) {
+        self.balance();
         let Some(unlooked) = &mut self.unlooked else { return };
         *unlooked += u64::from(written == WritesDone::Sample);
         if written == WritesDone::Batch || *unlooked == 64 {
@@ -475,7 +478,7 @@ impl Network {
         ]
     }
 
-    fn counts(&self, e: &TileEvents) -> [(Event, u64); 7] {
+    fn counts(&self, e: &TileEvents) -> [(Event, u64); 9] {
         [
             (Event::LookUps, e.look_ups),
             (Event::SaturatedLookUps, e.saturated_look_ups),
@@ -483,6 +486,8 @@ impl Network {
             (Event::Multiplies, e.multiplies),
             (Event::SaturatedGates, e.saturated_gates),
             (Event::RowPulses, e.row_pulses),
+            (Event::ThresholdSubtractions, e.threshold_subtractions),
+            (Event::StatisticAdds, e.statistic_adds),
             (Event::SramBits, 32 * e.look_ups + 8 * e.multiplies),
         ]
     }

@@ -8,6 +8,7 @@
 //! verified, limited and amplitude-coded pulses, reads from the columns, and digital actions of more than one cycle.
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
+mod balance;
 mod command;
 mod config;
 mod events;
@@ -18,6 +19,8 @@ mod registers;
 mod trains;
 mod write;
 
+pub use balance::TileBalance;
+use balance::TileReadings;
 pub use command::Command;
 pub use config::{More, TileAdc, TileConfig, TileSize, TileUnits};
 pub use events::{BankEvents, TileEvents};
@@ -188,6 +191,8 @@ pub struct Tile {
     trained: [Vec<bool>; 2],
     /// Whether the lanes have seen the last group of a sample in this cycle.
     looked_up: bool,
+    /// What lanes of units that keep to a middle have added up.
+    readings: TileReadings,
 }
 
 impl Tile {
@@ -240,6 +245,7 @@ impl Tile {
             kept: Kept::new(size.rows, size.columns),
             trained: [vec![false; cells], vec![false; cells]],
             looked_up: false,
+            readings: TileReadings::default(),
             size,
             config,
             table,

@@ -10,6 +10,7 @@
 use std::ops::Range;
 
 use super::super::tile::{BankEvents, Command, Launch, Tile, TileEvents, TileSize};
+use super::balance::Balancing;
 use super::normalise::{Normal, Normaliser};
 use super::pool::Pooler;
 use crate::chip::hardware::timing::tree_levels;
@@ -51,6 +52,8 @@ pub(super) struct TickLayer {
     /// The stage behind it, where its units are normalised, and where their codes are pooled.
     pub(super) normaliser: Option<Normaliser>,
     pub(super) pooler: Option<Pooler>,
+    /// What it has beside its tiles, where its units keep to a middle.
+    pub(super) balancing: Option<Balancing>,
     pub(super) backward: Vec<i64>,
     /// Converter shifts, and codes on the rail and all codes since they were looked at, by target stream and slice.
     pub(super) adc_shifts: Vec<Vec<u32>>,
@@ -115,6 +118,7 @@ impl TickLayer {
                 Normaliser::new(timing.beat, lanes, hardware.tile.columns)
             }),
             pooler: Pooler::new(timing, hardware.tile.columns, &layer.spec),
+            balancing: Balancing::of(layer, hardware.digital.lut_bits.get()),
             backward: vec![],
             adc_shifts: layer.adc_shifts.clone(),
             rails: layer.rails.clone(),
@@ -196,6 +200,16 @@ impl TickLayer {
     /// The plane that has the heads of a target's columns.
     fn heads(&self, target: Stream) -> usize {
         self.planes.iter().position(|plane| plane.0 == target).expect("targets have banks")
+    }
+
+    /// The first tile that has lanes of a target; those of the other columns follow it.
+    pub(super) fn at_head(&self, target: Stream) -> usize {
+        self.at(self.heads(target), 0, 0)
+    }
+
+    /// Columns of the widest tile.
+    pub(super) fn widest(&self) -> usize {
+        self.columns.min(self.tile[1])
     }
 
     /// Planes, tiles down, tiles across.

@@ -15,6 +15,8 @@ impl Network {
     /// `FWD(rows)` of layers in a pipeline.
     pub(super) fn reads(&mut self, layers: Range<usize>, samples: usize) {
         let count = self.layers.len();
+        let training = self.phase == Phase::Training;
+        layers.clone().for_each(|layer| self.layers[layer].note(training));
         let positions: Vec<usize> = self.layers.iter().map(TickLayer::positions).collect();
         // reads that commands were given for, reads that lanes have seen, and samples that were handed on
         let (mut issued, mut seen, mut done) = (vec![0; count], vec![0; count], vec![0; count]);
@@ -60,7 +62,6 @@ impl Network {
                 self.layers[layer].start_stages();
             }
         }
-        let training = self.phase == Phase::Training;
         for layer in layers {
             self.take_events(layer, During::ForwardRows, false);
             self.layers[layer].take_rails(training);

@@ -1,6 +1,7 @@
 //! Sizes and configuration registers of a tile: docs/TILE.md, 1.
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
+use super::TileBalance;
 use crate::chip::hardware::{PulseCode, SliceTime};
 
 /// Sizes a tile is built with.
@@ -116,6 +117,8 @@ pub struct More {
     pub tree_outside: bool,
     /// What the lanes do.
     pub units: TileUnits,
+    /// What units that keep to a middle have in registers; `lut_shift` is not theirs.
+    pub balance: Option<TileBalance>,
     /// Words a column adds; empty: the modulo tap.
     pub taps: Vec<Vec<usize>>,
     /// Shift of the sum of more than one word.
@@ -159,6 +162,7 @@ impl Default for More {
             slice_times: vec![],
             tree_outside: false,
             units: TileUnits::Table,
+            balance: None,
             taps: vec![],
             tap_shift: 0,
             beat: 1,
