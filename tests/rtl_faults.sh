@@ -129,7 +129,15 @@ fault "codes lose the weight of their slice" tile "assign code_shift = conv_slic
 fault "codes lose the weight of a step" tile "(adc == IDEAL ? 32'd0 : 32'(adc_shift))" "32'd0"
 fault "lane group off by one" tile "group_of[32*c +: 32] == lane_group" "group_of[32*c +: 32] == lane_group + 32'd1"
 fault "index truncates" tile \
-    "index = rsh(64'(\$signed(out[32*c +: 32])), lut_shift)" "index = 64'(\$signed(out[32*c +: 32])) >>> lut_shift"
+    ": rsh(distance, lut_shift)" ": distance >>> lut_shift"
+fault "thresholds ignored" tile " - rsh(64'(\$signed(threshold[40*c +: 40])), 6'd8)" ""
+fault "thresholds truncate" tile \
+    "rsh(64'(\$signed(threshold[40*c +: 40])), 6'd8)" "(64'(\$signed(threshold[40*c +: 40])) >>> 8)"
+fault "thresholds have no sign" tile "64'(\$signed(threshold[40*c +: 40]))" "64'(threshold[40*c +: 40])"
+fault "one threshold for all" tile "threshold[40*c +: 40])), 6'd8)" "threshold[39:0])), 6'd8)"
+fault "thresholds lose their fraction" tile "+: 40])), 6'd8)" "+: 40])), 6'd0)"
+fault "steps below one count as one" tile "distance <<< (6'd0 - lut_shift)" "distance"
+fault "the sign of a shift is ignored" tile "lut_shift[5] ? distance <<< (6'd0 - lut_shift) : rsh" "rsh"
 fault "index is symmetric" tile "held = clamp(index, -half, half - 64'sd1)" "held = clamp(index, 64'sd1 - half, half - 64'sd1)"
 fault "halves go down" tile ">> 1)) >>> s;" ">> 1) - (s == 6'd0 ? 64'sd0 : 64'sd1)) >>> s;"
 

@@ -1,11 +1,11 @@
 // The tile: a crossbar of unsigned cells in two banks, with its converters and lanes, that learns in place.
 //
 //   read     acc[c]   = sum over slices of (code_e[c] - code_i[c]) << (ash + slice * dac_bits)
-//   look up  i        = clamp(rsh(acc, lsh), -2^(lut_bits-1), 2^(lut_bits-1) - 1),  a = value(i), a' = slope(i)
+//   look up  i        = clamp(rsh(acc - rsh(T[c], 8), lsh), -2^(lut_bits-1), 2^(lut_bits-1) - 1),  a = value(i), a' = slope(i)
 //   gate     u[c]     = sat_8(rsh(error[c] * a'[c], error_bits))
 //   learn    level   += clamp(SR(+-drive * u * mantissa, k), +-increment_max) pulses, inside floor .. ceiling
 //
-// rsh(v, s) = (v + 2^(s-1)) >> s, halves toward +infinity; sat_8 is symmetric. Every register, command, counter
+// rsh(v, s) = (v + 2^(s-1)) >> s, halves toward +infinity, and v << -s where s is below 0; sat_8 is symmetric. Every register, command, counter
 // and cycle is that of docs/TILE.md; register names are those of its table. The schedule is static: no part ever waits
 // for another, and data enter it only as the pulses of a row. There is no divider: which converter step, lane group and
 // bus word a column belongs to follows from the configuration through a chain of counters along the columns.
@@ -31,6 +31,10 @@ module ed_tile #(
     input wire logic [LUT_BITS-1:0]      lut_address,
     input wire logic [7:0]               lut_value,
     input wire logic [7:0]               lut_slope,
+    // Thresholds, with 8 fractional bits. Heard only while idle.
+    input wire logic                     threshold_write,
+    input wire logic [31:0]              threshold_address,
+    input wire logic [39:0]              threshold_value,
     // Commands.
     input wire logic                     cmd_valid,
     output logic                         cmd_ready,
@@ -312,12 +316,13 @@ module ed_tile #(
 
     // --- look-up lanes: a group of columns a cycle ---
 
+    logic [40*COLUMNS-1:0] threshold;
     logic [7:0] lut_values [0:2**LUT_BITS-1];
     logic [7:0] lut_slopes [0:2**LUT_BITS-1];
     logic lanes_end;
     logic [COLUMNS-1:0] look_columns, look_clipped;
     logic [8*COLUMNS-1:0] look_values, look_slopes;
-    logic signed [63:0] half, index, held;
+    logic signed [63:0] half, distance, index, held;
 
     assign lanes_end = lane_group == groups - 32'd1;
     assign half = $signed(64'd1 << (lut_bits - 6'd1));
@@ -327,11 +332,14 @@ module ed_tile #(
         look_clipped = '0;
         look_values = '0;
         look_slopes = '0;
+        distance = 64'sd0;
         index = 64'sd0;
         held = 64'sd0;
         for (int c = 0; c < COLUMNS; c++)
             if (lane_busy && used[c] && group_of[32*c +: 32] == lane_group) begin
-                index = rsh(64'($signed(out[32*c +: 32])), lut_shift);
+                distance = 64'($signed(out[32*c +: 32])) - rsh(64'($signed(threshold[40*c +: 40])), 6'd8);
+                // a shift of six bits with a sign
+                index = lut_shift[5] ? distance <<< (6'd0 - lut_shift) : rsh(distance, lut_shift);
                 held = clamp(index, -half, half - 64'sd1);
                 look_columns[c] = 1'b1;
                 look_clipped[c] = index != held;
@@ -345,6 +353,12 @@ module ed_tile #(
             lut_values[lut_address] <= lut_value;
             lut_slopes[lut_address] <= lut_slope;
         end
+    end
+
+    always_ff @(posedge clock) begin : thresholds
+        if (threshold_write && idle)
+            for (int c = 0; c < COLUMNS; c++)
+                if (threshold_address == c) threshold[40*c +: 40] <= threshold_value;
     end
 
     always_ff @(posedge clock) begin : look_up_lanes

@@ -151,6 +151,16 @@ void write_table(Tile* tile, uint32_t address, uint32_t value, uint32_t slope) {
     tile->top.lut_write = 0;
 }
 
+// Writes the threshold of a column, in a cycle of its own.
+void write_threshold(Tile* tile, uint32_t column, int64_t threshold) {
+    tile->top.cmd_valid = 0;
+    tile->top.threshold_write = 1;
+    tile->top.threshold_address = column;
+    tile->top.threshold_value = static_cast<uint64_t>(threshold) & ((uint64_t{1} << 40) - 1);
+    tile->edge();
+    tile->top.threshold_write = 0;
+}
+
 // Puts inputs on the ports, settles what depends on them, and reads the outputs.
 void set_inputs(Tile* tile, const Inputs* inputs, Outputs* outputs) {
     auto& top = tile->top;
@@ -204,6 +214,7 @@ struct Functions {
     void (*edge)(Tile*);
     const char* (*layout)(const Tile*);
     void (*read_registers)(const Tile*, int64_t*);
+    void (*write_threshold)(Tile*, uint32_t, int64_t);
 };
 
 }  // namespace
@@ -211,6 +222,6 @@ struct Functions {
 // What tests/rtl calls; the order is that of `Functions` there.
 extern "C" const Functions* ED_TILE_NAME() {
     static const Functions functions = {create,     destroy, reset,  configure,     write_table,
-                                        set_inputs, edge,    layout, read_registers};
+                                        set_inputs, edge,    layout, read_registers, write_threshold};
     return &functions;
 }

@@ -2,7 +2,7 @@
 //!
 //! Fields: name, rows and columns built, digest of the registers, shifts of updates, configuration registers.
 
-use dalean::chip::engine::tick::{More, TileAdc, TileConfig};
+use dalean::chip::engine::tick::{More, TileAdc, TileBalance, TileConfig};
 
 use super::Setting;
 
@@ -324,9 +324,51 @@ pub(crate) fn settings() -> Vec<Setting> {
                 ..plain(16)
             },
         ),
+        make(
+            "thresholds, steps below a unit of a sum",
+            8,
+            "0000000000000000",
+            [6, 14],
+            TileConfig {
+                columns: 7,
+                lanes: 2,
+                lut_bits: 6,
+                adc: TileAdc::Digital { bits: 4, shift: 14 },
+                more: keeps(vec![5, -130, 128, 127, -128, 1 << 20, -(1 << 21)], -3),
+                ..plain(8)
+            },
+        ),
+        make(
+            "large, thresholds of every size, long steps",
+            16,
+            "0000000000000000",
+            [6, 14],
+            TileConfig {
+                lanes: 5,
+                more: keeps((0..16).map(|c| (1 - 2 * (c % 2)) << (2 * c + 7)).collect(), 12),
+                ..plain(16)
+            },
+        ),
+        make(
+            "a threshold a column, ideal converters, a step of one",
+            8,
+            "0000000000000000",
+            [6, 14],
+            TileConfig {
+                ceiling: 3,
+                more: keeps((0..8).map(|c| 25_000 * (c - 3)).collect(), 0),
+                ..plain(8)
+            },
+        ),
     ];
     for (setting, seed) in settings.iter_mut().zip(1..) {
         setting.seed = seed;
     }
     settings
+}
+
+/// Units that keep to a middle: thresholds with 8 fractional bits, and the step of their table.
+fn keeps(thresholds: Vec<i64>, shift: i32) -> More {
+    let balance = Some(TileBalance { thresholds, shift, tracks: false });
+    More { balance, ..More::default() }
 }

@@ -50,6 +50,7 @@ struct Functions {
     edge: unsafe extern "C" fn(*mut Raw),
     layout: unsafe extern "C" fn(*const Raw) -> *const c_char,
     read_registers: unsafe extern "C" fn(*const Raw, *mut i64),
+    write_threshold: unsafe extern "C" fn(*mut Raw, u32, i64),
 }
 
 type Entry = unsafe extern "C" fn() -> *const Functions;
@@ -129,11 +130,18 @@ impl Rtl {
         unsafe { (self.functions.reset)(self.raw) }
     }
 
-    /// Writes all configuration registers and the table. The tile has to be idle.
+    /// Writes all configuration registers, thresholds and the table. The tile has to be idle.
     pub(crate) fn configure(&mut self, config: &TileConfig, table: &[[u8; 2]]) {
         for (address, value) in (0..).zip(configuration(config)) {
             // SAFETY: `raw` is a live tile that only this value reaches; the port cuts what it is given.
             unsafe { (self.functions.configure)(self.raw, address, value) }
+        }
+        let balance = config.more.balance.as_ref();
+        for column in 0..self.columns {
+            let thresholds = balance.map_or(&[][..], |balance| &balance.thresholds);
+            let threshold = thresholds.get(column).copied().unwrap_or(0);
+            // SAFETY: as above.
+            unsafe { (self.functions.write_threshold)(self.raw, narrow(column), threshold) }
         }
         for (address, [value, slope]) in (0..).zip(table) {
             let (value, slope) = (u32::from(*value), u32::from(*slope));
@@ -231,6 +239,9 @@ fn configuration(config: &TileConfig) -> [u32; 27] {
         TileAdc::Digital { bits, shift } => (1, bits, shift),
         TileAdc::Current { bits, shift } => (2, bits, shift),
     };
+    // six bits with a sign: the port cuts it
+    let lut_shift =
+        config.more.balance.as_ref().map_or(config.lut_shift, |own| own.shift.cast_unsigned());
     [
         narrow(config.rows),
         narrow(config.columns),
@@ -250,7 +261,7 @@ fn configuration(config: &TileConfig) -> [u32; 27] {
         adc_bits,
         adc_shift,
         config.lut_bits,
-        config.lut_shift,
+        lut_shift,
         config.error_bits,
         config.negate.into(),
         narrow(config.mantissa),

@@ -3,39 +3,44 @@
 use super::super::tick::Network;
 use super::super::{Centre, Engine, ErrorUnit, Operation, Phase, Side, Write, WritesDone};
 use super::*;
-use crate::chip::crossbar::kernel::Backend;
+use crate::chip::crossbar::kernel::{Backend, ConvShape};
 use crate::chip::hardware::timing::{PulseCode, Timing};
 use crate::chip::hardware::{Adc, AdcRange, Hardware, Subtract, Window};
-use crate::chip::layer::homeostasis::{first_shift, first_threshold, moved, shifted, stepped};
-use crate::chip::layer::{
-    Delivery, DrivenBy, Homeostasis, InitialLevels, LayerSpec, Pool, Readings, Taps,
-};
-use crate::chip::population::{Polarity, Wiring};
-use crate::num::fixed::{AdcBits, DriveBits, LevelBits, LutBits, rsh};
+use crate::chip::layer::{Delivery, DrivenBy, Homeostasis, InitialLevels, LayerSpec, Pool, Taps};
+use crate::chip::population::Wiring;
+use crate::chip::state::{Piece, Section, Seen as Told, State, Visitor};
+use crate::num::fixed::{AdcBits, DriveBits, LevelBits, LutBits};
 use crate::num::tables::{Activation, Positive, SoftmaxTables};
+use bitvec::prelude::{BitVec, Lsb0};
 use proptest::prelude::*;
 
+mod plain;
+
+use plain::{Plain, plain_read};
+
 /// The `at`-th of some numbers below `below`.
-pub(super) fn number(seed: u64, at: usize, below: usize) -> usize {
+fn number(seed: u64, at: usize, below: usize) -> usize {
     let mixed = (seed ^ at as u64).wrapping_add(1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
     (mixed ^ mixed >> 29).wrapping_mul(0xbf58_476d_1ce4_e5b9) as usize % (1 << 40) % below
 }
 
 /// A net of hidden layers that keep to a middle, each in its way, below a layer that does not.
 #[derive(Debug, Clone)]
-pub(super) struct Net {
-    pub(super) seed: u64,
-    pub(super) sides: Vec<usize>,
-    pub(super) laws: Vec<Homeostasis>,
-    pub(super) wiring: Wiring,
-    pub(super) samples: usize,
-    pub(super) hardware: Hardware,
+struct Net {
+    seed: u64,
+    sides: Vec<usize>,
+    laws: Vec<Homeostasis>,
+    wiring: Wiring,
+    samples: usize,
+    hardware: Hardware,
+    /// The window of the first layer and its channels, whose map is the second side.
+    window: Option<(ConvShape, usize)>,
 }
 
-pub(super) const WORDS: usize = 3;
+const WORDS: usize = 3;
 
 impl Net {
-    pub(super) fn codes(&self, batch: usize) -> Vec<u8> {
+    fn codes(&self, batch: usize) -> Vec<u8> {
         let top = usize::from(self.hardware.drive.bits.code_max()) + 1;
         let of = |at| number(self.seed ^ batch as u64 * 77, at, top) as u8;
         (0..self.samples * self.sides[0]).map(of).collect()
@@ -50,13 +55,16 @@ impl Net {
         window.floor() + offset as u16
     }
 
-    pub(super) fn layers(&self) -> Vec<Layer> {
+    fn layers(&self) -> Vec<Layer> {
         let last = self.sides.len() - 2;
         let one = |at: usize| {
             let law = self.laws.get(at).copied().unwrap_or(Homeostasis::OFF);
+            let window = self.window.filter(|_| at == 0);
+            let dense = (self.sides[at], self.sides[at + 1]);
+            let (inputs, units) = window.map_or(dense, |(shape, units)| (shape.rows(), units));
             let spec = LayerSpec {
-                inputs: self.sides[at],
-                units: self.sides[at + 1],
+                inputs,
+                units,
                 wiring: self.wiring,
                 driven_by: if at == 0 { DrivenBy::Shared } else { DrivenBy::Streams },
                 activation: match law.gain {
@@ -67,7 +75,7 @@ impl Net {
                 weight_max_log2: 0,
                 initial: InitialLevels::Uniform { gain_64ths: [64, 64] },
                 constant_row: false,
-                convolution: None,
+                convolution: window.map(|(shape, _)| shape),
                 pool: Pool::None,
                 homeostasis: law,
             };
@@ -96,169 +104,7 @@ impl Net {
     }
 }
 
-/// What a layer remembers, and what it does, by plain loops.
-#[derive(Debug, Clone, PartialEq)]
-struct Plain {
-    law: Homeostasis,
-    bits: u32,
-    thresholds: [Vec<i64>; 2],
-    shift: i32,
-    variance: i64,
-}
-
-impl Plain {
-    fn of(layer: &Layer) -> Self {
-        let b = &layer.balance;
-        Self {
-            law: b.law(),
-            bits: layer.lut.activity.len().ilog2(),
-            thresholds: [Stream::P, Stream::N].map(|stream| b.thresholds(stream).to_vec()),
-            shift: b.shift(),
-            variance: b.variance(),
-        }
-    }
-
-    /// `d` of accumulators `[stream][sample][unit]`.
-    fn left(&self, sums: &[Vec<Vec<i64>>; 2]) -> [Vec<Vec<i64>>; 2] {
-        std::array::from_fn(|stream| {
-            let off = |(unit, &sum): (usize, &i64)| {
-                sum - self.thresholds[stream].get(unit).map_or(0, |&t| rsh(t, 8))
-            };
-            sums[stream].iter().map(|sums| sums.iter().enumerate().map(off).collect()).collect()
-        })
-    }
-
-    fn indices(&self, sums: &[Vec<Vec<i64>>; 2]) -> (Vec<Vec<Vec<i64>>>, u64) {
-        let half = 1i64 << (self.bits - 1);
-        let mut ends = 0;
-        let mut index = |d: &i64| {
-            let i = shifted(*d, self.shift);
-            ends += u64::from(i < -half || i >= half);
-            i.clamp(-half, half - 1)
-        };
-        let left = self.left(sums);
-        let of = left.iter().map(|stream| {
-            stream.iter().map(|sums| sums.iter().map(&mut index).collect()).collect()
-        });
-        (of.collect(), ends)
-    }
-
-    fn readings(&self, sums: &[Vec<Vec<i64>>; 2], samples: usize) -> Readings {
-        let total = |stream: usize| {
-            let units = sums[stream].first().map_or(0, Vec::len);
-            (0..units).map(|unit| sums[stream].iter().map(|sums| sums[unit]).sum()).collect()
-        };
-        let indices = self.indices(sums).0;
-        let left = self.left(sums);
-        Readings {
-            reads: samples as u64,
-            sums: [total(0), total(1)],
-            squares: indices.iter().flatten().flatten().map(|i| (i * i) as u64).sum(),
-            deviations: left.iter().flatten().flatten().map(|d| (d * d) as u128).sum(),
-        }
-    }
-
-    fn units(sums: &[Vec<Vec<i64>>; 2]) -> i64 {
-        sums.iter().map(|stream| stream.first().map_or(0, Vec::len) as i64).sum()
-    }
-
-    fn calibrate(&mut self, sums: &[Vec<Vec<i64>>; 2], samples: usize) {
-        let readings = self.readings(sums, samples);
-        for (thresholds, sums) in self.thresholds.iter_mut().zip(&readings.sums) {
-            for (threshold, &sum) in thresholds.iter_mut().zip(sums) {
-                *threshold = first_threshold(sum, samples as u64);
-            }
-        }
-        let spread = match self.law.gain {
-            Gain::Table => return,
-            Gain::Fixed { spread } => spread as i32,
-            Gain::Tracking => 0,
-        };
-        let deviations = self.readings(sums, samples).deviations;
-        let count = samples as u64 * Self::units(sums) as u64;
-        self.shift = (first_shift(deviations, count, self.bits) + spread).min(47);
-        if self.law.gain == Gain::Tracking {
-            self.variance = ((self.readings(sums, samples).squares << 4) / samples as u64) as i64;
-        }
-    }
-
-    fn written(&mut self, sums: &[Vec<Vec<i64>>; 2], samples: usize) {
-        let readings = self.readings(sums, samples);
-        for (thresholds, sums) in self.thresholds.iter_mut().zip(&readings.sums) {
-            for (threshold, &sum) in thresholds.iter_mut().zip(sums) {
-                *threshold = moved(*threshold, sum << 8, samples as i64, self.law.window_log2);
-            }
-        }
-        if self.law.gain == Gain::Tracking {
-            let squares = (readings.squares << 4) as i64;
-            let variance = moved(self.variance, squares, samples as i64, self.law.window_log2);
-            (self.shift, self.variance) =
-                stepped(self.shift, variance, Self::units(sums), self.bits);
-        }
-    }
-}
-
-/// Accumulators of a layer, `[stream][sample][unit]`, of drives that lie likewise.
-fn sums(net: &Net, at: usize, drives: &[Vec<Vec<i64>>; 2]) -> [Vec<Vec<i64>>; 2] {
-    let mut sums = [vec![], vec![]];
-    for &target in net.wiring.targets() {
-        sums[target.index()] = vec![vec![0; net.sides[at + 1]]; net.samples];
-    }
-    for (array, pathway) in net.wiring.pathways().iter().enumerate() {
-        let sign = if pathway.polarity == Polarity::Excites { 1 } else { -1 };
-        for (sample, sums) in sums[pathway.target.index()].iter_mut().enumerate() {
-            for (row, &x) in drives[pathway.source.index()][sample].iter().enumerate() {
-                for (column, sum) in sums.iter_mut().enumerate() {
-                    *sum += sign * x * i64::from(net.level(at, array, row, column));
-                }
-            }
-        }
-    }
-    sums
-}
-
-/// Reads a batch; every hidden layer is moved or calibrated by `then` before its units are looked up.
-fn plain_read(
-    net: &Net,
-    layers: &[Layer],
-    codes: &[u8],
-    states: &mut [Plain],
-    calibrates: bool,
-) -> Vec<(Vec<Vec<Vec<u8>>>, u64, [Vec<Vec<i64>>; 2])> {
-    let bits = net.hardware.drive.bits;
-    let drive: Vec<Vec<i64>> = codes
-        .chunks(net.sides[0])
-        .map(|codes| codes.iter().map(|&code| code.into()).collect())
-        .collect();
-    let mut drives = [drive.clone(), drive];
-    let mut all = vec![];
-    for (at, state) in states.iter_mut().enumerate() {
-        let sums = sums(net, at, &drives);
-        if calibrates {
-            state.calibrate(&sums, net.samples);
-        }
-        let (indices, ends) = state.indices(&sums);
-        let half = 1i64 << (state.bits - 1);
-        let lut = &layers[at].lut;
-        let mut slopes = vec![];
-        for (stream, indices) in indices.into_iter().enumerate() {
-            let place = |i: &i64| (i + half) as usize;
-            drives[stream] = indices
-                .iter()
-                .map(|row| {
-                    let code = |i| periphery::drive(lut.activity[place(i)], bits);
-                    row.iter().map(code).map(i64::from).collect()
-                })
-                .collect();
-            let slope = |row: &Vec<i64>| row.iter().map(|i| lut.derivative[place(i)]).collect();
-            slopes.push(indices.iter().map(slope).collect());
-        }
-        all.push((slopes, ends, sums));
-    }
-    all
-}
-
-pub(super) fn law() -> impl Strategy<Value = Homeostasis> {
+fn law() -> impl Strategy<Value = Homeostasis> {
     let gain = prop_oneof![
         1 => Just(Gain::Table),
         1 => (0u32..=2).prop_map(|spread| Gain::Fixed { spread }),
@@ -268,7 +114,7 @@ pub(super) fn law() -> impl Strategy<Value = Homeostasis> {
         .prop_map(|(threshold, gain, window_log2)| Homeostasis { threshold, gain, window_log2 })
 }
 
-pub(super) fn side() -> impl Strategy<Value = usize> {
+fn side() -> impl Strategy<Value = usize> {
     prop_oneof![4 => 1usize..=12, 3 => prop::sample::select(vec![31, 32, 33, 63, 64, 65]), 1 => 96usize..=140]
 }
 
@@ -295,7 +141,7 @@ proptest! {
             h.digital.lut_bits = LutBits::new(lut_bits).unwrap();
         }).unwrap();
         let laws = laws[..sides.len() - 2].to_vec();
-        let net = Net { seed, sides, laws, wiring, samples, hardware };
+        let net = Net { seed, sides, laws, wiring, samples, hardware, window: None };
         for (backend, threads) in Backend::available().into_iter().zip([1, 2, 1, 2]) {
             let layers = net.layers();
             let mut states: Vec<_> = layers[..net.laws.len()].iter().map(Plain::of).collect();
@@ -423,6 +269,9 @@ proptest! {
         mode in prop::sample::select(vec![Mode::Accumulate, Mode::Replay, Mode::Online]),
         unit in (any::<bool>(), prop::sample::select(vec![Centre::None, Centre::Batch, Centre::Running])),
         times in (1u64..=9, 1u64..=3, 1u64..=6, any::<bool>(), 1u64..=12, 1u64..=3),
+        window in prop::option::weighted(
+            0.4, (1usize..=2, [2usize..=4, 2usize..=4], 1usize..=2, 1usize..=2, 0usize..=1, 1usize..=4),
+        ),
     ) {
         let (settle, convert, share, overlapped, lanes, beat) = times;
         let timing = Timing {
@@ -447,9 +296,16 @@ proptest! {
             ][adc];
             h.timing = Some(timing);
         }).unwrap();
-        let sides: Vec<usize> = sides.into_iter().chain([WORDS]).collect();
+        let mut sides: Vec<usize> = sides.into_iter().chain([WORDS]).collect();
         let laws = laws[..sides.len() - 2].to_vec();
-        let net = Net { seed, sides, laws, wiring, samples, hardware };
+        let window = window.map(|(channels, [height, width], side, stride, pad, units)| {
+            let pad = pad.min(side - 1);
+            let shape = ConvShape { channels, height, width, side, stride, pad };
+            sides[0] = height * width * channels;
+            sides[1] = shape.positions() * units;
+            (shape, units)
+        });
+        let net = Net { seed, sides, laws, wiring, samples, hardware, window };
         let mut engine = Engine::new(net.hardware.clone(), Backend::best(), seed, net.layers());
         let _ = engine.calibrate(&net.codes(0));
         let (softmax, centre) = unit;
@@ -492,5 +348,96 @@ proptest! {
             prop_assert_eq!(engine.error_unit().means(), tick.means());
             prop_assert_eq!(engine.ledger(Phase::Training), tick.ledger(Phase::Training));
         }
+    }
+}
+
+/// Looks at thresholds and steps alone, or tells them again.
+#[derive(Default)]
+struct Balances {
+    told: Vec<(String, Option<Section>, Vec<i64>)>,
+    again: bool,
+}
+
+impl Visitor for Balances {
+    fn halves(&mut self, _: &Piece<'_>, _: [usize; 2], _: &dyn Fn() -> Vec<u16>) -> Told<Vec<u16>> {
+        Ok(None)
+    }
+
+    fn bits(
+        &mut self,
+        _: &Piece<'_>,
+        _: [usize; 2],
+        _: &dyn Fn() -> BitVec<u8, Lsb0>,
+    ) -> Told<BitVec<u8, Lsb0>> {
+        Ok(None)
+    }
+
+    fn numbers(&mut self, piece: &Piece<'_>, values: &[i64]) -> Told<Vec<i64>> {
+        if !matches!(piece.section, Some(Section::Thresholds | Section::TableShifts)) {
+            return Ok(None);
+        }
+        assert!(values.iter().all(|value| piece.within.contains(value)), "{}", piece.name);
+        if self.again {
+            return Ok(Some(self.told.remove(0).2));
+        }
+        self.told.push((piece.name.to_owned(), piece.section, values.to_vec()));
+        Ok(None)
+    }
+
+    fn rows(&mut self, _: &Piece<'_>, _: usize, _: &dyn Fn() -> Vec<i64>) -> Told<Vec<i64>> {
+        Ok(None)
+    }
+}
+
+#[test]
+fn what_units_keep_to_is_state_and_may_be_told_again() {
+    let law = |threshold, gain| Homeostasis { threshold, gain, window_log2: 5 };
+    let laws = vec![
+        law(true, Gain::Tracking),
+        law(false, Gain::Fixed { spread: 1 }),
+        law(true, Gain::Table),
+    ];
+    let net = Net {
+        seed: 4,
+        sides: vec![6, 5, 4, 3, WORDS],
+        laws,
+        wiring: Wiring::Dual,
+        samples: 8,
+        hardware: Hardware::reference(),
+        window: None,
+    };
+    let engine = || Engine::new(net.hardware.clone(), Backend::best(), 4, net.layers());
+    let mut one = engine();
+    let _ = one.calibrate(&net.codes(0));
+    learn(&net, &mut one, &net.codes(1), Mode::Accumulate, 0);
+    let mut said = Balances::default();
+    one.visit(&mut said).unwrap();
+    let names: Vec<_> =
+        said.told.iter().map(|(name, _, values)| (&name[..], values.len())).collect();
+    assert_eq!(
+        names,
+        [
+            ("layer0.thresholds.p", 5),
+            ("layer0.thresholds.n", 5),
+            ("layer0.table_shift", 1),
+            ("layer0.variance", 1),
+            ("layer1.table_shift", 1),
+            ("layer2.thresholds.p", 3),
+            ("layer2.thresholds.n", 3),
+        ]
+    );
+    let mut other = engine();
+    said.again = true;
+    other.visit(&mut said).unwrap();
+    assert!(said.told.is_empty());
+    for (one, other) in one.layers().iter().zip(other.layers()) {
+        let both = [one, other].map(|layer| {
+            let balance = &layer.balance;
+            let variance = balance.tracks().then_some(balance.variance());
+            let thresholds =
+                [Stream::P, Stream::N].map(|stream| balance.thresholds(stream).to_vec());
+            (thresholds, balance.shift(), variance)
+        });
+        assert_eq!(both[0], both[1]);
     }
 }
