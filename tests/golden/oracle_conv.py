@@ -14,7 +14,9 @@ READINGS = dict(
     pool_of="drives",              # what a pool pools: "activities" of 8 bits, or "drives" of drive_bits, as the program does
     replay_moves="batch",          # thresholds and gains of a replay: once a "batch" or after each "sample"'s write
     on_off="each",                 # full scale of the halves: "each" its own range, or "data", that of the data
-    sign_words="cell",             # words of sign with separable dither: "cell", or "separable"
+    nearest="ratio",               # of a mantissa of rms: by the "difference" of the numbers, or by their "ratio", as the program does
+    converters="layer",            # ranges of a net with thresholds or gains: "layer" by layer with those below, or of the "network" before any
+    sign_words="separable",        # words of sign with separable dither: "separable" as any word of a cell, or "cell"
 )
 
 
@@ -134,18 +136,14 @@ def decay_at(decay, t, total):
     return {"constant": 1.0, "linear": 1 - t / total, "cosine": (1 + math.cos(math.pi * t / total)) / 2}[decay]
 
 
-def power_tables():
+def power_table(f):
     """(m, s) with m 2^-s nearest to 2^(-f/256), m in 1..15."""
-    out = []
-    for f in range(256):
-        v = 2.0 ** (-f / 256)
-        best = min(((abs(m / 2 ** s - v), s, m) for s in range(12) for m in range(1, 16)))
-        out.append((best[2], best[1]))
-    assert out[0] == (1, 0) and out[128] in ((11, 4),)
-    return out
+    if READINGS["nearest"] == "ratio":
+        far = lambda m, s: abs(math.log2(m) - s + f / 256)
+    else:
+        far = lambda m, s: abs(m / 2 ** s - 2.0 ** (-f / 256))
+    return min((far(m, s), s, m) for s in range(12) for m in range(1, 16))[:0:-1]
 
-
-POWERS = power_tables()
 
 DEFAULTS = dict(
     seed=1, examples=40, height=6, width=6, channels=1, classes=4, full_scale=255, coding="raw", batch=8, epochs=2,
@@ -247,7 +245,10 @@ class ConvNet(Net):
         self.sat_train, self.events = self.new_sat(), {}
         self.calib_other, self.ash = None, []
         self.tracks = s["adc_range"] == "tracking"
-        self.set_converters()                                             # of the whole net, by thresholds of 0 and the shifts of tables
+        # converters of a net with thresholds or gains are fitted with what is calibrated below
+        self.by_layer = (s["adc_range"] in ("tracking", "calibrated") and READINGS["converters"] == "layer"
+                         and any(a["threshold"] or a["gain"] != "table" for a in self.layers))
+        self.set_converters()
         self.forget_rails()
         self.unlooked = 0
         self.calibrate_homeostasis()
@@ -361,7 +362,10 @@ class ConvNet(Net):
         maps = {"p": codes, "n": codes}
         self.lsh_before = list(self.lsh)
         for l in range(self.nl):
-            a, rec = self.layers[l], self.read_layer(l, maps, count, self.s["adc"] == "ideal")
+            a = self.layers[l]
+            if self.by_layer:
+                self.fit_converters(l, {"xp": self.reads(l, maps["p"]), "xn": self.reads(l, maps["n"])})
+            rec = self.read_layer(l, maps, count, self.s["adc"] == "ideal")
             n = len(codes) * a["positions"]
             if l in self.T:
                 for st in "pn":
@@ -389,7 +393,7 @@ class ConvNet(Net):
                     self.lsh[l], self.V[l] = self.lsh[l] + 1, self.V[l] >> 2
                 elif self.V[l] < self.constant(l, 3, 15):
                     self.lsh[l], self.V[l] = self.lsh[l] - 1, self.V[l] << 2
-                assert -8 <= self.lsh[l] <= 47
+                assert -8 <= self.lsh[l] <= 47, "reaches an end"
             if l in self.T:
                 for st in "pn":
                     self.T[l][st] = self.T[l][st] + rsh((recs[l]["acc_" + st][rows].sum(axis=0) << 8) - n * self.T[l][st], w)
@@ -487,7 +491,7 @@ class ConvNet(Net):
                 X = ((self.R[l] + 128) >> 1) - self.k[l]
                 kept = min(max(X, 0), 256 * 31 - 1)
                 self.held[l] += kept != X
-                m, s = POWERS[kept & 255]
+                m, s = power_table(kept & 255)
             for p, v in sums.items():
                 self.program(l, p, self.stochastic(sign(p) * v * m, (kept >> 8) + s - F, l, p) if z else np.zeros_like(v))
         if a["centred"] and not first:
