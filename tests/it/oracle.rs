@@ -13,7 +13,7 @@ use dalean::chip::hardware::{
 use dalean::chip::layer::{DrivenBy, Homeostasis, InitialLevels, LayerSpec, Optimiser, Pool};
 use dalean::chip::ledger::{During, Event};
 use dalean::chip::population::Wiring;
-use dalean::learn::error::Centre;
+use dalean::learn::error::{Centre, OutputError};
 use dalean::learn::network::NetworkSpec;
 use dalean::learn::route::Route;
 use dalean::learn::rule::{Rule, UpdateMode};
@@ -147,6 +147,7 @@ fn experiment(s: &Value) -> Experiment {
         layers,
         rule: Rule::Ed,
         mode: mode(s),
+        error: OutputError::OneVsAll,
         centre: centre(s),
         route: Some(Route::Modulo { taps, shift }),
         batch: Batch::new(int(&s["batch"])).unwrap(),
