@@ -89,7 +89,7 @@ pub mod network {
         DrivenBy, Gain, Homeostasis, InitialLevels, LayerSpec, Optimiser, PlanError, Pool,
     };
     pub use crate::chip::population::Wiring;
-    pub use crate::learn::error::Centre;
+    pub use crate::learn::error::{Centre, OutputError};
     pub use crate::learn::route::Route;
     pub use crate::learn::rule::{Rule, UpdateMode};
     pub use crate::num::fixed::{Batch, RateMantissa};

@@ -21,7 +21,7 @@ use super::crossbar::Collect;
 use super::crossbar::kernel::{Backend, Team};
 use super::crossbar::layout::BLOCK_ROWS;
 use super::hardware::Hardware;
-use super::layer::{DrivenBy, Layer};
+use super::layer::{DrivenBy, Layer, Readings};
 use super::ledger::{Cycles, During, Event, Ledger, coded};
 use super::population::{Stream, Wiring};
 use crate::num::tables::Scales;
@@ -32,6 +32,7 @@ mod currents;
 mod each;
 mod error;
 mod forward;
+mod homeostasis;
 mod mute;
 mod normalise;
 mod optimise;
@@ -55,7 +56,7 @@ mod words;
 use forward::Units;
 use schedule::Schedule;
 
-pub use calibrate::Calibration;
+pub use calibrate::{CALIBRATION_SAMPLES, Calibration};
 pub use pulses::{Pulses, TilePeaks, active};
 pub use tape::Recorded;
 pub use track::WritesDone;
@@ -182,6 +183,8 @@ struct Registers {
     images: [Lines<u8>; 2],
     /// Sums by target stream, where units are normalised: they lie here until all of a stream are known.
     unscaled: [Lines<i32>; 2],
+    /// What units that keep to a middle learnt from what was read last.
+    readings: Readings,
     /// Accumulators by target stream, of the last layer.
     accumulators: [Vec<i64>; 2],
     /// Activities by target stream, of the last layer where it has some.

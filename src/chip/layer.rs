@@ -17,11 +17,13 @@ use crate::num::fixed::DriveBits;
 use crate::num::tables::{Activation, FullDrive, Lut, Unit};
 
 mod delivery;
+pub mod homeostasis;
 pub mod requests;
 mod stage;
 mod state;
 
 pub use delivery::{Delivery, Taps, WordSource};
+pub use homeostasis::{Balance, Readings};
 pub use requests::{Followed, Optimiser, Requests};
 pub use stage::{Gain, Homeostasis, Pool};
 
@@ -203,6 +205,8 @@ pub struct Layer {
     /// Of converters that track, by target stream and slice: codes on the rail, and all codes, of training since ranges
     /// were last looked at. Empty where none track.
     pub rails: Vec<Vec<[u64; 2]>>,
+    /// Thresholds and step of its units.
+    pub balance: Balance,
     /// How its sums become requests.
     pub requests: Requests,
 }
@@ -239,7 +243,20 @@ impl Layer {
         let rails = if tracks { adc_shifts.iter().map(no_rail).collect() } else { vec![] };
         let writes = vec![0; arrays.len()];
         let requests = Requests::PLAIN;
-        Self { index, spec, layout, lut, delivery, arrays, writes, adc_shifts, rails, requests }
+        let balance = Balance::new(&spec, hardware.digital.lut_bits, lut.shift);
+        Self {
+            index,
+            spec,
+            layout,
+            lut,
+            delivery,
+            arrays,
+            writes,
+            adc_shifts,
+            rails,
+            balance,
+            requests,
+        }
     }
 
     /// The table as kernels take it: what a unit hands on is its activity or, with `drive_bits`, the drive code of

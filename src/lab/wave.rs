@@ -69,7 +69,7 @@ pub fn record(
     after.keep_tape();
     after.updates(look.update)?;
     let tape = after.take_tape();
-    let samples = samples_of(&tape, before.engines()[0].layers()[0].spec.inputs);
+    let samples = samples_of(&tape, before.engines()[0].layers()[0].spec.sample_inputs());
 
     let engine = before.engines()[0];
     let mut network = Network::new(&config.hardware, config.seed, engine.layers(), samples);
@@ -88,7 +88,8 @@ pub fn record(
     let writer = Rc::new(RefCell::new(vcd::Writer::new(timing.clock_khz, look.all)));
     let sink = Rc::clone(&writer);
     network.watch_tile(place, move |cycle, tile: &Tile| {
-        sink.borrow_mut().cycle(cycle, &tile.registers());
+        let most = if look.all { usize::MAX } else { NUMBERS_MAX };
+        sink.borrow_mut().cycle(cycle, &tile.registers_within(most));
     });
     network.play_tape(&tape);
 

@@ -2,12 +2,29 @@
 //!
 //! ```text
 //! e[b][c] = target - a_p                                      target 255 onehot; one output: 255 label
+//! e[b][c] = 255 onehot - p                                    p: what classes share of 255, by softmax of accumulators
 //! ```
 //!
 //! What an error unit makes of them, [`ErrorUnit`], is a part of the chip. See docs/MODEL.md, 3.1.
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
 pub use crate::chip::engine::{Centre, ErrorUnit};
+use crate::num::tables::Positive;
+
+/// What an error of an output is.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[non_exhaustive]
+pub enum OutputError {
+    /// How far its activity is from its target, each class for itself. Of an output that is read out as it is, the error is
+    /// what a task hands.
+    #[default]
+    OneVsAll,
+    /// How far what it shares with the others is from its target, by look-up of its accumulator.
+    Softmax {
+        /// Nats of an accumulator are divided by it.
+        temperature: Positive,
+    },
+}
 
 /// Errors of one sample: `255 onehot - a`, or `255 label - a` of a single output.
 pub fn errors(label: u8, activity: impl ExactSizeIterator<Item = u8>, out: &mut Vec<i32>) {

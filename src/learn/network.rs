@@ -14,7 +14,7 @@ mod tests;
 pub use check::{GAIN_64THS, WEIGHT_MAX_LOG2};
 
 use super::driver::{Driver, Learning};
-use super::error::{Centre, ErrorUnit};
+use super::error::{Centre, ErrorUnit, OutputError};
 use super::route::Route;
 use super::rule::{Rule, UpdateMode};
 use crate::chip::crossbar::kernel::Backend;
@@ -25,7 +25,7 @@ use crate::chip::layer::{self, Delivery, InitialLevels, Layer, LayerSpec, Optimi
 use crate::chip::population::{Pathway, Polarity};
 use crate::num::draw::{Place, Site};
 use crate::num::fixed::{Batch, RateMantissa, log2_ceil};
-use crate::num::tables::{Activation, Decay, Positive, Rate, RateOf, half_gaussian};
+use crate::num::tables::{Activation, Decay, Positive, Rate, RateOf, SoftmaxTables, half_gaussian};
 
 /// `log2` of the batches after which a mean drive has come all the way, were it not to turn: 0.1 a batch is the rate that
 /// was measured, and an eighth the nearest power of two.
@@ -42,6 +42,8 @@ pub struct NetworkSpec {
     pub rule: Rule,
     /// When a batch is written.
     pub mode: UpdateMode,
+    /// What an error of an output is.
+    pub error: OutputError,
     /// What is subtracted from errors.
     pub centre: Centre,
     /// How errors reach hidden layers; `None` for back-propagation, whose errors come down through the layers above.
@@ -75,13 +77,14 @@ pub struct NetworkPlace {
 /// A network that does not fit together, or not on the chip.
 ///
 /// ```
-/// use dalean::network::{Batch, Centre, Decay, Rule, UpdateMode};
+/// use dalean::network::{Batch, Centre, Decay, OutputError, Rule, UpdateMode};
 /// use dalean::{Hardware, NetworkSpec};
 ///
 /// let nothing = NetworkSpec {
 ///     layers: vec![],
 ///     rule: Rule::Bp,
 ///     mode: UpdateMode::Accumulate,
+///     error: OutputError::OneVsAll,
 ///     centre: Centre::None,
 ///     route: None,
 ///     batch: Batch::new(1)?,
@@ -203,8 +206,15 @@ impl NetworkSpec {
         engine.set_centred(&windows);
         load_initial_levels(&mut engine, place.seed);
         let bits = hardware.digital.error_bits;
-        let unit = match self.layers.last().map(|last| last.activation) {
-            Some(Activation::Accumulator) => ErrorUnit::handed(bits),
+        let unit = match (self.error, self.layers.last()) {
+            (OutputError::Softmax { temperature }, Some(last)) => {
+                let unit = layer::unit(last, hardware);
+                let tables = SoftmaxTables::new(unit, temperature, self.outputs());
+                ErrorUnit::new(self.centre, bits, self.outputs()).with_softmax(tables)
+            }
+            (_, Some(last)) if last.activation == Activation::Accumulator => {
+                ErrorUnit::handed(bits)
+            }
             _ => ErrorUnit::new(self.centre, bits, self.outputs()),
         };
         let learning = Learning { rule: self.rule, mode: self.mode, shifts };

@@ -1,6 +1,7 @@
 //! Rules: makers of operation lists. A rule says in which order errors are delivered and layers written; it
 //! never touches a cell.
 
+use super::error::OutputError;
 use crate::chip::engine::Write;
 use crate::chip::population::Wiring;
 use crate::num::tables::Activation;
@@ -57,10 +58,13 @@ pub enum Readout {
 }
 
 impl Readout {
-    /// That of a last layer with units of this kind.
+    /// That of a last layer with units of this kind, from which errors of this kind come.
     #[must_use]
-    pub fn of(activation: Activation) -> Self {
-        if activation == Activation::Accumulator { Self::All } else { Self::P }
+    pub fn of(activation: Activation, error: OutputError) -> Self {
+        match (activation, error) {
+            (Activation::Accumulator, OutputError::OneVsAll) => Self::All,
+            _ => Self::P,
+        }
     }
 }
 

@@ -6,6 +6,7 @@
 //! lsh      = least shift >= 0 with 2^(lut_bits - 1 + lsh) units >= 4 alpha (sigmoid), 4 (ReLU, identity)
 //! exact    : units are rational, so tables of ReLU and identity, and their lsh, are computed in integers:
 //!            lut_a[i] = floor( (2 * 255 * i * 2^p + D) / (2 D) ),  p = lsh + log2(weight_max) - level_bits,  D = 2^drive_bits - 1
+//! softmax  of accumulators, by look-up: `softmax`
 //! k        of a rate: `rate`;  factors of a layer: `scales`
 //! ```
 //!
@@ -20,12 +21,14 @@ mod policy;
 pub(crate) mod precise;
 mod rate;
 mod scales;
+mod softmax;
 mod unit;
 
 pub use gaussian::half_gaussian;
 pub use policy::PolicyTables;
 pub use rate::{Decay, LEVELS_SHIFT_MAX, Rate, RateOf, SHIFT_MAX};
 pub use scales::{Factor, Scales};
+pub use softmax::SoftmaxTables;
 pub use unit::{FullDrive, Unit};
 
 use super::fixed::{LutBits, narrow, rsh};

@@ -9,14 +9,16 @@ import numpy as np
 from oracle import (I64, NN, NP, PATH_NAMES, PN, PP, SITE_DITHER, SITE_INIT, Net, activity_codes, clamp_counted, data_codes,
                     draw_cells, gain_word, rsh, sat, shuffle_order, table_shift, tables, tap_table)
 
-# The sentence that has two readings, and the one that the golden file has.
+# Sentences of the specification that had two readings when this was written, and the one that the golden file has. Where the
+# program took the other one at first sight, it says so.
 READINGS = dict(
-    pool_of="drives",              # what a pool pools: "activities" of 8 bits, or "drives" of drive_bits, as the program does
-    replay_moves="batch",          # thresholds and gains of a replay: once a "batch" or after each "sample"'s write
-    on_off="each",                 # full scale of the halves: "each" its own range, or "data", that of the data
-    nearest="ratio",               # of a mantissa of rms: by the "difference" of the numbers, or by their "ratio", as the program does
-    converters="layer",            # ranges of a net with thresholds or gains: "layer" by layer with those below, or of the "network" before any
-    sign_words="separable",        # words of sign with separable dither: "separable" as any word of a cell, or "cell"
+    pool_of="drives",              # a pool takes codes of drive_bits, or "activities" of 8 bits before them (first reading; MODEL 2.4 says codes)
+    replay_moves="batch",          # thresholds and gains of a replay move once a batch, or after the write of each "sample" (MODEL 2.5)
+    on_off="each",                 # full scale of the halves: each its own range, or that of the "data"
+    nearest="ratio",               # the mantissa of rms nearest to a power: by their ratio, or by their "difference" (first reading)
+    converters="layer",            # ranges of a net with thresholds or gains: layer by layer with those below, or of the "network" before any
+                                   # (first reading; MODEL 2.5 says by layer)
+    sign_words="separable",        # words of sign with separable dither: separable as any word of a cell, or its own "cell"'s (first reading)
 )
 
 
@@ -77,8 +79,9 @@ WHITE = """
 WHITE = np.array(WHITE.split(), I64).reshape(3, 3, 5, 5)      # [filter][colour][ky][kx]
 
 
-def white(x):
+def white(x, full_scale):
     """Six unsigned channels, 255 the full scale: on_0 on_1 on_2 off_0 off_1 off_2."""
+    x = data_codes(x, full_scale, 8)
     n, height, width, channels = x.shape
     assert channels == 3
     size = height * width * 3
@@ -171,7 +174,7 @@ class ConvNet(Net):
         self.raw, self.y = images(s["examples"], s["height"], s["width"], s["channels"], s["classes"], s["full_scale"])
         self.means_of_data = None
         if s["coding"] == "white":
-            self.values, self.full = white(self.raw)
+            self.values, self.full = white(self.raw, s["full_scale"])
         elif s["coding"] == "on_off":
             self.values, self.full, self.means_of_data = on_off(self.raw, s["full_scale"])
         else:
@@ -240,7 +243,7 @@ class ConvNet(Net):
         self.k = [self.shift_of(l) for l in range(self.nl)]
         for l, a in enumerate(self.layers):
             if a["optimiser"] != "rms":
-                assert 0 <= self.k[l] <= (16 if a["optimiser"] == "sign" else 30), (l, self.k[l])
+                assert 0 <= nearest(self.kstar[l]) <= (16 if a["optimiser"] == "sign" else 30), (l, self.k[l])
         self.mu = np.zeros(s["classes"], I64)
         self.sat_train, self.events = self.new_sat(), {}
         self.calib_other, self.ash = None, []

@@ -49,9 +49,23 @@ fn by_hand(profile: &Profile, act: &Act) -> [(&'static str, [f64; 3]); 4] {
         let class = match constant.quantity.name {
             "cell_read" | "cell_load" | "cell_pulse" | "row_pulse" | "laser" | "heater" => 0,
             "dac_slice" | "hold" | "conversion" | "verify_read" | "receiver" => 1,
-            "shift_add" | "look_up" | "multiply" | "bus_word" | "accumulate" | "delta"
-            | "sram_bit" | "square" | "root" | "scaling" | "row_mean" | "sum_square"
-            | "optimiser_step" => 2,
+            "shift_add"
+            | "look_up"
+            | "multiply"
+            | "bus_word"
+            | "accumulate"
+            | "delta"
+            | "sram_bit"
+            | "square"
+            | "root"
+            | "scaling"
+            | "row_mean"
+            | "sum_square"
+            | "optimiser_step"
+            | "pooling"
+            | "threshold_subtraction"
+            | "statistic_add"
+            | "softmax_look_up" => 2,
             "static" | "tile_static" => 3,
             other => panic!("no class of {other}"),
         };

@@ -40,6 +40,7 @@ mod levels;
 #[cfg(target_arch = "aarch64")]
 mod neon;
 mod normalise;
+mod offsets;
 mod ops;
 mod optimise;
 #[cfg(target_arch = "x86_64")]
@@ -68,6 +69,7 @@ pub use self::{
         OneSample, Peaks, Pulsed, Rails, Scratch, TOGETHER, WriteCounts, WriteLaw, is_driven,
     },
     normalise::{HandOn, SQUARED_MAX},
+    offsets::OFFSET_MAX,
     optimise::{MEAN_BITS, SignLaw, Squares, joined},
     sums::Sums,
     team::Team,
@@ -225,6 +227,36 @@ impl Kernel {
         let least = (samples - 1) * BLOCK_ROWS + PANEL_COLUMNS;
         assert!(values.len() >= least && derivatives.len() >= least, "every unit has its place");
         call!(self, look_up(accumulators, table, live, values, derivatives))
+    }
+
+    /// Takes an offset a unit off the sums of a panel of 32 units, `[sample][32]`, and raises what is left by a power of two;
+    /// the sums of each unit, as they were, are added to its total. The plan proves that differences fit: numbers lie below
+    /// [`OFFSET_MAX`], `raise` below it where they are raised.
+    ///
+    /// # Panics
+    /// When the sizes do not match.
+    pub fn offset(
+        &self,
+        sums: &mut [i32],
+        offsets: &[i32; PANEL_COLUMNS],
+        raise: u32,
+        totals: &mut [i64; PANEL_COLUMNS],
+    ) {
+        assert!(sums.len().is_multiple_of(PANEL_COLUMNS) && raise < 31, "32 units a sample");
+        call!(self, offset(sums, offsets, raise, totals));
+    }
+
+    /// Sum of the squares of the places at which the first `live` units of a panel (`[sample][32]`) are looked up, counted from
+    /// the middle of a table of `2 half` entries.
+    ///
+    /// # Panics
+    /// When the sizes do not match.
+    #[must_use]
+    pub fn index_squares(&self, sums: &[i32], shift: u32, half: i32, live: usize) -> u64 {
+        assert!(sums.len().is_multiple_of(PANEL_COLUMNS), "32 units a sample");
+        assert!(live <= PANEL_COLUMNS && shift <= 30, "a panel has 32 columns");
+        assert!((1..=1 << 15).contains(&half), "squares of indices fit 32 bits");
+        call!(self, index_squares(sums, shift, half, live))
     }
 
     /// `sums = E - I`, sum by sum. The plan proves that it fits.

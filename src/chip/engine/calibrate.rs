@@ -8,16 +8,19 @@
 //!
 //! The first 256 training samples are read with ideal converters in the whole network, and every current that a
 //! finite converter would have seen is noted. A conversion is on the rail when its code is the greatest one
-//! (or, of a difference, the least). See docs/MODEL.md, 2.
+//! (or, of a difference, the least). Where units keep to a middle this is done layer by layer upward, each with
+//! what was found below: a layer's converters, then its thresholds and step (see `homeostasis`), and what the layer above is
+//! driven with is read as the chip reads it. See docs/MODEL.md, 2.
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
 use super::read::Mode;
 use super::{Engine, Operation, Phase};
 use crate::chip::hardware::{Adc, AdcRange};
+use crate::chip::layer::Layer;
 use crate::num::fixed::rsh;
 
-/// Samples read to find converter ranges.
-const SAMPLES: usize = 256;
+/// Samples read to find converter ranges, thresholds and steps.
+pub const CALIBRATION_SAMPLES: usize = 256;
 /// One conversion in so many may lie on the rail.
 const RARE: u64 = 1024;
 
@@ -32,15 +35,40 @@ pub struct Calibration {
 
 impl Engine {
     /// Reads up to 256 samples (`inputs` codes each) with ideal converters and, if the hardware calibrates, sets
-    /// the converter shifts. `None` when the converters are ideal.
+    /// the converter shifts; before the first update also thresholds and steps of units that keep to a middle. `None` when
+    /// the converters are ideal.
     pub fn calibrate(&mut self, codes: &[u8]) -> Option<Calibration> {
-        let Adc::Finite { range, .. } = self.hardware.adc else { return None };
+        let range = match self.hardware.adc {
+            Adc::Finite { range, .. } => Some(range),
+            Adc::Ideal => None,
+        };
+        let balance = self.is_to_balance();
+        let on = |layer: &Layer| balance && layer.balance.law().is_on();
+        let layers = match range {
+            Some(_) => self.layers.len(),
+            // nothing waits for what lies above
+            None => self.layers.iter().rposition(on).map_or(0, |last| last + 1),
+        };
+        if layers == 0 {
+            return None;
+        }
         let phase = self.phase;
         self.set_phase(Phase::Calibration);
         let inputs = self.layers[0].spec.sample_inputs();
-        self.execute(&Operation::LoadDrives { codes: &codes[..codes.len().min(SAMPLES * inputs)] });
+        self.execute(&Operation::LoadDrives {
+            codes: &codes[..codes.len().min(CALIBRATION_SAMPLES * inputs)],
+        });
         let mut calibration = Calibration { shifts: vec![], code_max: vec![] };
-        for layer in 0..self.layers.len() {
+        for layer in 0..layers {
+            let on = on(&self.layers[layer]);
+            let Some(range) = range else {
+                if on {
+                    self.balance(layer)
+                } else {
+                    self.forward(layer)
+                }
+                continue;
+            };
             let histograms = self.forward_in(layer, Mode::Probe);
             let mut code_max = 0;
             for (target, histogram) in histograms.iter().enumerate() {
@@ -59,9 +87,15 @@ impl Engine {
             }
             calibration.shifts.push(self.layers[layer].adc_shifts.clone());
             calibration.code_max.push(code_max);
+            // with something to find above, everything is read as the chip reads it
+            if on {
+                self.balance(layer);
+            } else if balance && layer + 1 < layers {
+                self.forward(layer);
+            }
         }
         self.set_phase(phase);
-        Some(calibration)
+        range.map(|_| calibration)
     }
 }
 

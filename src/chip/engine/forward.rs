@@ -3,7 +3,7 @@
 //! ```text
 //! ideal      acc = v_E - v_I                                  over all rows
 //! finite     acc += d << (ash + s dac_bits)                    over slices s and row tiles
-//! a, a'      table at index(acc);  next drive from a
+//! a, a'      table at index(acc);  next drive from a         index(acc - rsh(T, 8)) of units that keep to a middle
 //! readout    acc kept;  a' = 255;  y = acc_p - acc_n, or acc_p where there is no n
 //! ```
 //!
@@ -15,6 +15,7 @@ use std::ops::Range;
 
 use super::Engine;
 use super::each::each;
+use super::homeostasis::Middle;
 use super::read::{Histogram, Mode, PanelPart, Reader, Seen};
 use crate::chip::crossbar::kernel::{HandOn, Kernel, LookUp, Scratch, TOGETHER};
 use crate::chip::crossbar::layout::{BLOCK_ROWS, PANEL_COLUMNS};
@@ -31,6 +32,8 @@ use crate::num::tables::Activation;
 pub(super) enum Units {
     /// They look them up.
     Table(LookUp),
+    /// They look up how far from their middle they are, in steps that a read brings with it.
+    Homeostatic(LookUp),
     /// They are normalised, stream by stream.
     Normalised(HandOn),
     /// They keep them, with slope 1: a readout.
@@ -48,6 +51,7 @@ impl Units {
             (Activation::Rms, None) => panic!("what is normalised drives a layer"),
             (Activation::Accumulator, None) => Self::Kept,
             (Activation::Accumulator, Some(_)) => panic!("what is read out drives no layer"),
+            _ if layer.spec.homeostasis.is_on() => Self::Homeostatic(layer.look_up(drive_bits)),
             _ => Self::Table(layer.look_up(drive_bits)),
         }
     }
@@ -76,10 +80,15 @@ impl Engine {
             return vec![Histogram::new(); wiring.targets().len()];
         }
         self.make_room(layer);
-        let seen = match self.units[layer] {
+        if let Units::Homeostatic(table) = &mut self.units[layer] {
+            table.shift = u32::try_from(self.layers[layer].balance.shift()).unwrap_or(0);
+        }
+        let notes = self.notes(layer, mode);
+        let mut seen = match self.units[layer] {
             Units::Normalised(hand_on) => self.normalised(layer, mode, hand_on),
-            Units::Table(_) | Units::Kept => self.put_out(layer, mode),
+            Units::Table(_) | Units::Homeostatic(_) | Units::Kept => self.put_out(layer, mode),
         };
+        self.note(layer, notes, &mut seen);
         self.hand_on(layer);
         self.load_constant(layer + 1);
         self.note_currents(layer);
@@ -127,6 +136,7 @@ impl Engine {
     /// Reads a layer whose units need nothing but their own accumulators. What was seen, by target.
     fn put_out(&mut self, layer: usize, mode: Mode) -> Vec<Seen> {
         let samples = self.reads(layer);
+        let notes = self.notes(layer, mode);
         let direct = self.hands_on_directly(layer);
         let (head, tail) = self.registers.split_at_mut(layer + 1);
         let own = &mut head[layer];
@@ -164,12 +174,16 @@ impl Engine {
                 }
             }
         }
+        let middles = wiring.targets().iter().zip(&readers);
+        let middles: Vec<_> =
+            middles.map(|(&target, reader)| Middle::of(this, target, reader, notes)).collect();
         let units = &self.units[layer];
         let work = samples * this.layout.cells() * wiring.pathways().len();
         let blocks = this.layout.columns.div_ceil(BLOCK_ROWS);
         let parts = outs.into_iter().map(|outs| (outs[0].block, outs)).collect();
         let seen = each(&mut self.team, work, blocks, parts, |kernel, outs| {
             let target = outs[0].target.index();
+            let units = (units, middles[target].as_ref());
             (target, put_out(kernel, &readers[target], units, samples, outs))
         });
         Seen::by_target(wiring, seen)
@@ -223,7 +237,7 @@ impl Engine {
             }
             let code = Self::code_of(wiring, target);
             match self.units[layer] {
-                Units::Table(_) => {
+                Units::Table(_) | Units::Homeostatic(_) => {
                     self.charge_read(layer, code, Event::LookUps, samples * columns);
                     // an entry of the table, then activity and derivative
                     self.charge_read(layer, code, Event::SramBits, samples * columns * 32);
@@ -246,7 +260,7 @@ fn blocks_together(hardware: &Hardware) -> usize {
 fn put_out(
     kernel: &Kernel,
     reader: &Reader<'_>,
-    units: &Units,
+    (units, middle): (&Units, Option<&Middle>),
     samples: usize,
     mut outs: Vec<Out<'_>>,
 ) -> Seen {
@@ -256,6 +270,7 @@ fn put_out(
     for start in (0..samples).step_by(TOGETHER) {
         let group = start..(start + TOGETHER).min(samples);
         for out in &mut outs {
+            let units = (units, middle);
             put_out_group(kernel, reader, units, out, &group, (&mut scratch, &mut sums), &mut seen);
         }
     }
@@ -266,7 +281,7 @@ fn put_out(
 fn put_out_group(
     kernel: &Kernel,
     reader: &Reader<'_>,
-    units: &Units,
+    (units, middle): (&Units, Option<&Middle>),
     out: &mut Out<'_>,
     group: &Range<usize>,
     (scratch, sums): (&mut Scratch, &mut [i32; Scratch::SUMS]),
@@ -295,6 +310,19 @@ fn put_out_group(
                 Units::Table(table) => {
                     seen.look_ups += kernel.look_up(sums, table, live, values, derivatives);
                 }
+                Units::Homeostatic(table) => {
+                    let middle = middle.expect("made with the read");
+                    if middle.is_narrow() {
+                        middle.take_off(kernel, (panel, live), table.shift, sums, seen);
+                        seen.look_ups += kernel.look_up(sums, table, live, values, derivatives);
+                    } else {
+                        let mut wide = [0; Scratch::SUMS];
+                        wide.iter_mut().zip(&*sums).for_each(|(wide, &sum)| *wide = sum.into());
+                        let wide = &mut wide[..cells];
+                        middle.take_off_wide((panel, live), table.shift, wide, seen);
+                        look_up_wide(wide, table, live, [values, derivatives], seen);
+                    }
+                }
                 _ => slope_one(derivatives, live, group.len()),
             }
             keep(kept, sums.iter().map(|&sum| i64::from(sum)));
@@ -304,6 +332,11 @@ fn put_out_group(
             reader.read_wide(kernel, &part, sums, seen);
             match units {
                 Units::Table(table) => {
+                    look_up_wide(sums, table, live, [values, derivatives], seen);
+                }
+                Units::Homeostatic(table) => {
+                    let middle = middle.expect("made with the read");
+                    middle.take_off_wide((panel, live), table.shift, sums, seen);
                     look_up_wide(sums, table, live, [values, derivatives], seen);
                 }
                 _ => slope_one(derivatives, live, group.len()),

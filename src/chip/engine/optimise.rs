@@ -165,6 +165,12 @@ impl Engine {
         let sets = spec.drive_sets();
         if let Some(shape) = spec.convolution {
             let samples = ready.samples / shape.positions();
+            if samples == 0 {
+                // a write of nothing
+                let rows = shape.channels + usize::from(spec.constant_row);
+                sets.iter().for_each(|set| codes[set.index()] = vec![0; rows]);
+                return codes;
+            }
             assert!(samples == self.samples, "means are taken of all that is loaded");
             let pixels = (samples * shape.height * shape.width) as i64;
             let constant = pixels * i64::from(self.hardware.drive.bits.code_max());
@@ -214,7 +220,9 @@ impl Engine {
             self.charge(layer, code, During::Update, Event::RowMeans, count);
             self.charge(layer, code, During::Update, Event::SramBits, MEAN_WIDTH * count);
         };
-        // used by every array in each pass that sees it, and kept once a set of drives
+        // used by every array in each pass that sees it, and kept once a set of drives, or a channel of it
+        let constant = usize::from(spec.constant_row);
+        let kept = spec.convolution.map_or(rows, |shape| (shape.channels + constant) as u64);
         let pathways = spec.wiring.pathways();
         for pathway in pathways {
             let looks = looks_at(optimiser, pathway.polarity == Polarity::Inhibits);
@@ -222,7 +230,7 @@ impl Engine {
         }
         for &set in spec.drive_sets() {
             let first = pathways.iter().find(|pathway| spec.drives_of(pathway.source) == set);
-            means(first.expect("drives drive an array").code, rows);
+            means(first.expect("drives drive an array").code, kept);
         }
     }
 }

@@ -13,6 +13,7 @@
 use std::borrow::Cow;
 use std::ops::Range;
 
+use super::homeostasis::{Noted, Notes};
 use crate::chip::crossbar::Crossbar;
 use crate::chip::crossbar::kernel::{Banks, Conversion, Drives, Greatest, Kernel, Scratch};
 use crate::chip::crossbar::layout::{BLOCK_ROWS, PANEL_COLUMNS};
@@ -31,6 +32,8 @@ pub(super) enum Mode {
     Hardware,
     /// With ideal converters, remembering what finite ones would need.
     Probe,
+    /// As the hardware says, learning so much of units that keep to a middle.
+    Noting(Notes),
 }
 
 impl Mode {
@@ -58,6 +61,7 @@ pub(super) struct Seen {
     pub(super) reached: Vec<u64>,
     pub(super) look_ups: u64,
     pub(super) histogram: Histogram,
+    pub(super) noted: Noted,
 }
 
 impl Seen {
@@ -80,6 +84,7 @@ impl Seen {
     fn merge(&mut self, other: Self) {
         self.saturated.iter_mut().zip(other.saturated).for_each(|(sum, more)| *sum += more);
         self.look_ups += other.look_ups;
+        self.noted.merge(other.noted);
         self.reached.resize(other.reached.len(), 0);
         self.reached.iter_mut().zip(other.reached).for_each(|(sum, more)| *sum += more);
         if self.histogram.is_empty() {

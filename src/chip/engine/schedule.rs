@@ -6,13 +6,16 @@
 //! ```text
 //! reads      FWD(rows) of successive layers, in a pipeline of layers and samples
 //!                sum_l (1 + T_fwd(l)) + (B - 1) max_l (1 + again(l))
-//!            a normalised layer is followed by a digital stage of its own, of 2 NG + 32 beats in both sums
+//!            a convolution is read P times a sample, back to back:  1 + T_fwd + (P - 1) (1 + again), and P (1 + again)
+//!            a normalised layer is followed by a digital stage of its own, of 2 NG + 32 beats in both sums; one with a
+//!            pool by one of NG beats a position that the pool puts out
 //! rounds     ERR, FWD(columns), UPD(add), UPD(now), sample by sample in the order of the list; in a round a run of
 //!            ERR with the same words is heard by all their layers at once, and a run of UPD on different layers
 //!            goes side by side:  sum_b ( 1 + T_err + ... + 1 + max_l T_upd(l, b) ); words that the error unit forms for
 //!            a layer are formed before its ERR, while nothing else happens
 //! writes     UPD(write) on different layers side by side:  1 + max_l T_write(l)
 //! loads      LOADW, a row a cycle
+//! moves      of thresholds and steps after the writes, side by side:  max_l beat NG(l)
 //! ```
 //!
 //! Where a later operation would see what an earlier one of another sample has still to do (a second UPD(now) of a
@@ -25,7 +28,7 @@ use std::ops::Range;
 use super::Write;
 use crate::chip::hardware::timing::{Timing, tree_levels};
 use crate::chip::hardware::{Hardware, ReadTime};
-use crate::chip::layer::Layer;
+use crate::chip::layer::{Layer, Pool};
 use crate::chip::ledger::{Cycles, During, Interval, Part};
 use crate::chip::population::Stream;
 use crate::num::tables::Activation;
@@ -44,8 +47,10 @@ struct Shape {
     words: u64,
     /// Cycles in which the error unit forms the words of a sample.
     form: u64,
-    /// Cycles of the stage that normalises a sample, which no command begins; 0 where there is none.
-    normalise: u64,
+    /// Reads of a sample.
+    positions: u64,
+    /// Cycles of the stage behind it, which normalises or pools a sample and which no command begins; 0 where there is none.
+    stage: u64,
 }
 
 /// Layers whose commands of one kind run at the same time.
@@ -167,6 +172,7 @@ impl Schedule {
             let pairs = layer.spec.wiring.pairs(Stream::P).len() as u64;
             let columns = layer.layout.columns.min(hardware.tile.columns) as u64;
             let normalised = layer.spec.activation == Activation::Rms;
+            let pooled = layer.spec.pooled().into_iter().product::<usize>() as u64;
             let planes = layer.spec.wiring.planes().count() as u64;
             Shape {
                 rows: layer.layout.rows.min(hardware.tile.rows) as u64,
@@ -175,7 +181,12 @@ impl Schedule {
                 tiles: planes * down * across,
                 words: layer.delivery.taps.width as u64,
                 form: timing.form(layer.delivery.terms() as u64),
-                normalise: if normalised { timing.normalise(columns) } else { 0 },
+                positions: layer.spec.positions() as u64,
+                stage: match layer.spec.pool {
+                    Pool::None if normalised => timing.normalise(columns),
+                    Pool::None => 0,
+                    _ => timing.pool(columns, pooled),
+                },
             }
         };
         Self {
@@ -204,15 +215,16 @@ impl Schedule {
             self.settle(cycles);
             self.segment = Segment::Reads { next: layer, samples: 0, latency: 0, again: 0 };
         }
-        let one = t.accept() + self.reads.read(1, shape.columns, shape.levels[0]);
         let front = t.accept() + self.reads.again(1, shape.columns);
+        let one = t.accept() + self.reads.read(1, shape.columns, shape.levels[0]);
+        let one = one + (shape.positions - 1) * front;
         if let Segment::Reads { next, samples: count, latency, again } = &mut self.segment {
             *next = layer + 1;
             *count = samples as u64;
-            *latency += one + shape.normalise;
-            *again = (*again).max(front).max(shape.normalise);
+            *latency += one + shape.stage;
+            *again = (*again).max(shape.positions * front).max(shape.stage);
         }
-        let count = samples as u64;
+        let count = samples as u64 * shape.positions;
         cycles.occupy(layer, During::ForwardRows, count * front);
         self.engage_read(cycles, layer, [count, 1], shape.columns, shape.levels[0]);
     }
@@ -231,6 +243,12 @@ impl Schedule {
         cycles.engage(layer, Part::Converters, reads * times * self.reads.converters);
         cycles.engage(layer, Part::Tree, reads * t.beat * levels);
         cycles.engage(layer, Part::Lanes, reads * t.beat * t.groups(lines));
+    }
+
+    /// The error unit looks so many entries up, one a beat.
+    pub(super) fn look_up_outputs(&mut self, cycles: &mut Cycles, look_ups: u64) {
+        self.settle(cycles);
+        cycles.pass(Interval::Centre, self.timing.beat * look_ups);
     }
 
     /// The error unit takes the mean over a batch.
@@ -274,7 +292,7 @@ impl Schedule {
             return;
         }
         let (t, shape) = (self.timing, self.shapes[layer]);
-        let one = t.accept() + t.error(shape.words, shape.columns);
+        let one = t.accept() + t.error(shape.words, shape.columns, shape.positions);
         for round in self.rounds(cycles, samples) {
             if shape.form > 0 {
                 round.close();
@@ -285,7 +303,8 @@ impl Schedule {
         let count = samples.len() as u64;
         cycles.occupy(layer, During::Error, count * one);
         cycles.engage(layer, Part::Bus, count * t.beat * shape.words);
-        cycles.engage(layer, Part::Multipliers, count * t.beat * t.groups(shape.columns));
+        let gates = count * shape.positions;
+        cycles.engage(layer, Part::Multipliers, gates * t.beat * t.groups(shape.columns));
     }
 
     /// `FWD(columns)` of all samples: both phases, with all slices.
@@ -318,7 +337,7 @@ impl Schedule {
             return;
         }
         let (t, shape) = (self.timing, self.shapes[layer]);
-        let busy = t.accumulate(shape.rows, shape.columns);
+        let busy = shape.positions * t.accumulate(shape.rows, shape.columns);
         for round in self.rounds(cycles, samples) {
             round.join(Doing::Adding, layer, t.accept() + busy, false);
         }
@@ -343,6 +362,12 @@ impl Schedule {
             one += t.look(shape.rows, shape.columns, shape.tiles);
             let squared = t.accumulate(shape.rows, shape.columns);
             cycles.engage(layer, Part::Accumulators, squared);
+        }
+        if write == Write::Now && shape.positions > 1 {
+            // products of more than one read are added up before anything is written
+            let added = shape.positions * t.accumulate(shape.rows, shape.columns);
+            cycles.engage(layer, Part::Accumulators, added);
+            one += added;
         }
         cycles.occupy(layer, During::Update, one);
         cycles.engage(layer, Part::Writers, busy);
@@ -373,6 +398,19 @@ impl Schedule {
             written[layer] = sample + 1;
             *last = sample;
         }
+    }
+
+    /// Thresholds and steps of these layers move, after the writes.
+    pub(super) fn balance(&mut self, cycles: &mut Cycles, layers: &[usize]) {
+        self.settle(cycles);
+        let mut longest = 0;
+        for &layer in layers {
+            let one = self.timing.beat * self.timing.groups(self.shapes[layer].columns);
+            cycles.occupy(layer, During::Update, one);
+            cycles.engage(layer, Part::Lanes, one);
+            longest = longest.max(one);
+        }
+        cycles.pass(Interval::Program, longest);
     }
 
     /// Ends the segment in progress: its time has passed.

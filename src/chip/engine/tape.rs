@@ -36,7 +36,7 @@ pub enum Recorded {
         /// Errors of the loaded samples, `[sample][output]`.
         errors: Vec<i32>,
     },
-    /// Writes are done, on a chip whose converters track.
+    /// Writes are done, on a chip whose converters track or whose units keep to a middle.
     Written(WritesDone),
     /// `ERR`.
     Error {

@@ -48,13 +48,21 @@ impl Engine {
         }
     }
 
-    /// Writes are done: where converters track, their ranges may be looked at.
+    /// Writes are done: thresholds and steps of tables move where there are some and, where converters track, their ranges
+    /// may be looked at.
     pub fn written(&mut self, written: WritesDone) {
-        if !self.tracks() {
+        let balances = (0..self.layers.len()).any(|layer| self.balances(layer));
+        if !self.tracks() && !balances {
             return;
         }
         if let Some(tape) = &mut self.tape {
             tape.push(Recorded::Written(written));
+        }
+        if balances {
+            self.move_balances();
+        }
+        if !self.tracks() {
+            return;
         }
         if written == WritesDone::Sample {
             self.unlooked += 1;

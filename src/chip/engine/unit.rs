@@ -5,6 +5,7 @@
 //! batch     c = B' e - sum_b' e;  S = sat_eb( floor((2 c + m) / (2 m)) ),  m = B' 2^(9 - error_bits)
 //! running   S = sat_eb( rsh((e << 8) - mu, 17 - error_bits) ),  then mu += rsh((e << 8) - mu, 8)
 //! handed    S = sat_eb( rsh(e, 23 - error_bits) )             e with 20 fractional bits; no centre
+//! softmax   e = 255 onehot - p, p by `num::tables::SoftmaxTables`:  2 CE + 1 look-ups a sample, one a beat, before any mean
 //! ```
 //!
 //! `e` is the error of an output in activity codes or, where a task hands it itself, a number whose 4 is just beyond the
@@ -17,6 +18,7 @@ use crate::chip::ledger::{During, Event};
 use crate::chip::population::Stream;
 use crate::chip::state::{Piece, Section, State, StateError, Visitor};
 use crate::num::fixed::{ErrorBits, rsh, sat};
+use crate::num::tables::SoftmaxTables;
 
 /// What is subtracted from the error of a class.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -39,6 +41,8 @@ pub struct ErrorUnit {
     shift: u32,
     /// `mu`, 8 fractional bits, by output; empty unless the centre runs.
     means: Vec<i64>,
+    /// What it looks accumulators up in, where classes share by softmax.
+    softmax: Option<SoftmaxTables>,
 }
 
 impl ErrorUnit {
@@ -46,7 +50,19 @@ impl ErrorUnit {
     #[must_use]
     pub fn new(centre: Centre, bits: ErrorBits, outputs: usize) -> Self {
         let means = if centre == Centre::Running { vec![0; outputs] } else { vec![] };
-        Self { centre, bits, shift: 9 - bits.get(), means }
+        Self { centre, bits, shift: 9 - bits.get(), means, softmax: None }
+    }
+
+    /// The same unit, where classes share by softmax: it looks the accumulators of outputs up before their errors are there.
+    #[must_use]
+    pub fn with_softmax(self, tables: SoftmaxTables) -> Self {
+        Self { softmax: Some(tables), ..self }
+    }
+
+    /// What it looks accumulators up in, where classes share by softmax.
+    #[must_use]
+    pub const fn softmax(&self) -> Option<&SoftmaxTables> {
+        self.softmax.as_ref()
     }
 
     /// Fractional bits of errors that a task hands itself.
@@ -56,7 +72,7 @@ impl ErrorUnit {
     #[must_use]
     pub const fn handed(bits: ErrorBits) -> Self {
         let shift = Self::POINT + 3 - bits.get();
-        Self { centre: Centre::None, bits, shift, means: vec![] }
+        Self { centre: Centre::None, bits, shift, means: vec![], softmax: None }
     }
 
     /// Bits that are rounded off an error without a centre.
@@ -160,8 +176,14 @@ impl Engine {
         let (words, saturated) = self.unit.words(errors, outputs);
         let code = Self::code_of(wiring, Stream::P);
         self.charge(last, code, During::Error, Event::SaturatedErrors, saturated);
+        let samples = errors.len() / outputs;
+        if self.unit.softmax.is_some() {
+            let each = 2 * outputs as u64 + 1;
+            let look_ups = samples as u64 * each;
+            self.charge(last, code, During::Error, Event::SoftmaxLookUps, look_ups);
+            self.time(|schedule, cycles| schedule.look_up_outputs(cycles, look_ups));
+        }
         if self.unit.waits_for_batch() {
-            let samples = errors.len() / outputs;
             self.time(|schedule, cycles| schedule.centre(cycles, samples, outputs));
         }
         words

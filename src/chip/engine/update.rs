@@ -56,7 +56,13 @@ impl Engine {
                     self.row_sums[layer] = None;
                     return self.write_trains(layer, samples.start, shift, slots_log2);
                 }
-                self.charge_accumulate(layer, self.layers[layer].spec.positions());
+                let reads = self.layers[layer].spec.positions();
+                self.charge_accumulate(layer, reads);
+                if reads > 1 {
+                    // sums of more than one product lie in memory until they are written
+                    let sums = 2 * SUM_BITS * (reads as u64 + 1);
+                    self.charge_cells(layer, Event::SramBits, sums);
+                }
                 self.program(layer, samples.clone(), shift);
                 self.charge_time(layer, write, &samples);
             }

@@ -6,8 +6,9 @@
 //! until the next FWD                  max(NS period, NG)            period = max(T_A, conv), or T_A + conv
 //! slices that take unequal times      see `read_time`
 //! words formed in the error unit       ceil(CE N / U)              of N words, each a sum of CE
-//! ERR                                 CE + H + NG
-//! UPD add                             rows NG
+//! ERR                                 CE + H + P NG                       P reads a sample: positions of a convolution
+//! UPD add                             P rows NG;  of a sample that is written at once, where P > 1, before its write
+//! a pool                              NG a position it puts out
 //! a look at all sums before a write   rows NG + ceil(log2(tiles))
 //! a pulse of a row                    T_W passes, and T_A + conv more when it is verified
 //! ```
@@ -135,13 +136,13 @@ impl Timing {
         columns.div_ceil(self.lanes)
     }
 
-    /// Busy cycles of `ERR` with so many words.
+    /// Busy cycles of `ERR` with so many words, of a sample that was read so many times.
     #[must_use]
-    pub(crate) const fn error(&self, words: u64, columns: u64) -> u64 {
-        self.beat * (words + self.hops + self.groups(columns))
+    pub(crate) const fn error(&self, words: u64, columns: u64, reads: u64) -> u64 {
+        self.beat * (words + self.hops + reads * self.groups(columns))
     }
 
-    /// Busy cycles of `UPD(add)`.
+    /// Busy cycles of `UPD(add)`, a read.
     #[must_use]
     pub(crate) const fn accumulate(&self, rows: u64, columns: u64) -> u64 {
         self.beat * rows * self.groups(columns)
@@ -169,6 +170,12 @@ impl Timing {
     #[must_use]
     pub(crate) const fn normalise(&self, columns: u64) -> u64 {
         self.beat * (2 * self.groups(columns) + ROOT_BEATS)
+    }
+
+    /// Cycles of the stage that pools a sample, of so many columns a tile, to so many positions.
+    #[must_use]
+    pub(crate) const fn pool(&self, columns: u64, positions: u64) -> u64 {
+        self.beat * positions * self.groups(columns)
     }
 
     /// Cycles of one pass of a pulse.

@@ -1,4 +1,4 @@
-//! What a layer keeps: its arrays, the shifts of its converters and what these are adjusted by, and how often each array was written.
+//! What a layer keeps: its arrays, the shifts of its converters and what these are adjusted by, thresholds and table step, and how often each array was written.
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
 use super::Layer;
@@ -38,6 +38,7 @@ impl Layer {
                 });
             }
         }
+        self.balance.visit(&name, visitor)?;
         self.requests.visit(&name, (self.spec.wiring, self.layout), visitor)?;
         if !self.rails.is_empty() {
             let counts = self.rails.iter_mut().flatten().flatten();

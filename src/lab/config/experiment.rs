@@ -5,6 +5,7 @@ use std::iter;
 use super::check::{Bias, wrong};
 use super::{Config, ConfigError};
 use crate::chip::layer::{DrivenBy, Homeostasis, InitialLevels, LayerSpec, Pool};
+use crate::learn::error::OutputError;
 use crate::learn::network::NetworkSpec;
 use crate::learn::rule::{Readout, Rule};
 use crate::num::tables::Activation;
@@ -75,7 +76,8 @@ impl Config {
         let layers = (0..hidden.len() + 1).zip(driven).map(|(layer, driven_by)| {
             let last = layer == hidden.len();
             let activation = self.activations[layer];
-            let wiring = self.rule.wiring(last.then(|| Readout::of(activation)));
+            let wiring =
+                self.rule.wiring(last.then(|| Readout::of(activation, OutputError::OneVsAll)));
             LayerSpec {
                 inputs: sizes[layer],
                 units: sizes[layer + 1],
@@ -98,6 +100,7 @@ impl Config {
             layers: layers.collect(),
             rule: self.rule,
             mode: self.mode,
+            error: OutputError::OneVsAll,
             centre: self.centre,
             route: self.route,
             batch: self.batch,

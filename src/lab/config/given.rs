@@ -12,7 +12,7 @@ use crate::chip::hardware::{
     HardwareSpec, PulseCode, Subtract, TileSpec, Timing, WriteScheme, WriteSpec,
 };
 use crate::chip::layer::{DrivenBy, Gain, Homeostasis, InitialLevels, LayerSpec, Optimiser, Pool};
-use crate::learn::error::Centre;
+use crate::learn::error::{Centre, OutputError};
 use crate::learn::network::NetworkSpec;
 use crate::learn::route::Route;
 use crate::learn::rule::{Rule, UpdateMode};
@@ -78,6 +78,9 @@ const FROZEN: &[(&str, &str)] = &[
     ("layer.threshold", "false"),
     ("layer.gain", "table"),
     ("layer.homeostasis_window_log2", "9"),
+    ("learning.error", "one_vs_all"),
+    ("actor.error", "one_vs_all"),
+    ("critic.error", "one_vs_all"),
 ];
 
 /// Key and word.
@@ -224,6 +227,7 @@ impl List {
             layers,
             rule,
             mode,
+            error,
             centre,
             route,
             batch,
@@ -279,6 +283,11 @@ impl List {
         };
         self.put(&format!("{head}.rule"), rule);
         self.put(&format!("{head}.mode"), mode);
+        let error = match error {
+            OutputError::OneVsAll => "one_vs_all".to_owned(),
+            OutputError::Softmax { temperature } => format!("softmax {}", temperature.get()),
+        };
+        self.put(&format!("{head}.error"), error);
         self.put(&format!("{head}.centre"), centre);
         self.put(&format!("{head}.route"), route);
         self.put(&format!("{head}.batch"), batch.get());

@@ -42,7 +42,7 @@ pub fn figures(hardware: &Hardware, words: u64) -> Vec<Figure> {
     vec![
         figure("read", accept + reads.read(1, columns, 0)),
         figure("next read after", accept + reads.again(1, columns)),
-        figure("error words", accept + timing.error(words, columns)),
+        figure("error words", accept + timing.error(words, columns, 1)),
         figure("accumulate", accept + timing.accumulate(rows, columns)),
         figure("write, row without pulses", timing.rows(1, 0)),
         figure("write, row with one pulse", timing.rows(1, 1)),

@@ -93,6 +93,10 @@ pub fn tables(networks: &[&Driver]) -> String {
         hash.update(&layer.lut.shift.to_le_bytes());
         hash.update(&layer.lut.activity).update(&layer.lut.derivative);
     }
+    for tables in networks.iter().filter_map(|driver| driver.unit().softmax()) {
+        hash.update(&tables.shift().to_le_bytes());
+        tables.entries().for_each(|entry| _ = hash.update(&entry.to_le_bytes()));
+    }
     hash.finalize().to_hex().to_string()
 }
 

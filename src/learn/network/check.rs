@@ -5,7 +5,7 @@ use super::{NetworkError, NetworkSpec};
 use crate::chip::hardware::{Adc, Hardware, WriteScheme};
 use crate::chip::layer::{self, DrivenBy, InitialLevels, LayerSpec, Optimiser};
 use crate::chip::population::Wiring;
-use crate::learn::error::Centre;
+use crate::learn::error::{Centre, OutputError};
 use crate::learn::route::Route;
 use crate::learn::rule::{Readout, Rule, UpdateMode};
 use crate::num::fixed::OutOfRange;
@@ -24,6 +24,8 @@ const TAPS_MAX: usize = 4;
 /// Shift of a sum of words, at most: nothing is left of it beyond.
 const TAP_SHIFT_MAX: u32 = 16;
 
+mod homeostasis;
+
 type Checked = Result<(), NetworkError>;
 
 fn misfit(key: &'static str, found: impl ToString, allowed: impl ToString) -> Checked {
@@ -37,6 +39,7 @@ pub(super) fn check(network: &NetworkSpec, hardware: &Hardware) -> Checked {
     tables(network, hardware)?;
     rule(network, hardware)?;
     activations(network)?;
+    homeostasis::check(network, hardware)?;
     wiring(network)?;
     batches(network, hardware)?;
     convolutions(network, hardware)?;
@@ -164,13 +167,28 @@ fn activations(network: &NetworkSpec) -> Checked {
                 let found = format!("keeps the accumulators of layer {at}");
                 return misfit("network.activation", found, allowed);
             }
-            Activation::Accumulator if network.centre != Centre::None => {
+            Activation::Accumulator
+                if network.error == OutputError::OneVsAll && network.centre != Centre::None =>
+            {
                 let allowed = "where accumulators are read out, the task hands the errors and nothing is subtracted: use \
                                learning.centre = \"none\"";
                 return misfit("learning.centre", "is not \"none\"", allowed);
             }
             _ => {}
         }
+    }
+    if network.error == OutputError::OneVsAll {
+        return Ok(());
+    }
+    if network.layers[last].activation != Activation::Accumulator {
+        let allowed =
+            "accumulators are looked up, and no activities: outputs of such a network keep theirs";
+        return misfit("learning.error", "is \"softmax\" beside outputs with a table", allowed);
+    }
+    if network.outputs() < 2 {
+        let allowed =
+            "a single output has nothing to share with; give it one a class, or use \"one_vs_all\"";
+        return misfit("learning.error", "is \"softmax\" of one output", allowed);
     }
     Ok(())
 }
@@ -179,7 +197,8 @@ fn activations(network: &NetworkSpec) -> Checked {
 fn wiring(network: &NetworkSpec) -> Checked {
     let last = network.layers.len() - 1;
     for (at, layer) in network.layers.iter().enumerate() {
-        let wanted = network.rule.wiring((at == last).then(|| Readout::of(layer.activation)));
+        let wanted =
+            network.rule.wiring((at == last).then(|| Readout::of(layer.activation, network.error)));
         if layer.wiring != wanted {
             let found =
                 format!("does not fit the arrays of layer {at}, which {}", wired(layer.wiring));
@@ -252,6 +271,11 @@ fn convolutions(network: &NetworkSpec, hardware: &Hardware) -> Checked {
     for (at, layer) in network.layers.iter().enumerate() {
         if layer.convolution.is_none() {
             continue;
+        }
+        let below = at.checked_sub(1).map(|below| network.layers[below].activation);
+        if layer.activation == Activation::Rms || below == Some(Activation::Rms) {
+            let allowed = "a read of a convolution is not normalised, and does not follow what is: give it a table";
+            return misfit("network.activation", format!("normalises around layer {at}"), allowed);
         }
         let positions = layer.positions() as u64;
         let reads = u64::from(network.batch.get()).saturating_mul(positions);

@@ -1,12 +1,16 @@
 use super::*;
+use crate::chip::crossbar::kernel::ConvShape;
 use crate::chip::engine::Phase;
 use crate::chip::hardware::{Adc, AdcRange, HardwareSpec, Subtract, WriteScheme};
-use crate::chip::layer::{DrivenBy, Homeostasis, Pool};
+use crate::chip::layer::{DrivenBy, Gain, Homeostasis, Pool};
 use crate::chip::ledger::Event;
 use crate::chip::population::Wiring;
 use crate::learn::rule::Readout;
 use crate::num::fixed::{AdcBits, ResidualBits};
 use crate::num::tables::Activation;
+
+const SOFTMAX: OutputError = OutputError::Softmax { temperature: Positive::ONE };
+const MIDDLE: Homeostasis = Homeostasis { threshold: true, ..Homeostasis::OFF };
 
 /// 5 to 4 to 3 units by error diffusion: as plain as can be.
 fn plain() -> NetworkSpec {
@@ -27,6 +31,7 @@ fn plain() -> NetworkSpec {
         layers: vec![layer(5, 4, Wiring::Dual), layer(4, 3, Wiring::DualReadout)],
         rule: Rule::Ed,
         mode: UpdateMode::Accumulate,
+        error: OutputError::OneVsAll,
         centre: Centre::Batch,
         route: Some(Route::Modulo { taps: 1, shift: None }),
         batch: Batch::new(8).unwrap(),
@@ -73,7 +78,7 @@ fn refused(network: &NetworkSpec) -> NetworkError {
 #[test]
 fn everything_that_does_not_fit_together_is_refused_with_its_key() {
     type Change = fn(&mut NetworkSpec);
-    let cases: [(&str, &str, Change); 46] = [
+    let cases: [(&str, &str, Change); 56] = [
         ("network.hidden", "0 layers", |n| n.layers.clear()),
         ("network.hidden", "a layer of 0 units", |n| n.layers[1].units = 0),
         ("network.hidden", "a layer of 0 inputs", |n| n.layers[0].inputs = 0),
@@ -179,6 +184,32 @@ fn everything_that_does_not_fit_together_is_refused_with_its_key() {
             n.optimisers[1] = Optimiser::Sign { dead_zone: false };
             n.rates[1] = Positive::new(1.0 / 65_536.0).unwrap();
         }),
+        ("learning.error", "outputs of such a network keep theirs", |n| n.error = SOFTMAX),
+        ("learning.error", "of one output", |n| {
+            (n.error, n.layers[1].units) = (SOFTMAX, 1);
+            n.layers[1].activation = Activation::Accumulator;
+        }),
+        ("learning.rule", "read one of two populations out", |n| {
+            (n.error, n.layers[1].wiring) = (SOFTMAX, Wiring::Dual);
+            n.layers[1].activation = Activation::Accumulator;
+        }),
+        ("network.gain", "have to be found", |n| n.layers[0].activation = Activation::Ramp),
+        ("network.gain", "which is no ramp", |n| n.layers[0].homeostasis.gain = Gain::Tracking),
+        ("network.threshold", "layer 1, the output", |n| n.layers[1].homeostasis = MIDDLE),
+        ("network.threshold", "layer 0, which is normalised", |n| {
+            n.layers[0].activation = Activation::Rms;
+            n.layers[0].homeostasis = MIDDLE;
+        }),
+        ("network.gain_spread", "of layer 0 is 3", |n| {
+            n.layers[0].activation = Activation::Ramp;
+            n.layers[0].homeostasis.gain = Gain::Fixed { spread: 3 };
+        }),
+        ("network.homeostasis_window", "of layer 0 is 4 samples", |n| {
+            n.layers[0].homeostasis = Homeostasis { window_log2: 2, ..MIDDLE };
+        }),
+        ("network.homeostasis_window", "is 2^25 samples", |n| {
+            n.layers[0].homeostasis = Homeostasis { window_log2: 25, ..MIDDLE };
+        }),
         ("learning.rate", "layer 0 a k of -2", |n| n.rates[0] = Positive::new(1e5).unwrap()),
     ];
     for (key, words, change) in cases {
@@ -191,9 +222,47 @@ fn everything_that_does_not_fit_together_is_refused_with_its_key() {
 }
 
 #[test]
+fn sums_of_a_batch_that_64_bits_may_not_hold_are_refused() {
+    // 61,440 rows of 255 x 255 with 8 fractional bits, in 256 samples of 181 x 181 positions
+    let shape = ConvShape { channels: 3840, height: 184, width: 184, side: 4, stride: 1, pad: 0 };
+    let network = |shape: ConvShape| {
+        let mut network = plain();
+        let [hidden, last] = &mut network.layers[..] else { panic!("two layers") };
+        (hidden.inputs, hidden.units) = (16 * shape.channels, 1);
+        hidden.convolution = Some(shape);
+        hidden.homeostasis = MIDDLE;
+        last.inputs = hidden.sample_outputs();
+        NetworkSpec { batch: Batch::new(2).unwrap(), ..network }
+    };
+    let error = network(shape).check(&Hardware::reference()).unwrap_err();
+    let words = error.to_string();
+    assert!(error.key() == "network.threshold" && words.contains("adds up to 2^63"), "{error}");
+    let smaller = ConvShape { height: 131, width: 131, ..shape };
+    let error = network(smaller).check(&Hardware::reference()).err();
+    assert!(error.is_none_or(|error| error.key() == "learning.rate"));
+}
+
+#[test]
 fn what_lies_at_the_edge_is_built() {
     let cases = [
         NetworkSpec { route: modulo(3, Some(16)), ..plain() },
+        {
+            let mut network = plain();
+            network.layers[0].homeostasis = Homeostasis { window_log2: 3, ..MIDDLE };
+            network
+        },
+        {
+            let mut network = NetworkSpec { rates: vec![Positive::ONE; 2], ..plain() };
+            network.layers[0].activation = Activation::Ramp;
+            network.layers[0].homeostasis.gain = Gain::Fixed { spread: 2 };
+            network
+        },
+        {
+            let mut network = NetworkSpec { error: SOFTMAX, ..plain() };
+            network.layers[1].activation = Activation::Accumulator;
+            network.rates[1] = Positive::ONE;
+            network
+        },
         NetworkSpec { route: Some(Route::RandomSparse), ..plain() },
         NetworkSpec { route: Some(Route::ScalarBroadcast), ..plain() },
         NetworkSpec { mode: UpdateMode::Online, centre: Centre::Running, ..plain() },

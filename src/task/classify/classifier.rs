@@ -15,7 +15,9 @@ use crate::learn::network::NetworkError;
 /// use dalean::network::{
 ///     Activation, Centre, Decay, DrivenBy, Homeostasis, InitialLevels, LayerSpec, Pool, Wiring,
 /// };
-/// use dalean::network::{Batch, Optimiser, Positive, RateMantissa, Route, Rule, UpdateMode};
+/// use dalean::network::{
+///     Batch, Optimiser, OutputError, Positive, RateMantissa, Route, Rule, UpdateMode,
+/// };
 /// use dalean::{Backend, Classifier, Examples, Experiment, Hardware, NetworkSpec};
 ///
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -42,6 +44,7 @@ use crate::learn::network::NetworkError;
 ///     ],
 ///     rule: Rule::Ed,
 ///     mode: UpdateMode::Accumulate,
+///     error: OutputError::OneVsAll,
 ///     centre: Centre::Batch,
 ///     route: Some(Route::Modulo { taps: 1, shift: None }),
 ///     batch: Batch::new(4)?,

@@ -5,7 +5,9 @@ use crate::chip::crossbar::kernel::Backend;
 use crate::chip::hardware::Hardware;
 use crate::chip::layer::LayerSpec;
 use crate::learn::driver::Driver;
+use crate::learn::error::OutputError;
 use crate::learn::network::{NetworkError, NetworkPlace, NetworkSpec};
+use crate::num::tables::Activation;
 
 /// Random shifts of training images.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -54,10 +56,19 @@ impl Experiment {
     /// When something does not, with the key that says it.
     pub fn check(&self) -> Result<(), NetworkError> {
         self.network.check(&self.hardware)?;
-        if self.network.centred.contains(&true) {
+        let (last, hidden) = self.network.layers.split_last().expect("a network that was checked");
+        let thresholds = hidden.iter().all(|layer| layer.homeostasis.threshold);
+        let alone = self.network.error == OutputError::OneVsAll;
+        if alone && last.activation == Activation::Accumulator {
+            let found = "is \"one_vs_all\" beside outputs without a table";
+            let allowed =
+                "classes are told apart by activities; give outputs a table, or use \"softmax\"";
+            return Err(NetworkError::misfit("learning.error", found, allowed));
+        }
+        if alone && self.network.centred.contains(&true) && !thresholds {
             let found = "is true of a layer";
-            let allowed = "an error of one class against all others takes its mean off in the output alone, and such a \
-                           network does not learn without thresholds, which are not built; leave it out";
+            let allowed = "where an error is that of one class against all others, centred updates do not learn without \
+                           thresholds: use network.threshold = true or learning.error = \"softmax\", or leave it out";
             return Err(NetworkError::misfit("learning.centred", found, allowed));
         }
         match self.augment {

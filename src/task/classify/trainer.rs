@@ -160,6 +160,7 @@ impl Trainer {
         let same = table.iter().zip(0..=u8::MAX).all(|(&code, value)| code == value);
         let (mut correct, mut done) = (0, 0);
         let mut codes = Vec::new();
+        let (mut sums, mut shares) = (Vec::new(), Vec::new());
         let mut shifts = shifts;
         self.driver.engine_mut().set_phase(Phase::Training);
         for batch in order.chunks(self.experiment.network.batch.get() as usize) {
@@ -184,8 +185,21 @@ impl Trainer {
                 for sample in 0..engine.samples() {
                     let label = train.labels()[batch[first + sample] as usize];
                     let outputs = outputs(engine);
-                    let activity = (0..outputs).map(|unit| engine.output_activity(sample, unit));
-                    error::errors(label, activity, errors);
+                    match engine.error_unit().softmax() {
+                        Some(tables) => {
+                            sums.clear();
+                            sums.extend(
+                                (0..outputs).map(|at| engine.output_accumulator(sample, at)),
+                            );
+                            tables.share_out(&sums, &mut shares);
+                            error::errors(label, shares.iter().copied(), errors);
+                        }
+                        None => {
+                            let activity =
+                                (0..outputs).map(|at| engine.output_activity(sample, at));
+                            error::errors(label, activity, errors);
+                        }
+                    }
                     correct += u64::from(predict(engine, sample).0 == usize::from(label));
                 }
             });

@@ -137,6 +137,11 @@ impl PolicyExperiment {
                 let allowed = "a policy reads the accumulators of both streams: use \"p-n\"";
                 return Err(NetworkError::misfit("network.readout", "is not \"p-n\"", allowed));
             }
+            if network.layers.iter().any(|layer| layer.homeostasis.is_on()) {
+                let allowed =
+                    "thresholds and gains follow batches of examples; layers of policies have none";
+                return Err(NetworkError::misfit("network.threshold", "is given", allowed));
+            }
         }
         if self.actor.batch != self.critic.batch {
             let allowed = "actor and critic learn from the same minibatches";

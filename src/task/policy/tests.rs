@@ -12,7 +12,7 @@ use crate::chip::layer::{DrivenBy, Homeostasis, InitialLevels, LayerSpec, Optimi
 use crate::chip::ledger::Event;
 use crate::chip::population::Wiring;
 use crate::chip::state::{Piece, Seen, State, Visitor};
-use crate::learn::error::Centre;
+use crate::learn::error::{Centre, OutputError};
 use crate::learn::network::{NetworkPlace, NetworkSpec};
 use crate::learn::route::Route;
 use crate::learn::rule::{Rule, UpdateMode};
@@ -103,6 +103,7 @@ fn network(inputs: usize, outputs: usize, rule: Rule) -> NetworkSpec {
         layers: vec![layer(inputs, 10, true, false), layer(10, outputs, false, true)],
         rule,
         mode: UpdateMode::Accumulate,
+        error: OutputError::OneVsAll,
         centre: Centre::None,
         route: match rule {
             Rule::Bp => None,
@@ -360,6 +361,7 @@ fn a_policy_and_a_classifier_learn_by_lists_of_the_same_five_operations() {
             layer(4, 10, Wiring::Dual, DrivenBy::Shared),
             layer(10, 2, Wiring::DualReadout, DrivenBy::Streams),
         ],
+        error: OutputError::OneVsAll,
         centre: Centre::Batch,
         optimisers: vec![Optimiser::Plain; 2],
         centred: vec![false; 2],

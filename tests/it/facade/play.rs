@@ -12,7 +12,7 @@ use dalean::hardware::{
 };
 use dalean::network::{
     Activation, Augment, Batch, Centre, Decay, DrivenBy, Homeostasis, InitialLevels, LayerSpec,
-    Optimiser, Pool, Positive, RateMantissa, Route, Rule, UpdateMode, Wiring,
+    Optimiser, OutputError, Pool, Positive, RateMantissa, Route, Rule, UpdateMode, Wiring,
 };
 use dalean::{
     Backend, Classifier, Config, Data, DataRoot, Examples, Experiment, Hardware, HardwareSpec,
@@ -242,6 +242,10 @@ fn network(c: &mut Choices<'_>, inputs: usize, outputs: usize) -> NetworkSpec {
         layers,
         rule,
         mode: c.of(&[UpdateMode::Accumulate, UpdateMode::Replay, UpdateMode::Online]),
+        error: match c.one_in(8) {
+            true => OutputError::Softmax { temperature: Positive::ONE },
+            false => OutputError::OneVsAll,
+        },
         centre: c.of(&[Centre::None, Centre::Batch, Centre::Running]),
         route,
         batch: or(Batch::new(batch), Batch::new(4).expect("inside")),

@@ -6,7 +6,7 @@ use dalean::chip::layer::{DrivenBy, Homeostasis, InitialLevels, LayerSpec, Optim
 use dalean::chip::population::Wiring;
 use dalean::lab::store::checkpoint::{self, Identity};
 use dalean::lab::store::hash;
-use dalean::learn::error::Centre;
+use dalean::learn::error::{Centre, OutputError};
 use dalean::learn::network::NetworkSpec;
 use dalean::learn::route::Route;
 use dalean::learn::rule::{Rule, UpdateMode};
@@ -125,6 +125,7 @@ fn run() -> impl Strategy<Value = Run> {
                 layers: specs.collect(),
                 rule,
                 mode,
+                error: OutputError::OneVsAll,
                 centre,
                 route: route(raw, outputs, rule),
                 batch: Batch::new(batch).unwrap(),

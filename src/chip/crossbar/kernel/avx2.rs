@@ -55,6 +55,8 @@ pub(super) const OPS: Ops = Ops {
     may_move: fused::may_move,
     pulses,
     levels,
+    offset,
+    index_squares,
     stream_squares,
     scale,
     centre,

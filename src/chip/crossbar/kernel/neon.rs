@@ -17,7 +17,7 @@ use std::arch::{asm, is_aarch64_feature_detected};
 use std::ops::Range;
 
 use super::ops::Ops;
-use super::{Drives, Extremes, Half, Peaks, lanes, levels, pulses, scalar};
+use super::{Drives, Extremes, Half, Peaks, lanes, levels, normalise, offsets, pulses, scalar};
 use crate::chip::crossbar::layout::{BLOCK_CELLS, BLOCK_ROWS, HALF_CELLS, HALF_COLUMNS, Layout};
 
 mod dither;
@@ -80,6 +80,8 @@ const fn table<M: Multiply>() -> Ops {
         may_move: pulses::may_move_twin,
         pulses: pulses::twin,
         levels: levels::twin,
+        offset: offsets::offset,
+        index_squares: offsets::index_squares,
         stream_squares: normalise::stream_squares,
         scale: normalise::scale,
         peaks,

@@ -16,7 +16,7 @@ use super::{
     Banks, Cells, Conversion, Dither, Draws, Drives, Ends, Extremes, Half, HandOn, Image, LookUp,
     OneSample, Peaks, Rails, Scratch, SignLaw, Squares, Sums, WriteCounts, WriteLaw,
 };
-use crate::chip::crossbar::layout::{BLOCK_ROWS, HALF_COLUMNS, Layout};
+use crate::chip::crossbar::layout::{BLOCK_ROWS, HALF_COLUMNS, Layout, PANEL_COLUMNS};
 use crate::num::fixed::ErrorBits;
 
 /// The operations of a back end.
@@ -34,6 +34,8 @@ pub(super) struct Ops {
         unsafe fn(&Banks<'_>, Range<usize>, &mut Scratch, &mut [i16]) -> Option<Rails>,
     pub(super) convert: unsafe fn([&[i32]; 2], Conversion, usize, &mut [i16]) -> Rails,
     pub(super) look_up: unsafe fn(&[i32], &LookUp, usize, &mut [u8], &mut [u8]) -> u64,
+    pub(super) offset: unsafe fn(&mut [i32], &[i32; PANEL_COLUMNS], u32, &mut [i64; PANEL_COLUMNS]),
+    pub(super) index_squares: unsafe fn(&[i32], u32, i32, usize) -> u64,
     pub(super) difference: unsafe fn([&[i32]; 2], &mut [i32]),
     pub(super) stream_squares: unsafe fn(&[i32], &mut [u64]),
     pub(super) scale: unsafe fn(&[i32], &[u64], HandOn, &mut [u8], &mut [u8]) -> u64,
@@ -80,7 +82,7 @@ pub(super) struct Ops {
     pub(super) peak: unsafe fn(usize) -> u64,
 }
 
-/// Compiles twins, of a write's steps and of normalised activities, for features of the processor. Where the whole program is compiled for them,
+/// Compiles twins, of a write's steps, of offsets and of normalised activities, for features of the processor. Where the whole program is compiled for them,
 /// tables have the twins themselves.
 #[cfg(target_arch = "x86_64")]
 macro_rules! twins {
@@ -104,6 +106,21 @@ macro_rules! twins {
         #[target_feature(enable = $features)]
         fn levels(cells: &mut Cells<'_>, pulses: &Half<i8>, ends: Ends, groups: u16) -> u64 {
             crate::chip::crossbar::kernel::levels::twin(cells, pulses, ends, groups)
+        }
+
+        #[target_feature(enable = $features)]
+        fn offset(
+            sums: &mut [i32],
+            offsets: &[i32; crate::chip::crossbar::layout::PANEL_COLUMNS],
+            raise: u32,
+            totals: &mut [i64; crate::chip::crossbar::layout::PANEL_COLUMNS],
+        ) {
+            crate::chip::crossbar::kernel::offsets::offset(sums, offsets, raise, totals);
+        }
+
+        #[target_feature(enable = $features)]
+        fn index_squares(sums: &[i32], shift: u32, half: i32, live: usize) -> u64 {
+            crate::chip::crossbar::kernel::offsets::index_squares(sums, shift, half, live)
         }
 
         #[target_feature(enable = $features)]

@@ -1,5 +1,6 @@
 //! The law of reads, units and words: what every kernel computes, one cell after the other. That of a write stands with
-//! its steps: `sums`, `requests`, `pulses`, `levels`; that of normalised activities in `normalise`.
+//! its steps: `sums`, `requests`, `pulses`, `levels`; that of normalised activities in `normalise`,
+//! that of offsets in `offsets`.
 //!
 //! ```text
 //! read        v[c]   = sum_r level[r][c] * x[r]
@@ -17,7 +18,7 @@ use std::ops::Range;
 use super::ops::Ops;
 use super::{
     Conversion, Draws, Drives, Extremes, Half, LookUp, Peaks, Rails, conv, levels, normalise,
-    optimise, pulses, sums,
+    offsets, optimise, pulses, sums,
 };
 use crate::chip::crossbar::layout::{
     BLOCK_CELLS, BLOCK_ROWS, HALF_CELLS, HALF_COLUMNS, Layout, PANEL_COLUMNS, in_half,
@@ -31,6 +32,8 @@ pub(super) const OPS: Ops = Ops {
     read_converted: |_, _, _, _| None,
     convert,
     look_up,
+    offset: offsets::law_offset,
+    index_squares: offsets::law_index_squares,
     difference,
     stream_squares: normalise::law_squares,
     scale: normalise::law_scale,

@@ -15,8 +15,11 @@ use crate::chip::layer::Layer;
 use crate::chip::ledger::{Cycles, During, Event, Interval, Ledger, Part};
 use crate::chip::population::Stream;
 
+mod balance;
 mod layer;
 mod normalise;
+mod pipeline;
+mod pool;
 mod segment;
 mod unit;
 mod watch;
@@ -103,8 +106,10 @@ impl Network {
         self.unlooked = self.unlooked.map(|_| unlooked);
     }
 
-    /// Writes are done: where converters track, ranges are looked at after those of a batch, or of 64 samples.
+    /// Writes are done: thresholds and steps move and, where converters track, ranges are looked at after those of a batch, or
+    /// of 64 samples.
     pub fn written(&mut self, written: WritesDone) {
+        self.balance();
         let Some(unlooked) = &mut self.unlooked else { return };
         *unlooked += u64::from(written == WritesDone::Sample);
         if written == WritesDone::Batch || *unlooked == 64 {
@@ -231,10 +236,10 @@ impl Network {
 
     /// Executes operations that follow one another without a pause.
     pub fn run(&mut self, operations: &[Operation<'_>]) {
-        for segment in segment::cut(operations, self.samples, &self.input_sizes()) {
+        for segment in segment::cut(operations, self.samples, self.layers[0].sample_inputs()) {
             match segment {
                 Segment::LoadDrives { codes } => {
-                    self.samples = codes.len() / self.layers[0].inputs;
+                    self.samples = codes.len() / self.layers[0].sample_inputs();
                     self.layers[0].load_inputs(codes);
                 }
                 Segment::LoadWeights { layer, array, row, levels } => {
@@ -278,106 +283,8 @@ impl Network {
         }
     }
 
-    fn input_sizes(&self) -> Vec<usize> {
-        self.layers.iter().map(|layer| layer.inputs).collect()
-    }
-
     fn charge(&mut self, layer: usize, code: u8, during: During, event: Event, count: u64) {
         self.ledgers[self.phase as usize].add(layer, code, during, event, count);
-    }
-
-    /// `FWD(rows)` of layers in a pipeline.
-    fn reads(&mut self, layers: Range<usize>, samples: usize) {
-        let count = self.layers.len();
-        // samples that commands were given for, that lanes have seen, and that were handed on
-        let (mut issued, mut seen, mut done) = (vec![0; count], vec![0; count], vec![0; count]);
-        // cycles for which the next command has been offered
-        let mut offered = vec![0; count];
-        let mut started = vec![vec![]; count];
-        let beat = self.timing.beat;
-        while done[layers.end - 1] < samples {
-            self.begin(Interval::Forward);
-            for layer in layers.clone() {
-                let command = Command::Forward { slot: issued[layer] };
-                let there = layer == layers.start || done[layer - 1] > issued[layer];
-                let offer = issued[layer] < samples && there && self.layers[layer].ready(&command);
-                offered[layer] = if offer { offered[layer] + 1 } else { 0 };
-                if offered[layer] == 1 {
-                    started[layer].push(self.clock);
-                }
-                let given = (offered[layer] == beat).then_some(command);
-                self.account(layer, During::ForwardRows, offer);
-                self.layers[layer].cycle(given.as_ref(), &[]);
-                if given.is_some() {
-                    issued[layer] += 1;
-                    offered[layer] = 0;
-                }
-            }
-            self.end();
-            for layer in layers.clone() {
-                if self.leave_stage(layer, done[layer]) {
-                    done[layer] += 1;
-                }
-                if self.layers[layer].looked_up() {
-                    let sample = seen[layer];
-                    seen[layer] += 1;
-                    if !self.layers[layer].normalise() {
-                        self.hand_on(layer, sample);
-                        done[layer] += 1;
-                    }
-                    let (start, end) = (started[layer][sample], self.clock);
-                    let (layer, sample) = (Some(layer), Some(sample));
-                    self.watch.span(Span { layer, name: "FWD(rows)", sample, start, end });
-                }
-                if let Some(stage) = &mut self.layers[layer].normaliser {
-                    stage.start();
-                }
-            }
-        }
-        let training = self.phase == Phase::Training;
-        for layer in layers {
-            self.take_events(layer, During::ForwardRows, false);
-            self.layers[layer].take_rails(training);
-        }
-    }
-
-    /// A cycle of the stage behind a layer, if it has one; true when a sample leaves it and is handed on.
-    fn leave_stage(&mut self, layer: usize, sample: usize) -> bool {
-        let stage = self.layers[layer].normaliser.as_mut();
-        let Some(streams) = stage.and_then(|stage| stage.cycle()) else { return false };
-        for (target, normal) in streams {
-            self.layers[layer].set_units(target, sample, &normal);
-            let code = self.layers[layer].unit_code(target);
-            let [squares, roots, scalings, bounded] = normal.counts;
-            // an accumulator is stored and fetched twice, activity and derivative are stored
-            let bits = squares * (32 + 32) + scalings * (32 + 16);
-            for (event, count) in [
-                (Event::Squares, squares),
-                (Event::Roots, roots),
-                (Event::Scalings, scalings),
-                (Event::SaturatedLookUps, bounded),
-                (Event::SramBits, bits),
-            ] {
-                self.charge(layer, code, During::ForwardRows, event, count);
-            }
-        }
-        self.hand_on(layer, sample);
-        true
-    }
-
-    /// A sample's activities become drives of the next layer, or outputs.
-    fn hand_on(&mut self, layer: usize, sample: usize) {
-        let last = layer + 1 == self.layers.len();
-        if last {
-            self.layers[layer].keep_outputs(sample);
-            return;
-        }
-        let (head, tail) = self.layers.split_at_mut(layer + 1);
-        let streams = head[layer].targets();
-        for stream in streams {
-            let values = head[layer].values(stream, sample);
-            tail[0].load_activities(stream, sample, &values);
-        }
     }
 
     /// ERR, FWD(columns), UPD(add), UPD(now), sample by sample.
@@ -543,7 +450,9 @@ impl Network {
     ) -> Vec<(Event, u64)> {
         let hardware = self.layers[layer].memory;
         let updating = during == During::Update;
-        let sums = if updating && !now { 64 * (e.accumulates + e.delta_computations) } else { 0 };
+        // a product of its own is written as it is formed
+        let alone = now && self.layers[layer].positions() == 1;
+        let sums = if updating && !alone { 64 * (e.accumulates + e.delta_computations) } else { 0 };
         let rests = 2 * hardware.residual_bits * e.delta_computations;
         let words = 2 * hardware.word_bits * e.optimiser_steps;
         let looked = 32 * e.sum_squares;
@@ -569,7 +478,7 @@ impl Network {
         ]
     }
 
-    fn counts(&self, e: &TileEvents) -> [(Event, u64); 7] {
+    fn counts(&self, e: &TileEvents) -> [(Event, u64); 9] {
         [
             (Event::LookUps, e.look_ups),
             (Event::SaturatedLookUps, e.saturated_look_ups),
@@ -577,7 +486,12 @@ impl Network {
             (Event::Multiplies, e.multiplies),
             (Event::SaturatedGates, e.saturated_gates),
             (Event::RowPulses, e.row_pulses),
+            (Event::ThresholdSubtractions, e.threshold_subtractions),
+            (Event::StatisticAdds, e.statistic_adds),
             (Event::SramBits, 32 * e.look_ups + 8 * e.multiplies),
         ]
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -8,6 +8,7 @@
 //! verified, limited and amplitude-coded pulses, reads from the columns, and digital actions of more than one cycle.
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
+mod balance;
 mod command;
 mod config;
 mod events;
@@ -18,6 +19,8 @@ mod registers;
 mod trains;
 mod write;
 
+pub use balance::TileBalance;
+use balance::TileReadings;
 pub use command::Command;
 pub use config::{More, TileAdc, TileConfig, TileSize, TileUnits};
 pub use events::{BankEvents, TileEvents};
@@ -91,6 +94,10 @@ enum UpdPhase {
     Look,
     /// Until those of the whole layer have been.
     Wait,
+    /// Products of more than one read are added up before they are written.
+    Gather,
+    /// Until those of the whole layer have been.
+    Gathered,
 }
 
 /// Field of an update, as it is numbered in the register.
@@ -108,6 +115,8 @@ struct Upd {
     kind: UpdKind,
     row: usize,
     group: usize,
+    /// Read of the sample.
+    position: usize,
     phase: UpdPhase,
     pulse: i64,
     count: u64,
@@ -129,7 +138,7 @@ struct TreeStage {
 /// Accumulators on their way to the lanes of a network.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Launch {
-    /// Which sample.
+    /// Which read.
     pub slot: usize,
     /// A sum a line.
     pub sums: Vec<i64>,
@@ -182,6 +191,8 @@ pub struct Tile {
     trained: [Vec<bool>; 2],
     /// Whether the lanes have seen the last group of a sample in this cycle.
     looked_up: bool,
+    /// What lanes of units that keep to a middle have added up.
+    readings: TileReadings,
 }
 
 impl Tile {
@@ -234,6 +245,7 @@ impl Tile {
             kept: Kept::new(size.rows, size.columns),
             trained: [vec![false; cells], vec![false; cells]],
             looked_up: false,
+            readings: TileReadings::default(),
             size,
             config,
             table,
@@ -331,6 +343,8 @@ impl Tile {
                 self.upd = update(UpdKind::Now, slot, shift);
                 if self.config.more.train_slots.is_some() {
                     self.upd.phase = UpdPhase::Set;
+                } else if self.config.more.positions > 1 {
+                    self.upd.phase = UpdPhase::Gather;
                 }
             }
             // the field is taken, and not used

@@ -111,7 +111,8 @@ mod tests {
                 "energy.dac_slice energy.hold energy.conversion energy.verify_read power.receiver area.adc area.dac",
                 "energy.shift_add energy.look_up energy.multiply energy.bus_word energy.accumulate energy.delta \
                  energy.sram_bit energy.square energy.root energy.scaling energy.row_mean energy.sum_square \
-                 energy.optimiser_step area.tile",
+                 energy.optimiser_step energy.pooling energy.threshold_subtraction energy.statistic_add \
+                 energy.softmax_look_up area.tile",
                 "power.static power.tile_static",
             ]
         );

@@ -25,7 +25,7 @@ impl Quantity {
 
 /// Every quantity a model can give. An event without a line here costs nothing by itself: it says what came of
 /// another one (a saturation, a pulse that was effective).
-pub const QUANTITIES: [Quantity; 30] = [
+pub const QUANTITIES: [Quantity; 34] = [
     energy(
         "dac_slice",
         Event::DacSlices,
@@ -128,6 +128,25 @@ pub const QUANTITIES: [Quantity; 30] = [
         Event::OptimiserSteps,
         [1e-16, 1e-11],
         "a comparison, a random word and a pulse or none; more with words of its own",
+    ),
+    energy("pooling", Event::Pooled, [1e-16, 1e-11], "an addition or a comparison of 8 to 16 bits"),
+    energy(
+        "threshold_subtraction",
+        Event::ThresholdSubtractions,
+        [1e-16, 1e-11],
+        "a register of 32 bits is read, and a subtraction of 32 bits",
+    ),
+    energy(
+        "statistic_add",
+        Event::StatisticAdds,
+        [1e-16, 1e-11],
+        "an addition to a register of 64 bits, and a square of 10 bits for a gain",
+    ),
+    energy(
+        "softmax_look_up",
+        Event::SoftmaxLookUps,
+        [1e-16, 1e-11],
+        "an entry of 8 to 16 bits out of a table of 1,024",
     ),
     power("static", Per::Chip, [1e-9, 1e3], "leakage, clocks and references of a chip"),
     power("tile_static", Per::Tile, [1e-12, 1e2], "leakage and bias of a tile")

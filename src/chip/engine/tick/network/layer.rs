@@ -10,12 +10,13 @@
 use std::ops::Range;
 
 use super::super::tile::{BankEvents, Command, Launch, Tile, TileEvents, TileSize};
+use super::balance::Balancing;
 use super::normalise::{Normal, Normaliser};
+use super::pool::Pooler;
 use crate::chip::hardware::timing::tree_levels;
 use crate::chip::hardware::{DitherPattern, Hardware, Timing, WriteScheme};
 use crate::chip::layer::{Delivery, DrivenBy, Layer, Optimiser};
 use crate::chip::ledger::{During, Part};
-use crate::chip::periphery;
 use crate::chip::population::{Stream, Wiring};
 use crate::num::fixed::DriveBits;
 use crate::num::tables::Activation;
@@ -23,6 +24,7 @@ use crate::num::tables::Activation;
 mod build;
 mod draws;
 mod optimise;
+mod window;
 
 use build::config;
 
@@ -39,14 +41,19 @@ pub(super) struct Memory {
 pub(super) struct TickLayer {
     pub(super) tiles: Vec<Tile>,
     pub(super) inputs: usize,
+    /// What moves over the image below, if something does.
+    window: window::Window,
     pub(super) columns: usize,
     pub(super) delivery: Delivery,
     pub(super) weight_max_log2: i32,
     pub(super) memory: Memory,
     /// Accumulator and activity by target stream and sample, of what was read last.
     pub(super) outputs: [Vec<(i64, u8)>; 2],
-    /// The stage behind it, where its units are normalised.
+    /// The stage behind it, where its units are normalised, and where their codes are pooled.
     pub(super) normaliser: Option<Normaliser>,
+    pub(super) pooler: Option<Pooler>,
+    /// What it has beside its tiles, where its units keep to a middle.
+    pub(super) balancing: Option<Balancing>,
     pub(super) backward: Vec<i64>,
     /// Converter shifts, and codes on the rail and all codes since they were looked at, by target stream and slice.
     pub(super) adc_shifts: Vec<Vec<u32>>,
@@ -90,6 +97,7 @@ impl TickLayer {
         let mut this = Self {
             tiles: vec![],
             inputs: layer.spec.inputs,
+            window: window::Window::new(&layer.spec, slots),
             columns,
             delivery: layer.delivery.clone(),
             weight_max_log2: layer.spec.weight_max_log2,
@@ -109,6 +117,8 @@ impl TickLayer {
                 let lanes = usize::try_from(timing.lanes).expect("few");
                 Normaliser::new(timing.beat, lanes, hardware.tile.columns)
             }),
+            pooler: Pooler::new(timing, hardware.tile.columns, &layer.spec),
+            balancing: Balancing::of(layer, hardware.digital.lut_bits.get()),
             backward: vec![],
             adc_shifts: layer.adc_shifts.clone(),
             rails: layer.rails.clone(),
@@ -132,6 +142,7 @@ impl TickLayer {
             delay: added.map(|tiles| timing.beat * tree_levels(tiles as u64)),
             batch: optimise::Batch::new(timing, layer, grid),
         };
+        let slots = slots * this.positions();
         let lut = layer.lut.activity.iter().zip(&layer.lut.derivative);
         let table: Vec<[u8; 2]> = lut.map(|(&a, &slope)| [a, slope]).collect();
         for (target, _) in wiring.planes() {
@@ -189,6 +200,16 @@ impl TickLayer {
     /// The plane that has the heads of a target's columns.
     fn heads(&self, target: Stream) -> usize {
         self.planes.iter().position(|plane| plane.0 == target).expect("targets have banks")
+    }
+
+    /// The first tile that has lanes of a target; those of the other columns follow it.
+    pub(super) fn at_head(&self, target: Stream) -> usize {
+        self.at(self.heads(target), 0, 0)
+    }
+
+    /// Columns of the widest tile.
+    pub(super) fn widest(&self) -> usize {
+        self.columns.min(self.tile[1])
     }
 
     /// Planes, tiles down, tiles across.
@@ -320,31 +341,6 @@ impl TickLayer {
         }
     }
 
-    pub(super) fn load_inputs(&mut self, codes: &[u8]) {
-        for (slot, codes) in codes.chunks_exact(self.inputs).enumerate() {
-            for (row, &code) in codes.iter().enumerate() {
-                self.load_drive(None, slot, row, code);
-            }
-            self.load_constant(slot);
-        }
-    }
-
-    fn load_constant(&mut self, slot: usize) {
-        if self.constant_row {
-            self.load_drive(None, slot, self.inputs, self.drive_bits.code_max());
-        }
-    }
-
-    pub(super) fn load_activities(&mut self, stream: Stream, slot: usize, values: &[u8]) {
-        if self.driven_by == DrivenBy::Shared && stream != Stream::P {
-            return;
-        }
-        for (row, &value) in values.iter().enumerate() {
-            self.load_drive(Some(stream), slot, row, periphery::drive(value, self.drive_bits));
-        }
-        self.load_constant(slot);
-    }
-
     /// Activities of a stream.
     pub(super) fn values(&self, target: Stream, slot: usize) -> Vec<u8> {
         let value = |column| {
@@ -367,6 +363,23 @@ impl TickLayer {
     pub(super) fn normalise(&mut self) -> bool {
         let sums = self.targets().into_iter().map(|target| (target, self.sums(target))).collect();
         self.normaliser.as_mut().map(|stage| stage.take(sums)).is_some()
+    }
+
+    /// Hands the codes of a sample to the pool behind, if there is one.
+    pub(super) fn pool(&mut self, sample: usize) -> bool {
+        let codes = |&stream: &Stream| (stream, self.codes_of(stream, sample));
+        let codes = self.targets().iter().map(codes).collect();
+        self.pooler.as_mut().map(|pooler| pooler.take(codes)).is_some()
+    }
+
+    /// What stages behind take for the cycle to come.
+    pub(super) fn start_stages(&mut self) {
+        if let Some(stage) = &mut self.normaliser {
+            stage.start();
+        }
+        if let Some(pooler) = &mut self.pooler {
+            pooler.start();
+        }
     }
 
     /// What the stage behind made of a stream of a sample.
@@ -397,8 +410,13 @@ impl TickLayer {
         }
     }
 
-    /// Gates go down from the heads of the columns.
-    pub(super) fn share_gates(&mut self, slot: usize) {
+    /// Gates of a sample go down from the heads of the columns.
+    pub(super) fn share_gates(&mut self, sample: usize) {
+        let positions = self.positions();
+        (sample * positions..(sample + 1) * positions).for_each(|slot| self.share_gates_of(slot));
+    }
+
+    fn share_gates_of(&mut self, slot: usize) {
         for (plane, (target, _)) in self.planes.clone().into_iter().enumerate() {
             for across in 0..self.grid[1] {
                 let head = self.at(self.heads(target), 0, across);
@@ -463,6 +481,9 @@ impl TickLayer {
         }
         self.tree();
         self.join_squares();
+        if self.tiles.iter().all(Tile::has_gathered) {
+            self.tiles.iter_mut().for_each(Tile::write_gathered);
+        }
     }
 
     fn tree(&mut self) {
@@ -543,7 +564,8 @@ impl TickLayer {
             parts.filter_map(move |(part, doing)| Some((at, part, doing?)))
         });
         let tree = self.tree.iter();
-        tiles.chain(tree.map(|entry| (entry.1, Part::Tree, [Some(entry.3.slot), None])))
+        let on = |slot| [Some(slot / self.positions()), None];
+        tiles.chain(tree.map(move |entry| (entry.1, Part::Tree, on(entry.3.slot))))
     }
 
     /// What was counted since the last call, by plane: banks, and what is beside them.

@@ -26,11 +26,11 @@ pub(super) enum Segment<'a> {
     Writes(Vec<(usize, u32)>),
 }
 
-/// Segments of a list that begins with so many samples loaded, for layers of these inputs.
+/// Segments of a list that begins with so many samples loaded, of so many codes each.
 pub(super) fn cut<'a>(
     operations: &'a [Operation<'a>],
     mut samples: usize,
-    inputs: &[usize],
+    inputs: usize,
 ) -> Vec<Segment<'a>> {
     let mut segments: Vec<Segment<'a>> = Vec::new();
     for operation in operations {
@@ -39,7 +39,7 @@ pub(super) fn cut<'a>(
                 segments.push(Segment::LoadWeights { layer, array, row, levels });
             }
             Operation::LoadDrives { codes } => {
-                samples = codes.len() / inputs[0];
+                samples = codes.len() / inputs;
                 segments.push(Segment::LoadDrives { codes });
             }
             Operation::Forward { side: Side::Rows, .. } if samples == 0 => {}

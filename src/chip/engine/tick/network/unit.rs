@@ -8,6 +8,7 @@ use crate::chip::layer::WordSource;
 use crate::chip::ledger::During;
 use crate::chip::population::Stream;
 use crate::num::fixed::{rsh, sat};
+use crate::num::tables::SoftmaxTables;
 
 /// What the unit is, and what it remembers.
 #[derive(Debug)]
@@ -18,6 +19,7 @@ pub(super) struct Unit {
     means: Vec<i64>,
     error_bits: u32,
     level_bits: u32,
+    softmax: Option<SoftmaxTables>,
 }
 
 impl Unit {
@@ -28,6 +30,7 @@ impl Unit {
             means: vec![],
             error_bits: hardware.digital.error_bits.get(),
             level_bits: hardware.cell.level_bits.get(),
+            softmax: None,
         }
     }
 }
@@ -38,6 +41,35 @@ impl Network {
         self.unit.centre = unit.centre();
         self.unit.shift = unit.shift();
         self.unit.means = unit.means().to_vec();
+        self.unit.softmax = unit.softmax().cloned();
+    }
+
+    /// What the outputs of a sample share, of 255, where they share by softmax.
+    ///
+    /// # Panics
+    /// When they do not.
+    #[must_use]
+    pub fn shares(&self, sample: usize) -> Vec<u8> {
+        let tables = self.unit.softmax.as_ref().expect("outputs share by softmax");
+        let last = self.layers.last().expect("a network has layers");
+        let sums: Vec<i64> = last.outputs[Stream::P.index()][sample * last.columns..]
+            [..last.columns]
+            .iter()
+            .map(|&(sum, _)| sum)
+            .collect();
+        let mut greatest = sums[0];
+        sums.iter().for_each(|&sum| greatest = greatest.max(sum));
+        // a class a look-up: exponentials are added up
+        let mut total = 0;
+        let mut places = vec![];
+        for sum in sums {
+            let place = tables.place(greatest - sum);
+            total += tables.exponential(place);
+            places.push(place);
+        }
+        // one of the sum, and a class a look-up again
+        let logarithm = tables.logarithm(total);
+        places.into_iter().map(|place| tables.share(place, logarithm)).collect()
     }
 
     /// Running means of the error unit.
@@ -63,6 +95,12 @@ impl Network {
         let (bits, samples) = (self.unit.error_bits, errors.len() / outputs);
         let errors: Vec<i64> = errors.iter().map(|&e| e.into()).collect();
         let mut sums = vec![0; outputs];
+        if self.unit.softmax.is_some() {
+            let look_ups = (samples * (2 * outputs + 1)) as u64;
+            self.unit_works(Interval::Centre, "softmax", look_ups);
+            let code = self.layers[last].unit_code(Stream::P);
+            self.charge(last, code, During::Error, Event::SoftmaxLookUps, look_ups);
+        }
         if self.unit.centre == Centre::Batch {
             // an error a beat, then a mean a beat
             self.unit_works(Interval::Centre, "mean", (errors.len() + outputs) as u64);

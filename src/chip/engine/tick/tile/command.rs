@@ -22,7 +22,7 @@ pub enum Command<'a> {
     },
     /// `FWD(rows)`.
     Forward {
-        /// Which sample.
+        /// Which read; where a sample is read once, which sample.
         slot: usize,
     },
     /// `FWD(columns)`, driven by gates.

@@ -1,6 +1,7 @@
 //! Sizes and configuration registers of a tile: docs/TILE.md, 1.
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
+use super::TileBalance;
 use crate::chip::hardware::{PulseCode, SliceTime};
 
 /// Sizes a tile is built with.
@@ -10,7 +11,7 @@ pub struct TileSize {
     pub rows: usize,
     /// Columns.
     pub columns: usize,
-    /// Samples it remembers.
+    /// Reads it remembers.
     pub slots: usize,
     /// Stages of the adder tree there are registers for.
     pub tree_max: usize,
@@ -116,6 +117,8 @@ pub struct More {
     pub tree_outside: bool,
     /// What the lanes do.
     pub units: TileUnits,
+    /// What units that keep to a middle have in registers; `lut_shift` is not theirs.
+    pub balance: Option<TileBalance>,
     /// Words a column adds; empty: the modulo tap.
     pub taps: Vec<Vec<usize>>,
     /// Shift of the sum of more than one word.
@@ -148,6 +151,8 @@ pub struct More {
     pub centred: Option<u32>,
     /// Slots of a train, where writes are coincidences of trains.
     pub train_slots: Option<u64>,
+    /// Reads of a sample, one after the other in the slots: positions of a window.
+    pub positions: usize,
 }
 
 impl Default for More {
@@ -157,6 +162,7 @@ impl Default for More {
             slice_times: vec![],
             tree_outside: false,
             units: TileUnits::Table,
+            balance: None,
             taps: vec![],
             tap_shift: 0,
             beat: 1,
@@ -173,6 +179,7 @@ impl Default for More {
             adam: None,
             centred: None,
             train_slots: None,
+            positions: 1,
         }
     }
 }

@@ -55,6 +55,10 @@ pub struct TileEvents {
     pub row_pulses: u64,
     /// Only in networks: sums of taps that hit their rail.
     pub saturated_errors: u64,
+    /// Only in networks: thresholds taken off sums.
+    pub threshold_subtractions: u64,
+    /// Only in networks: sums and squares added up beside the table.
+    pub statistic_adds: u64,
 }
 
 impl BankEvents {
@@ -88,5 +92,7 @@ impl TileEvents {
         self.saturated_gates += more.saturated_gates;
         self.row_pulses += more.row_pulses;
         self.saturated_errors += more.saturated_errors;
+        self.threshold_subtractions += more.threshold_subtractions;
+        self.statistic_adds += more.statistic_adds;
     }
 }

@@ -105,14 +105,15 @@ impl Tile {
     }
 
     pub(in super::super) fn is_writing(&self) -> bool {
-        let looks = matches!(self.upd.phase, UpdPhase::Look | UpdPhase::Wait);
-        self.upd.busy && self.upd.kind != UpdKind::Add && !looks
+        use UpdPhase::{Gather, Gathered, Look, Wait};
+        let other = matches!(self.upd.phase, Look | Wait | Gather | Gathered);
+        self.upd.busy && self.upd.kind != UpdKind::Add && !other
     }
 
     /// Whether the sums of its cells are added to, or looked at.
     fn is_adding(&self) -> bool {
-        let looks = self.upd.phase == UpdPhase::Look;
-        self.upd.busy && (self.upd.kind == UpdKind::Add || looks)
+        let adds = matches!(self.upd.phase, UpdPhase::Look | UpdPhase::Gather);
+        self.upd.busy && (self.upd.kind == UpdKind::Add || adds)
     }
 
     /// Array, converters, lanes, bus, multipliers, accumulators in the cycle that begins.
@@ -134,14 +135,15 @@ impl Tile {
     /// `None` rests.
     pub(in super::super) fn doing(&self) -> [Option<[Option<usize>; 2]>; 7] {
         let [arrays, converters, lanes, bus, multipliers, accumulators] = self.at_work();
-        let sliced = |slot, slice: u32| [Some(slot), usize::try_from(slice).ok()];
+        let sample = |slot| slot / self.config.more.positions;
+        let sliced = |slot, slice: u32| [Some(sample(slot)), usize::try_from(slice).ok()];
         let (front, conv) = (&self.front, &self.conv);
         let written = (self.upd.kind == UpdKind::Now).then_some(self.upd.slot);
-        let added = (self.upd.kind == UpdKind::Add).then_some(self.upd.slot);
+        let added = (self.upd.kind != UpdKind::Write).then_some(self.upd.slot);
         [
             arrays.then(|| sliced(front.slot, front.slice)),
             converters.then(|| sliced(conv.slot, conv.slice)),
-            lanes.then_some([Some(self.lane.slot), None]),
+            lanes.then_some([Some(sample(self.lane.slot)), None]),
             bus.then_some([Some(self.err.slot), None]),
             multipliers.then_some([Some(self.err.slot), None]),
             accumulators.then_some([added, None]),

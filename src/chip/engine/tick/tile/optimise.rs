@@ -65,7 +65,7 @@ impl Tile {
                 }
             }
             if group == 0 {
-                let code = self.drive[bank][self.upd.slot * self.size.rows + row];
+                let code = self.drive[bank][self.learnt() * self.size.rows + row];
                 self.kept.codes[bank][row] += i64::from(code);
             }
         }
@@ -189,6 +189,16 @@ impl Tile {
     pub(in super::super) const fn go_on(&mut self, said: Said) {
         self.kept.said = said;
         self.kept.squares = 0;
+        self.upd.phase = UpdPhase::Compute;
+    }
+
+    /// Whether the products of its reads are added up, and it waits for those of others.
+    pub(in super::super) fn has_gathered(&self) -> bool {
+        self.upd.busy && self.upd.phase == UpdPhase::Gathered
+    }
+
+    /// What was added up is written.
+    pub(in super::super) const fn write_gathered(&mut self) {
         self.upd.phase = UpdPhase::Compute;
     }
 

@@ -293,7 +293,10 @@ impl Tile {
         }
         let half = 1 << (self.config.lut_bits - 1);
         let out = self.lines[Way::Rows as usize].out[column];
-        let (index, saturated) = periphery::index(out, self.config.lut_shift, half);
+        let (index, saturated) = match self.config.more.balance {
+            Some(_) => self.balanced(column, out, half),
+            None => periphery::index(out, self.config.lut_shift, half),
+        };
         [self.value[at], self.slope[at]] = self.table[index];
         self.events.look_ups += 1;
         self.events.saturated_look_ups += u64::from(saturated);

@@ -6,7 +6,10 @@ use super::{Tile, UpdKind, UpdPhase};
 /// Bank counters of the page, used and unused.
 const BANK_COUNTERS: usize = 15;
 
-fn wide<T: Copy + Into<i64>>(numbers: &[T]) -> Vec<i64> {
+fn wide<T: Copy + Into<i64>>(numbers: &[T], most: usize) -> Vec<i64> {
+    if numbers.len() > most {
+        return vec![];
+    }
     numbers.iter().map(|&number| number.into()).collect()
 }
 
@@ -22,6 +25,12 @@ impl Tile {
     /// Name and numbers of every register, arrays row by row, bank e before bank i.
     #[must_use]
     pub fn registers(&self) -> Vec<(&'static str, Vec<i64>)> {
+        self.registers_within(usize::MAX)
+    }
+
+    /// The same, but registers of more numbers than `most` are given empty.
+    #[must_use]
+    pub fn registers_within(&self, most: usize) -> Vec<(&'static str, Vec<i64>)> {
         let (front, conv, lane) = (&self.front, &self.conv, &self.lane);
         let (err, upd) = (&self.err, &self.upd);
         let [e, i] = &self.lines[0].hold;
@@ -40,14 +49,16 @@ impl Tile {
             // only in networks
             UpdPhase::Look => 4,
             UpdPhase::Wait => 5,
+            UpdPhase::Gather => 6,
+            UpdPhase::Gathered => 7,
         };
         vec![
-            ("level_e", wide(&self.level[0])),
-            ("level_i", wide(&self.level[1])),
-            ("pruned_e", wide(&self.pruned[0])),
-            ("pruned_i", wide(&self.pruned[1])),
-            ("drive_e", wide(&self.drive[0])),
-            ("drive_i", wide(&self.drive[1])),
+            ("level_e", wide(&self.level[0], most)),
+            ("level_i", wide(&self.level[1], most)),
+            ("pruned_e", wide(&self.pruned[0], most)),
+            ("pruned_i", wide(&self.pruned[1], most)),
+            ("drive_e", wide(&self.drive[0], most)),
+            ("drive_i", wide(&self.drive[1], most)),
             ("hold_e", e.clone()),
             ("hold_i", i.clone()),
             ("acc", self.lines[0].acc.clone()),
@@ -55,12 +66,12 @@ impl Tile {
             ("tree_valid", tree(&|stage| vec![stage.valid.into()])),
             ("tree_slot", tree(&|stage| vec![place(stage.slot)])),
             ("out", self.lines[0].out.clone()),
-            ("value", wide(&self.value)),
-            ("slope", wide(&self.slope)),
+            ("value", wide(&self.value, most)),
+            ("slope", wide(&self.slope, most)),
             ("error", self.error.clone()),
-            ("gate", self.gate.clone()),
-            ("sum_e", self.sum[0].clone()),
-            ("sum_i", self.sum[1].clone()),
+            ("gate", wide(&self.gate, most)),
+            ("sum_e", wide(&self.sum[0], most)),
+            ("sum_i", wide(&self.sum[1], most)),
             ("pulse_e", self.pulse[0].clone()),
             ("pulse_i", self.pulse[1].clone()),
             ("peak_set", vec![self.peak_set]),

@@ -16,17 +16,18 @@ impl Tile {
         }
         self.err.beat = 0;
         let (hops, words) = (self.config.hops, self.config.words);
-        let groups = self.groups(self.config.columns);
+        let (groups, positions) = (self.groups(self.config.columns), self.config.more.positions);
         let count = self.err.count;
         if (hops..hops + words).contains(&count) {
             self.hear(count - hops, word);
         } else if count >= hops + words {
-            for column in self.group(count - hops - words, self.config.columns) {
-                self.multiply(column);
+            let turn = count - hops - words;
+            for column in self.group(turn % groups, self.config.columns) {
+                self.multiply(turn / groups, column);
             }
         }
         self.err.count += 1;
-        if self.err.count == hops + words + groups {
+        if self.err.count == hops + words + positions * groups {
             self.err.busy = false;
             self.err.count = 0;
         }
@@ -45,9 +46,11 @@ impl Tile {
         }
     }
 
-    fn multiply(&mut self, column: usize) {
+    /// The gate of a column at a position; its word is latched at the first.
+    fn multiply(&mut self, position: usize, column: usize) {
         let bits = self.config.error_bits;
-        if let Some(taps) = self.config.more.taps.get(column) {
+        let taps = self.config.more.taps.get(column);
+        if let (Some(taps), 0) = (taps, position) {
             let mut word = self.heard[column];
             if taps.len() > 1 {
                 let (bounded, changed) = sat(rsh(word, self.config.more.tap_shift), bits);
@@ -56,7 +59,8 @@ impl Tile {
             }
             self.error[column] = if self.config.negate { -word } else { word };
         }
-        let at = self.err.slot * self.size.columns + column;
+        let read = self.err.slot * self.config.more.positions + position;
+        let at = read * self.size.columns + column;
         let slope = self.slope[at];
         let (u, saturated) = sat(rsh(self.error[column] * i64::from(slope), bits), 8);
         self.gate[at] = u;
@@ -72,7 +76,7 @@ impl Tile {
             return self.trains(slots);
         }
         match (self.upd.kind, self.upd.phase) {
-            (UpdKind::Add, _) => {
+            (UpdKind::Add, _) | (_, UpdPhase::Gather) => {
                 if self.beat_is_over() {
                     self.add();
                 }
@@ -82,7 +86,7 @@ impl Tile {
                     self.look();
                 }
             }
-            (_, UpdPhase::Wait) => {}
+            (_, UpdPhase::Wait | UpdPhase::Gathered) => {}
             (_, UpdPhase::Compute) => {
                 if self.beat_is_over() && self.computed() {
                     self.compute(dither);
@@ -106,15 +110,20 @@ impl Tile {
         over
     }
 
+    /// The read whose products are formed.
+    pub(super) const fn learnt(&self) -> usize {
+        self.upd.slot * self.config.more.positions + self.upd.position
+    }
+
     /// The product of a row's drive and a column's gate as a bank takes it.
     pub(super) fn outer(&self, bank: usize, column: usize) -> i64 {
-        let drive = i64::from(self.drive[bank][self.upd.slot * self.size.rows + self.upd.row]);
+        let drive = i64::from(self.drive[bank][self.learnt() * self.size.rows + self.upd.row]);
         drive * self.signed_gate(bank, column)
     }
 
     /// A column's gate as a bank takes it.
     pub(super) fn signed_gate(&self, bank: usize, column: usize) -> i64 {
-        let gate = self.gate[self.upd.slot * self.size.columns + column];
+        let gate = self.gate[self.learnt() * self.size.columns + column];
         let only = self.config.more.potentiation_only;
         match bank {
             0 if only => gate.max(0),
@@ -134,9 +143,23 @@ impl Tile {
             }
         }
         self.upd.group += 1;
-        if self.upd.group == self.groups(self.config.columns) {
-            self.upd.group = 0;
-            self.next_row();
+        if self.upd.group < self.groups(self.config.columns) {
+            return;
+        }
+        self.upd.group = 0;
+        self.upd.row += 1;
+        if self.upd.row < self.config.rows {
+            return;
+        }
+        self.upd.row = 0;
+        self.upd.position += 1;
+        if self.upd.position < self.config.more.positions {
+            return;
+        }
+        let Upd { kind, slot, shift, .. } = self.upd;
+        self.upd = Upd { kind, slot, shift, ..Upd::default() };
+        if kind == UpdKind::Now {
+            (self.upd.busy, self.upd.phase) = (true, UpdPhase::Gathered);
         }
     }
 
@@ -156,11 +179,11 @@ impl Tile {
             for column in 0..self.config.columns {
                 let at = self.upd.row * self.size.columns + column;
                 let sum = match self.upd.kind {
-                    UpdKind::Now => {
+                    UpdKind::Now if self.config.more.positions == 1 => {
                         self.bank_events[bank].accumulates += 1;
                         self.outer(bank, column)
                     }
-                    UpdKind::Write | UpdKind::Add => {
+                    _ => {
                         let sum = self.asking(bank, self.upd.row, column);
                         self.sum[bank][at] = 0;
                         sum

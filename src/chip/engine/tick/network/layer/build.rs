@@ -4,6 +4,7 @@
 use std::ops::Range;
 
 use super::super::super::tile::{More, TileAdc, TileConfig, TileUnits};
+use super::super::balance;
 use crate::chip::crossbar::kernel::MEAN_BITS;
 use crate::chip::hardware::{Adc, FloorKind, Hardware, Subtract, Timing, WriteScheme};
 use crate::chip::layer::{Layer, Optimiser};
@@ -69,6 +70,7 @@ pub(super) fn config(
                 Activation::Accumulator => TileUnits::Kept,
                 _ => TileUnits::Table,
             },
+            balance: balance::registers(layer, target, columns.clone()),
             taps: own.collect(),
             tap_shift: taps.shift,
             beat: timing.beat,
@@ -100,6 +102,7 @@ pub(super) fn config(
                 WriteScheme::Rounded => None,
                 WriteScheme::Trains { slots_log2 } => Some(1 << slots_log2),
             },
+            positions: layer.spec.positions(),
         },
     }
 }

@@ -28,17 +28,19 @@ pub(super) struct Batch {
     scales: Scales,
     /// Window of the means, if rows are centred.
     window_log2: Option<u32>,
-    /// Mean codes by set of drives and row.
+    /// Mean codes by set of drives and row; by channel of what a window moves over, the constant row behind.
     means: [Vec<i64>; 2],
 }
 
 impl Batch {
     pub(super) fn new(timing: Timing, layer: &Layer, grid: [usize; 2]) -> Self {
         let wiring = layer.spec.wiring;
+        let (spec, rows) = (&layer.spec, layer.layout.rows);
+        let kept = spec.convolution.map_or(rows, |s| s.channels + usize::from(spec.constant_row));
         let tiles = wiring.planes().count() * grid[0] * grid[1];
         let means = [Stream::P, Stream::N].map(|set| {
-            let rows = layer.requests.means(set).iter().take(layer.layout.rows);
-            rows.map(|&mean| i64::from(mean)).collect()
+            let means = layer.requests.means(set).iter().take(kept);
+            means.map(|&mean| i64::from(mean)).collect()
         });
         Self {
             added: 0,
@@ -69,19 +71,26 @@ impl TickLayer {
         &self.batch.means[set.index()]
     }
 
-    /// Codes of every row over the samples added, by set of drives.
-    fn row_codes(&self) -> [Vec<i64>; 2] {
+    /// Codes of every row, or channel, over the samples added, by set of drives; and over how many samples, or pixels.
+    fn codes_added(&self) -> ([Vec<i64>; 2], i64) {
         let mut codes = [vec![], vec![]];
+        let samples = usize::try_from(self.batch.added).expect("few");
+        let mut count = self.batch.added;
         for plane in 0..self.planes.len() {
             for bank in 0..2 {
+                let set = self.set(plane, bank);
+                if let Some((sums, pixels)) = self.channel_codes(set, samples) {
+                    (codes[set], count) = (sums, pixels);
+                    continue;
+                }
                 let row = |row: usize| {
                     let tile = self.at(plane, row / self.tile[0], 0);
                     self.tiles[tile].codes(bank, row % self.tile[0])
                 };
-                codes[self.set(plane, bank)] = (0..self.rows).map(row).collect();
+                codes[set] = (0..self.rows).map(row).collect();
             }
         }
-        codes
+        (codes, count)
     }
 
     /// Before a write: means are those of the batch if there are none yet, and tiles are told.
@@ -92,11 +101,10 @@ impl TickLayer {
         if self.batch.window_log2.is_none() {
             return;
         }
-        let samples = self.batch.added;
-        if self.writes == 0 && samples > 0 {
+        if self.writes == 0 && self.batch.added > 0 {
+            let (codes, count) = self.codes_added();
             // halves up
-            let mean = |code: &i64| (32 * code + samples).div_euclid(2 * samples);
-            let codes = self.row_codes();
+            let mean = |code: &i64| (32 * code + count).div_euclid(2 * count);
             for (means, codes) in self.batch.means.iter_mut().zip(&codes) {
                 *means = codes.iter().map(mean).collect();
             }
@@ -106,7 +114,7 @@ impl TickLayer {
             for bank in 0..2 {
                 let set = self.set(self.plane(tile), bank);
                 for row in first..self.rows.min(first + self.tile[0]) {
-                    let mean = self.batch.means[set][row];
+                    let mean = self.batch.means[set][self.mean_at(row)];
                     self.tiles[tile].set_mean(bank, row - first, mean);
                 }
             }
@@ -115,15 +123,16 @@ impl TickLayer {
 
     /// After a write.
     pub(super) fn move_means(&mut self) {
-        let samples = std::mem::take(&mut self.batch.added);
         if let (Some(window), true) = (self.batch.window_log2, self.writes > 0) {
-            let codes = self.row_codes();
+            let (codes, count) = self.codes_added();
+            let window = window + self.pixels_log2();
             for (means, codes) in self.batch.means.iter_mut().zip(codes) {
                 for (mean, codes) in means.iter_mut().zip(codes) {
-                    *mean += rsh(16 * codes - samples * *mean, window);
+                    *mean += rsh(16 * codes - count * *mean, window);
                 }
             }
         }
+        self.batch.added = 0;
         self.tiles.iter_mut().for_each(Tile::clear_lines);
     }
 
@@ -200,6 +209,7 @@ impl TickLayer {
             return vec![];
         }
         let (rows, pathways) = (self.rows as u64, self.wiring.pathways());
+        let kept = self.batch.means[Stream::P.index()].len() as u64;
         let mut seen = vec![];
         let count = |pathway: &Pathway| {
             let set = if self.driven_by == DrivenBy::Shared { Stream::P } else { pathway.source };
@@ -210,7 +220,7 @@ impl TickLayer {
                 Optimiser::Rms => pathway.polarity == Polarity::Excites,
                 _ => false,
             };
-            (pathway.code, rows * (1 + u64::from(looks) + u64::from(first)))
+            (pathway.code, rows * (1 + u64::from(looks)) + kept * u64::from(first))
         };
         pathways.iter().map(count).collect()
     }
