@@ -47,7 +47,7 @@ DATA_NOTE = (
     "All integers non-negative, no wrap below 2^64. Example i, pixel (y, x) of height x width, channel c of `channels`, label = i % classes, full scale M: "
     "proto = (41*(y*(2*label + 1) + x*(label*label + 3) + c*(label + 2))) % (M+1); "
     "h = (i*2654435761 + ((y*width + x)*channels + c)*40503*(i+1)) >> 7; value = proto if h % 4 != 0, else (h >> 5) % (M+1). "
-    "Values lie y, x, channel.")
+    "Values lie y, x, channel here, and plane by plane in the Rust test.")
 
 
 def images(n, height, width, channels, classes, full_scale):
@@ -574,9 +574,7 @@ def run_case(name, note, **over):
     s = net.s
     res = {"name": name, "note": note,
            "settings": dict({k: v for k, v in s.items() if k != "layers"}, seed_decimal=str(s["seed"]), layers=net.layers,
-                            coded_full_scale=net.full, coded_shape=list(net.values.shape[1:]),
                             means_of_data=None if net.means_of_data is None else net.means_of_data.tolist(),
-                            coded_hex=None if s["coding"] == "raw" else net.values.astype("u1").tobytes().hex(),
                             k=net.k, lsh=net.lsh_before, esh=net.esh if net.softmax else None),
            "after_calibration": {**net.state(), "ash": copy.deepcopy(net.ash) or None}, "after_epoch": []}
     for e in range(s["epochs"]):
@@ -627,6 +625,9 @@ CASES = [
     ("recipe_white", "the recipe: white input, ramp, thresholds, tracking gains, centred, softmax, rms, cosine, a short last batch",
      dict(seed=104, height=8, width=8, channels=3, coding="white", error="softmax", decay="cosine", examples=42, classes=10, epochs=3,
           layers=[conv(10, border=1, pool="average", weight_max=2, window=5, **RECIPE), conv(10, border=1, pool="average", weight_max=2, window=6, **RECIPE), dense(20, weight_max=1, window=5, **RECIPE), readout(**SOFT)])),
+    ("white_of_16", "white input of a full scale of 16 and 5 bits of drives, a map that is not square",
+     dict(seed=119, height=6, width=7, channels=3, full_scale=16, coding="white", drive_bits=5, error="softmax", classes=5, examples=30,
+          layers=[conv(10, side=5, stride=2, border=2, weight_max=2, window=6, **RECIPE), readout(**SOFT)])),
     ("recipe_on_off_4bit", "the recipe of 4 bits: levels, drives and errors; on and off inputs, max pooling, remainders with rms",
      dict(seed=105, level_bits=4, drive_bits=4, error_bits=5, channels=2, coding="on_off", full_scale=16, error="softmax", residual_bits=3, classes=5, examples=35,
           layers=[conv(10, border=1, pool="max", weight_max=2, window=6, **RECIPE), conv(10, weight_max=1, window=6, **RECIPE), readout(**SOFT)])),
