@@ -352,17 +352,22 @@ class Net:
             self.ash, self.calib_other = blank(0), blank(0)
             recs = self.forward(self.x[:256], self.new_sat(), ideal=True)
             for l in range(self.nl):
-                for st in self.streams(l):
-                    seen = [[] for _ in range(self.ns)]
-                    for sl, _, ve, vi in self.currents(l, st, recs[l]["xp"], recs[l]["xn"]):
-                        seen[sl] += [ve.ravel(), vi.ravel()] if s["subtract"] == "digital" else [(ve - vi).ravel()]
-                    for sl in range(self.ns):
-                        v = np.concatenate(seen[sl])
-                        for which, table in ((1, self.ash), (0, self.calib_other)):
-                            ash = 0
-                            while self.over(v, ash)[which] * 1024 > len(v):
-                                ash += 1
-                            table[l][st][sl] = ash + s["headroom"]
+                self.fit_converters(l, recs[l])
+
+    def fit_converters(self, l, rec):
+        """Shifts of a layer by what it reads here, and those by the other meaning of `on the rail`."""
+        s = self.s
+        for st in self.streams(l):
+            seen = [[] for _ in range(self.ns)]
+            for sl, _, ve, vi in self.currents(l, st, rec["xp"], rec["xn"]):
+                seen[sl] += [ve.ravel(), vi.ravel()] if s["subtract"] == "digital" else [(ve - vi).ravel()]
+            for sl in range(self.ns):
+                v = np.concatenate(seen[sl])
+                for which, table in ((1, self.ash), (0, self.calib_other)):
+                    ash = 0
+                    while self.over(v, ash)[which] * 1024 > len(v):
+                        ash += 1
+                    table[l][st][sl] = ash + s["headroom"]
 
     def over(self, v, ash):
         """(conversions the clamp changes, conversions whose code lies on a rail)."""

@@ -9,12 +9,16 @@ import numpy as np
 from oracle import (I64, NN, NP, PATH_NAMES, PN, PP, SITE_DITHER, SITE_INIT, Net, activity_codes, clamp_counted, data_codes,
                     draw_cells, gain_word, rsh, sat, shuffle_order, table_shift, tables, tap_table)
 
-# The sentence that has two readings, and the one that the golden file has.
+# Sentences of the specification that had two readings when this was written, and the one that the golden file has. Where the
+# program took the other one at first sight, it says so.
 READINGS = dict(
-    pool_of="drives",              # what a pool pools: "activities" of 8 bits, or "drives" of drive_bits, as the program does
-    replay_moves="batch",          # thresholds and gains of a replay: once a "batch" or after each "sample"'s write
-    on_off="each",                 # full scale of the halves: "each" its own range, or "data", that of the data
-    sign_words="cell",             # words of sign with separable dither: "cell", or "separable"
+    pool_of="drives",              # a pool takes codes of drive_bits, or "activities" of 8 bits before them (first reading; MODEL 2.4 says codes)
+    replay_moves="batch",          # thresholds and gains of a replay move once a batch, or after the write of each "sample" (MODEL 2.5)
+    on_off="each",                 # full scale of the halves: each its own range, or that of the "data"
+    nearest="ratio",               # the mantissa of rms nearest to a power: by their ratio, or by their "difference" (first reading)
+    converters="layer",            # ranges of a net with thresholds or gains: layer by layer with those below, or of the "network" before any
+                                   # (first reading; MODEL 2.5 says by layer)
+    sign_words="separable",        # words of sign with separable dither: separable as any word of a cell, or its own "cell"'s (first reading)
 )
 
 
@@ -43,7 +47,7 @@ DATA_NOTE = (
     "All integers non-negative, no wrap below 2^64. Example i, pixel (y, x) of height x width, channel c of `channels`, label = i % classes, full scale M: "
     "proto = (41*(y*(2*label + 1) + x*(label*label + 3) + c*(label + 2))) % (M+1); "
     "h = (i*2654435761 + ((y*width + x)*channels + c)*40503*(i+1)) >> 7; value = proto if h % 4 != 0, else (h >> 5) % (M+1). "
-    "Values lie y, x, channel.")
+    "Values lie y, x, channel here, and plane by plane in the Rust test.")
 
 
 def images(n, height, width, channels, classes, full_scale):
@@ -75,8 +79,9 @@ WHITE = """
 WHITE = np.array(WHITE.split(), I64).reshape(3, 3, 5, 5)      # [filter][colour][ky][kx]
 
 
-def white(x):
+def white(x, full_scale):
     """Six unsigned channels, 255 the full scale: on_0 on_1 on_2 off_0 off_1 off_2."""
+    x = data_codes(x, full_scale, 8)
     n, height, width, channels = x.shape
     assert channels == 3
     size = height * width * 3
@@ -117,8 +122,8 @@ def ramp_table(lut_bits):
     return a, np.where((a > 0) & (a < 255), 255, 0)
 
 
-def softmax_tables(weight_max, level_bits, drive_bits, ce):
-    unit = Fr((1 << level_bits) * ((1 << drive_bits) - 1)) / Fr(weight_max)
+def softmax_tables(weight_max, level_bits, drive_bits, temperature, ce):
+    unit = Fr((1 << level_bits) * ((1 << drive_bits) - 1)) / Fr(weight_max) * Fr(temperature)
     esh = 0
     while (1 << (10 + esh)) < 8 * unit:
         esh += 1
@@ -134,24 +139,20 @@ def decay_at(decay, t, total):
     return {"constant": 1.0, "linear": 1 - t / total, "cosine": (1 + math.cos(math.pi * t / total)) / 2}[decay]
 
 
-def power_tables():
+def power_table(f):
     """(m, s) with m 2^-s nearest to 2^(-f/256), m in 1..15."""
-    out = []
-    for f in range(256):
-        v = 2.0 ** (-f / 256)
-        best = min(((abs(m / 2 ** s - v), s, m) for s in range(12) for m in range(1, 16)))
-        out.append((best[2], best[1]))
-    assert out[0] == (1, 0) and out[128] in ((11, 4),)
-    return out
+    if READINGS["nearest"] == "ratio":
+        far = lambda m, s: abs(math.log2(m) - s + f / 256)
+    else:
+        far = lambda m, s: abs(m / 2 ** s - 2.0 ** (-f / 256))
+    return min((far(m, s), s, m) for s in range(12) for m in range(1, 16))[:0:-1]
 
-
-POWERS = power_tables()
 
 DEFAULTS = dict(
     seed=1, examples=40, height=6, width=6, channels=1, classes=4, full_scale=255, coding="raw", batch=8, epochs=2,
     level_bits=8, floor=0, ceiling=None, floor_kind="recoverable", drive_bits=8, dac_bits=8, tile_rows=128,
     adc="ideal", adc_bits=None, subtract="digital", adc_range=None, headroom=1, lut_bits=10, error_bits=8,
-    error="one_vs_all", centre="batch", mode="accumulate", d_max=7, dither_bits=8, dither="per_cell", residual_bits=0,
+    error="one_vs_all", temperature=1, centre="batch", mode="accumulate", d_max=7, dither_bits=8, dither="per_cell", residual_bits=0,
     taps=1, tap_shift=None, decay="constant", layers=None)
 # Of an array; `side` makes it a convolution of `units` channels.
 ARRAY = dict(
@@ -173,7 +174,7 @@ class ConvNet(Net):
         self.raw, self.y = images(s["examples"], s["height"], s["width"], s["channels"], s["classes"], s["full_scale"])
         self.means_of_data = None
         if s["coding"] == "white":
-            self.values, self.full = white(self.raw)
+            self.values, self.full = white(self.raw, s["full_scale"])
         elif s["coding"] == "on_off":
             self.values, self.full, self.means_of_data = on_off(self.raw, s["full_scale"])
         else:
@@ -238,16 +239,19 @@ class ConvNet(Net):
                 assert s["mode"] == "accumulate" and a["mantissa"] == 1 and not (s["residual_bits"] and a["optimiser"] == "sign")
         self.widths = [a["fan_in"] for a in self.layers]
         if self.softmax:
-            self.esh, self.E, self.Q, self.Gs = softmax_tables(self.layers[-1]["weight_max"], s["level_bits"], s["drive_bits"], s["classes"])
+            self.esh, self.E, self.Q, self.Gs = softmax_tables(self.layers[-1]["weight_max"], s["level_bits"], s["drive_bits"], s["temperature"], s["classes"])
         self.k = [self.shift_of(l) for l in range(self.nl)]
         for l, a in enumerate(self.layers):
             if a["optimiser"] != "rms":
-                assert 0 <= self.k[l] <= (16 if a["optimiser"] == "sign" else 30), (l, self.k[l])
+                assert 0 <= nearest(self.kstar[l]) <= (16 if a["optimiser"] == "sign" else 30), (l, self.k[l])
         self.mu = np.zeros(s["classes"], I64)
         self.sat_train, self.events = self.new_sat(), {}
         self.calib_other, self.ash = None, []
         self.tracks = s["adc_range"] == "tracking"
-        self.set_converters()                                             # of the whole net, by thresholds of 0 and the shifts of tables
+        # converters of a net with thresholds or gains are fitted with what is calibrated below
+        self.by_layer = (s["adc_range"] in ("tracking", "calibrated") and READINGS["converters"] == "layer"
+                         and any(a["threshold"] or a["gain"] != "table" for a in self.layers))
+        self.set_converters()
         self.forget_rails()
         self.unlooked = 0
         self.calibrate_homeostasis()
@@ -361,7 +365,10 @@ class ConvNet(Net):
         maps = {"p": codes, "n": codes}
         self.lsh_before = list(self.lsh)
         for l in range(self.nl):
-            a, rec = self.layers[l], self.read_layer(l, maps, count, self.s["adc"] == "ideal")
+            a = self.layers[l]
+            if self.by_layer:
+                self.fit_converters(l, {"xp": self.reads(l, maps["p"]), "xn": self.reads(l, maps["n"])})
+            rec = self.read_layer(l, maps, count, self.s["adc"] == "ideal")
             n = len(codes) * a["positions"]
             if l in self.T:
                 for st in "pn":
@@ -389,7 +396,7 @@ class ConvNet(Net):
                     self.lsh[l], self.V[l] = self.lsh[l] + 1, self.V[l] >> 2
                 elif self.V[l] < self.constant(l, 3, 15):
                     self.lsh[l], self.V[l] = self.lsh[l] - 1, self.V[l] << 2
-                assert -8 <= self.lsh[l] <= 47
+                assert -8 <= self.lsh[l] <= 47, "reaches an end"
             if l in self.T:
                 for st in "pn":
                     self.T[l][st] = self.T[l][st] + rsh((recs[l]["acc_" + st][rows].sum(axis=0) << 8) - n * self.T[l][st], w)
@@ -487,7 +494,7 @@ class ConvNet(Net):
                 X = ((self.R[l] + 128) >> 1) - self.k[l]
                 kept = min(max(X, 0), 256 * 31 - 1)
                 self.held[l] += kept != X
-                m, s = POWERS[kept & 255]
+                m, s = power_table(kept & 255)
             for p, v in sums.items():
                 self.program(l, p, self.stochastic(sign(p) * v * m, (kept >> 8) + s - F, l, p) if z else np.zeros_like(v))
         if a["centred"] and not first:
@@ -567,9 +574,7 @@ def run_case(name, note, **over):
     s = net.s
     res = {"name": name, "note": note,
            "settings": dict({k: v for k, v in s.items() if k != "layers"}, seed_decimal=str(s["seed"]), layers=net.layers,
-                            coded_full_scale=net.full, coded_shape=list(net.values.shape[1:]),
                             means_of_data=None if net.means_of_data is None else net.means_of_data.tolist(),
-                            coded_hex=None if s["coding"] == "raw" else net.values.astype("u1").tobytes().hex(),
                             k=net.k, lsh=net.lsh_before, esh=net.esh if net.softmax else None),
            "after_calibration": {**net.state(), "ash": copy.deepcopy(net.ash) or None}, "after_epoch": []}
     for e in range(s["epochs"]):
@@ -620,11 +625,14 @@ CASES = [
     ("recipe_white", "the recipe: white input, ramp, thresholds, tracking gains, centred, softmax, rms, cosine, a short last batch",
      dict(seed=104, height=8, width=8, channels=3, coding="white", error="softmax", decay="cosine", examples=42, classes=10, epochs=3,
           layers=[conv(10, border=1, pool="average", weight_max=2, window=5, **RECIPE), conv(10, border=1, pool="average", weight_max=2, window=6, **RECIPE), dense(20, weight_max=1, window=5, **RECIPE), readout(**SOFT)])),
+    ("white_of_16", "white input of a full scale of 16 and 5 bits of drives, a map that is not square",
+     dict(seed=119, height=6, width=7, channels=3, full_scale=16, coding="white", drive_bits=5, error="softmax", classes=5, examples=30,
+          layers=[conv(10, side=5, stride=2, border=2, weight_max=2, window=6, **RECIPE), readout(**SOFT)])),
     ("recipe_on_off_4bit", "the recipe of 4 bits: levels, drives and errors; on and off inputs, max pooling, remainders with rms",
      dict(seed=105, level_bits=4, drive_bits=4, error_bits=5, channels=2, coding="on_off", full_scale=16, error="softmax", residual_bits=3, classes=5, examples=35,
           layers=[conv(10, border=1, pool="max", weight_max=2, window=6, **RECIPE), conv(10, weight_max=1, window=6, **RECIPE), readout(**SOFT)])),
     ("fixed_gain_plain", "gains fixed at twice a deviation, centred plain updates, mantissas, linear decay, average pooling of 3-bit drives, 6-bit levels",
-     dict(seed=106, level_bits=6, drive_bits=3, error="softmax", decay="linear", dither_bits=16, epochs=3,
+     dict(seed=106, temperature=2, level_bits=6, drive_bits=3, error="softmax", decay="linear", dither_bits=16, epochs=3,
           layers=[conv(8, border=1, pool="average", act="ramp", threshold=True, gain="fixed", spread=1, centred=True, rate=2, mantissa=3, window=7),
                   conv(8, border=1, act="ramp", threshold=True, gain="fixed", centred=True, rate=2, window=7), readout(centred=True, rate=1, mantissa=5, weight_max=2)])),
     ("sign_dead_zone", "2-bit levels, sign with a dead zone, centred, softmax, tracking gains",
@@ -645,7 +653,7 @@ CASES = [
      dict(seed=111, height=6, width=8, channels=2, adc="finite", adc_bits=8, adc_range="calibrated", dac_bits=2, tile_rows=8, headroom=3, mode="replay", error="softmax", lut_bits=8, taps=2, examples=30, epochs=3,
           layers=[conv(8, side=3, border=1, pool="average", act="ramp", threshold=True, gain="tracking", window=5, rate=4), conv(8, side=2, stride=2, border=1, act="ramp", threshold=True, gain="tracking", window=5, rate=2), readout(rate=1, weight_max=2)])),
     ("gain_without_threshold", "tracking gains without thresholds, an absorbing floor, a window of levels, rectified convolution with a threshold, dither 0, tables of 12 bits",
-     dict(seed=112, floor_kind="absorbing", floor=2, ceiling=120, dither_bits=0, lut_bits=12, error="softmax", d_max=3,
+     dict(seed=112, temperature=0.5, floor_kind="absorbing", floor=2, ceiling=120, dither_bits=0, lut_bits=12, error="softmax", d_max=3,
           layers=[conv(8, border=1, pool="max", act="ramp", gain="tracking", window=5, centred=True, optimiser="rms", rate=0.2), conv(8, border=1, act="relu", threshold=True, centred=True, rate=1, window=6), readout(**SOFT)])),
     ("dense_rms", "no convolution: rms, three taps, remainders, linear decay",
      dict(seed=114, taps=3, residual_bits=2, decay="linear", epochs=3, layers=[dense(13, alpha=6, optimiser="rms", rate=0.2), dense(11, alpha=4, optimiser="rms", rate=0.3, weight_max=2), readout(optimiser="rms", rate=0.4, alpha=6)])),
@@ -701,7 +709,6 @@ if __name__ == "__main__":
         key, _, value = given.partition("=")
         assert key in READINGS, key
         READINGS[key] = value
-    built = lambda over: over.get("error") != "softmax" and not any(a.get("threshold") for a in over["layers"])
-    cases = [run_case(n, note, **over) for n, note, over in CASES if built(over)]
+    cases = [run_case(n, note, **over) for n, note, over in CASES]
     json.dump({"notes": {"data": DATA_NOTE, "readings": READINGS}, "cases": cases}, sys.stdout, separators=(",", ":"))
     print()
