@@ -10,5 +10,6 @@ mod tile;
 
 pub use network::{Network, PartSpan, Span, TileAt};
 pub use tile::{
-    BankEvents, Command, Launch, More, Tile, TileAdc, TileConfig, TileEvents, TileSize, TileUnits,
+    BankEvents, Command, Launch, More, Tile, TileAdc, TileBalance, TileConfig, TileEvents,
+    TileSize, TileUnits,
 };
