@@ -94,7 +94,7 @@ pub mod network {
     pub use crate::learn::rule::{Rule, UpdateMode};
     pub use crate::num::fixed::{Batch, RateMantissa};
     pub use crate::num::tables::{Activation, Decay, Positive};
-    pub use crate::task::classify::Augment;
+    pub use crate::task::classify::{Augment, Coding};
 }
 
 #[cfg(feature = "lab")]

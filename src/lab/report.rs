@@ -104,6 +104,8 @@ pub struct RunView<'a> {
     pub pictures: &'a [Picture],
     /// Inputs of a policy, in the order of the rows of the first layer.
     pub inputs: &'a [PolicyInput],
+    /// Whether the first layer is a convolution.
+    pub windows: bool,
     /// An episode of a policy.
     pub film: Option<&'a Film>,
     /// Names of the classes; numbers stand in for missing ones.

@@ -19,7 +19,7 @@ use dalean::learn::route::Route;
 use dalean::learn::rule::{Rule, UpdateMode};
 use dalean::num::fixed::*;
 use dalean::num::tables::{Activation, Decay, Lut, Positive, Unit};
-use dalean::task::classify::{Examples, Experiment, Trainer};
+use dalean::task::classify::{Coding, Examples, Experiment, Trainer};
 use serde_json::Value;
 use sha2::{Digest, Sha256};
 
@@ -162,6 +162,7 @@ fn experiment(s: &Value) -> Experiment {
         hardware: hardware(s),
         network,
         epochs: int(&s["epochs"]) as u32,
+        coding: Coding::Values,
         augment: None,
     }
 }
@@ -291,7 +292,7 @@ fn run(case: &Value, backend: Backend) {
     let (name, s) = (text(&case["name"]), &case["settings"]);
     let data = examples(int(&s["features"]) as u64, int(&s["classes"]) as u64);
     let experiment = experiment(s);
-    let seeded = experiment.build(backend, data.len()).unwrap();
+    let seeded = experiment.build(backend, &data).unwrap();
     let mut trainer = Trainer::new(experiment, seeded);
     for (l, layer) in trainer.driver().engine().layers().iter().enumerate() {
         assert_eq!(i64::from(layer.lut.shift), int(&s["lsh"][l]), "{name}: lsh of layer {l}");

@@ -35,7 +35,7 @@ impl<'a> Net<'a> {
             .expect("a bench's networks fit their data");
         let batch = experiment.network.batch.get() as usize;
         let seeded =
-            experiment.build(backend, examples.len()).expect("a bench's networks fit their chip");
+            experiment.build(backend, examples).expect("a bench's networks fit their chip");
         let mut trainer = Trainer::new(experiment, seeded);
         trainer.calibrate(examples);
         Self { trainer, examples, batch, next: 0 }

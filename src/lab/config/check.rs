@@ -6,7 +6,6 @@ use std::fmt::Display;
 use std::iter;
 
 use super::changed::{self, UnderModel};
-use super::defaults::SetDefaults;
 use super::file::{ChipFile, DataFile, ExperimentFile, LearningFile, NetworkFile, PerLayer};
 use super::hardware::check_marks;
 use super::law::{kind_of, settings};
@@ -14,9 +13,9 @@ use super::policy::PolicySettings;
 use super::quantity::{Constants, constants_of};
 use super::{ConfigError, Sources, chip, data};
 use crate::chip::hardware::{ConverterKind, Hardware};
-use crate::chip::layer::Optimiser;
+use crate::chip::layer::{Homeostasis, Optimiser};
 use crate::lab::near;
-use crate::learn::error::Centre;
+use crate::learn::error::{Centre, OutputError};
 use crate::learn::route::Route;
 use crate::learn::rule::{Rule, UpdateMode};
 use crate::num::fixed::{Batch, OutOfRange, RateMantissa};
@@ -26,9 +25,13 @@ mod learning;
 mod network;
 mod policy;
 mod route;
+mod style;
+mod window;
 
 use learning::Learning;
 use network::Network;
+use style::{PRESETS, Preset, Style};
+pub(crate) use window::{Convolved, ImageInput};
 
 /// Which epoch's state reads the test set.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -80,7 +83,11 @@ pub struct Config {
     pub(crate) seed: u64,
     /// What is learnt.
     pub(crate) data: DataConfig,
-    /// Units of each hidden layer.
+    /// How values become drives.
+    pub(crate) input: ImageInput,
+    /// Convolutions before the dense layers.
+    pub(crate) convolutions: Vec<Convolved>,
+    /// Units of each dense hidden layer.
     pub(crate) hidden: Vec<usize>,
     /// Output units, if not one a class.
     pub(crate) outputs: Option<usize>,
@@ -92,12 +99,18 @@ pub struct Config {
     pub(crate) bias: Bias,
     /// Initial gains, 64ths, of hidden and of output layers.
     pub(crate) gain_64ths: [[u32; 2]; 2],
+    /// What hidden units do beside their table.
+    pub(crate) homeostasis: Homeostasis,
     /// The rule.
     pub(crate) rule: Rule,
     /// When a batch is written.
     pub(crate) mode: UpdateMode,
+    /// What the error of an output is.
+    pub(crate) error: OutputError,
     /// What is subtracted from errors.
     pub(crate) centre: Centre,
+    /// Whether all layers learn from what differs from the mean of a row; of policies, [`PolicySettings`] says which.
+    pub(crate) centred: bool,
     /// How errors reach hidden layers; `None` with back-propagation.
     pub(crate) route: Option<Route>,
     /// Samples of an update.
@@ -114,6 +127,8 @@ pub struct Config {
     pub(crate) epochs: u32,
     /// Random shift of training images.
     pub(crate) shift_pixels: u32,
+    /// Whether training images are mirrored at random.
+    pub(crate) flip: bool,
     /// What is learnt from.
     pub(crate) train_on: TrainOn,
     /// Which state reads the test set.
@@ -208,27 +223,34 @@ pub(super) fn config(mut file: ExperimentFile, model: &UnderModel) -> Result<Con
     let constants = constants_of(hw, &hardware, "hw.")?;
     let hardware_name = hw.name.get_or_insert_with(|| "unnamed".into()).clone();
     let not_simulated = hw.not_simulated.clone().unwrap_or_default();
-    let Learnt { data, hidden, outputs, network, learning, mantissas, policy } = match task {
+    let learnt = match task {
         TaskKind::Classify => classify(&mut file, &hardware)?,
         TaskKind::Policy => policy::resolve(&mut file, &hardware)?,
     };
-    let Network { activations, weight_max_log2, bias, gain_64ths } = network;
+    let Learnt { data, input, convolutions, hidden, outputs, .. } = learnt;
+    let Learnt { network, learning, mantissas, policy, .. } = learnt;
+    let Network { activations, weight_max_log2, bias, gain_64ths, homeostasis } = network;
     let Learning { kind, mode, centre, route, batch, rates, decay, optimiser, .. } = learning;
-    let Learning { epochs, shift_pixels, train_on, select, .. } = learning;
+    let Learning { error, centred, epochs, shift_pixels, flip, train_on, select, .. } = learning;
     #[cfg(feature = "grown")]
     file.learning.get_or_insert_default().grown.get_or_insert(0);
     Ok(Config {
         seed,
         data,
+        input,
+        convolutions,
         hidden,
         outputs,
         activations,
         weight_max_log2,
         bias,
         gain_64ths,
+        homeostasis,
         rule: kind.rule,
         mode,
+        error,
         centre,
+        centred,
         route,
         batch,
         mantissas,
@@ -237,6 +259,7 @@ pub(super) fn config(mut file: ExperimentFile, model: &UnderModel) -> Result<Con
         optimiser,
         epochs,
         shift_pixels,
+        flip,
         train_on,
         select,
         policy,
@@ -252,6 +275,8 @@ pub(super) fn config(mut file: ExperimentFile, model: &UnderModel) -> Result<Con
 /// What is learnt and how, whatever the chip.
 struct Learnt {
     data: DataConfig,
+    input: ImageInput,
+    convolutions: Vec<Convolved>,
     hidden: Vec<usize>,
     outputs: Option<usize>,
     network: Network,
@@ -264,15 +289,45 @@ struct Learnt {
 fn classify(file: &mut ExperimentFile, hardware: &Hardware) -> Result<Learnt, ConfigError> {
     policy::refused_in_classification(file)?;
     let data = data::resolve(file.data.get_or_insert_with(DataFile::default))?;
-    let defaults = SetDefaults::of(&data);
+    let preset = match &mut file.preset {
+        None => Preset::Own,
+        some => word("preset", some, "", &PRESETS)?,
+    };
     let network = file.network.get_or_insert_with(NetworkFile::default);
     let learning = file.learning.get_or_insert_with(LearningFile::default);
-    let hidden = network.hidden.get_or_insert_with(|| defaults.hidden.to_vec()).clone();
-    let learnt = learning::resolve(learning, &hidden, defaults)?;
-    let made = network::resolve(network, hidden.len() + 1, learnt.kind, defaults)?;
-    let mantissas = mantissas(learning, &learnt, &made, hardware)?;
-    let outputs = network.outputs;
-    Ok(Learnt { data, hidden, outputs, network: made, learning: learnt, mantissas, policy: None })
+    let windows = network.channels.as_ref().map_or(0, Vec::len);
+    let style = Style::of(preset, windows, &data)?;
+    let (input, convolutions) = window::resolve(network, style)?;
+    let hidden = network.hidden.get_or_insert_with(|| style.hidden()).clone();
+    let learnt = learning::resolve(learning, &hidden, style)?;
+    let made = network::resolve(
+        network,
+        &fan_ins(&convolutions, &hidden),
+        learnt.kind,
+        learnt.error,
+        style,
+    )?;
+    let mantissas = mantissas(learning, &learnt, &made, &convolutions, hardware)?;
+    let (outputs, policy) = (network.outputs, None);
+    let network = made;
+    Ok(Learnt {
+        data,
+        input,
+        convolutions,
+        hidden,
+        outputs,
+        network,
+        learning: learnt,
+        mantissas,
+        policy,
+    })
+}
+
+/// Inputs of a pathway of each layer; of the first dense one without convolutions the data say it.
+fn fan_ins(convolutions: &[Convolved], hidden: &[usize]) -> Vec<usize> {
+    let below = convolutions.last().map_or(1, |last| last.pooled().iter().product());
+    let windows = convolutions.iter().map(|one| one.shape.rows());
+    windows.chain(iter::once(below)).chain(hidden.iter().copied()).collect()
 }
 
 /// What the greatest code behind a layer of this kind stands for, or of data.
@@ -288,29 +343,33 @@ fn mantissas(
     file: &mut LearningFile,
     learning: &Learning,
     network: &Network,
+    convolutions: &[Convolved],
     hardware: &Hardware,
 ) -> Result<Vec<RateMantissa>, ConfigError> {
+    let positions = convolutions.iter().map(|one| one.shape.positions()).chain(iter::repeat(1));
     let layers = network.activations.iter().zip(&network.weight_max_log2);
     let below = iter::once(None).chain(network.activations.iter().map(Some));
-    let asked = learning.rates.iter().zip(layers).zip(below.map(full_drive));
-    let asked = asked.map(|((&rate, (&activation, &weight_max_log2)), full_drive)| Rate {
-        rate,
-        of: match learning.optimiser {
-            Optimiser::Sign { .. } => RateOf::Pulses,
-            Optimiser::AdamFx { .. } => RateOf::Requests,
-            _ => RateOf::Sums,
-        },
-        batch: learning.batch,
-        mantissa: RateMantissa::new(1).expect("in range"),
-        error_bits: hardware.digital.error_bits,
-        activation,
-        unit: Unit {
-            weight_max_log2,
-            level_bits: hardware.cell.level_bits,
-            drive_bits: hardware.drive.bits,
-            full_drive,
-        },
-    });
+    let asked = learning.rates.iter().zip(layers).zip(below.map(full_drive)).zip(positions);
+    let asked =
+        asked.map(|(((&rate, (&activation, &weight_max_log2)), full_drive), positions)| Rate {
+            rate,
+            of: match learning.optimiser {
+                Optimiser::Sign { .. } => RateOf::Pulses,
+                Optimiser::AdamFx { .. } => RateOf::Requests,
+                _ => RateOf::Sums,
+            },
+            batch: learning.batch,
+            positions,
+            mantissa: RateMantissa::new(1).expect("in range"),
+            error_bits: hardware.digital.error_bits,
+            activation,
+            unit: Unit {
+                weight_max_log2,
+                level_bits: hardware.cell.level_bits,
+                drive_bits: hardware.drive.bits,
+                full_drive,
+            },
+        });
     learning::mantissas(file, &asked.collect::<Vec<_>>())
 }
 

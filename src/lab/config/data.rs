@@ -6,7 +6,9 @@ use super::check::wrong;
 use super::file::{ColumnFile, DataFile};
 use super::{Config, ConfigError};
 use crate::lab::data::csv::{self, Reading};
-use crate::lab::data::{self, Data, DataError, DataRoot, FileSet, PartFile, Source, Told};
+use crate::lab::data::{
+    self, Data, DataError, DataRoot, FileSet, ImageShape, PartFile, Source, Told,
+};
 
 const MISSING: &str = "is missing";
 const ANY: &[&str] = &["idx", "npz", "csv"];
@@ -41,6 +43,7 @@ fn keys(data: &DataFile) -> Vec<(String, bool, &'static [&'static str])> {
     let others = [
         ("full_scale", data.full_scale.is_some(), ANY),
         ("classes", data.classes.is_some(), ANY),
+        ("shape", data.shape.is_some(), ANY),
         ("label_column", data.label_column.is_some(), TABLES),
         ("ignore_columns", data.ignore_columns.is_some(), TABLES),
         ("header", data.header.is_some(), TABLES),
@@ -185,7 +188,8 @@ fn own(data: &DataFile) -> Result<FileSet, ConfigError> {
     let [train, validation, test] = found;
     let train = train.expect("its file is given");
     let (full_scale, classes) = (data.full_scale, data.classes);
-    Ok(FileSet { train, validation, test, full_scale, classes, image: None })
+    let image = data.shape.map(|[height, width, channels]| ImageShape { height, width, channels });
+    Ok(FileSet { train, validation, test, full_scale, classes, image })
 }
 
 /// What is stated of tables.

@@ -40,13 +40,24 @@ pub struct SetDefaults {
 }
 
 /// Keys whose default follows from other keys of an experiment than data and rule.
-pub(super) const FOLLOWING: [&str; 6] = [
+pub(super) const FOLLOWING: [&str; 17] = [
     "learning.rate",
     "learning.rate_multipliers",
     "learning.centre",
     "environment.rollouts",
     "network.critic_hidden",
     "network.weight_max",
+    "network.hidden",
+    "network.input",
+    "network.activation",
+    "network.alpha",
+    "network.threshold",
+    "network.gain",
+    "learning.error",
+    "learning.optimiser",
+    "learning.centred",
+    "learning.batch",
+    "learning.taps",
 ];
 
 /// One entry a data set that has defaults of its own, then the entry of all others.

@@ -104,26 +104,25 @@ impl Config {
             .map(|config| config.resolved)
     }
 
-    /// The same with everything else that is said, but for keys whose default follows from it.
-    fn following(&self) -> Option<ExperimentFile> {
-        let mut file = self.resolved.clone();
-        let learning = file.learning.as_mut()?;
-        (learning.rate, learning.rate_multipliers, learning.centre) = (None, None, None);
-        file.environment.iter_mut().for_each(|environment| environment.rollouts = None);
-        if let Some(network) = file.network.as_mut() {
-            (network.critic_hidden, network.weight_max) = (None, None);
-        }
-        check::config(file, &UnderModel::default()).ok().map(|config| config.resolved)
+    /// What a key is by saying everything else: its default follows from that.
+    fn following(&self, key: &str) -> Option<String> {
+        let mut table = toml::Table::try_from(&self.resolved).ok()?;
+        let (head, name) = key.split_once('.')?;
+        table.get_mut(head)?.as_table_mut()?.remove(name)?;
+        let config = check::config(table.try_into().ok()?, &UnderModel::default()).ok()?;
+        let mut lines = lines_of(&config.resolved).into_iter();
+        lines.find(|(found, _)| found == key).map(|(_, value)| value)
     }
 
     /// Keys whose value is another than by saying nothing but data, rule and chip; the seed aside.
     #[must_use]
     pub(crate) fn differences(&self) -> Vec<Difference> {
         let mut silent = self.silent().map(|file| lines_of(&file)).unwrap_or_default();
-        if let Some(file) = self.following() {
-            let follows = |key: &str| FOLLOWING.contains(&key);
-            silent.retain(|(key, _)| !follows(key));
-            silent.extend(lines_of(&file).into_iter().filter(|(key, _)| follows(key)));
+        for key in FOLLOWING {
+            if let Some(value) = self.following(key) {
+                silent.retain(|(name, _)| name != key);
+                silent.push((key.to_owned(), value));
+            }
         }
         let all = lines_of(&self.resolved).into_iter();
         let others = all.filter(|(key, _)| !SAID.contains(&&**key) && !key.starts_with("data."));

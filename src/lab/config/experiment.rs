@@ -2,14 +2,13 @@
 
 use std::iter;
 
-use super::check::{Bias, wrong};
+use super::check::{Bias, Convolved, ImageInput, wrong};
 use super::{Config, ConfigError};
 use crate::chip::layer::{DrivenBy, Homeostasis, InitialLevels, LayerSpec, Pool};
-use crate::learn::error::OutputError;
 use crate::learn::network::NetworkSpec;
 use crate::learn::rule::{Readout, Rule};
 use crate::num::tables::Activation;
-use crate::task::classify::{Augment, Experiment};
+use crate::task::classify::{Augment, Coding, Experiment};
 
 impl Config {
     /// The experiment for examples of `features` values and `classes` classes.
@@ -37,50 +36,100 @@ impl Config {
                 format!("the data has {classes} classes: use {classes}, or 1 for two classes");
             return Err(wrong("network.outputs", format!("is {outputs}"), allowed));
         }
-        let augment = match (self.shift_pixels, image) {
-            (0, _) => None,
-            (pixels, Some([height, width, channels])) => {
-                Some(Augment { pixels, height, width, channels })
-            }
-            (pixels, None) => {
-                let allowed = "the data holds no images; leave the key out";
-                return Err(wrong("learning.shift_pixels", format!("is {pixels}"), allowed));
-            }
-        };
+        let coding = self.coding(image)?;
         let experiment = Experiment {
             seed: self.seed,
             hardware: self.hardware.clone(),
-            network: self.network_of(features, &self.hidden, outputs),
+            network: self.network_of(coding.rows(features), &self.hidden, outputs),
+            coding,
             epochs: self.epochs,
-            augment,
+            augment: self.augment(image)?,
         };
         experiment.check()?;
         Ok(experiment)
     }
 
-    /// The network between so many inputs and outputs, through hidden layers of so many units.
+    /// What examples put on rows.
+    fn coding(&self, image: Option<[usize; 3]>) -> Result<Coding, ConfigError> {
+        const SHAPE: &str =
+            "say their sizes with data.shape = [height, width, channels], or leave the key out";
+        let convolution = self.convolutions.first();
+        let Some(image) = image else {
+            return match (self.input, convolution) {
+                (ImageInput::Raw, None) => Ok(Coding::Values),
+                (ImageInput::Raw, Some(_)) => {
+                    Err(wrong("network.channels", "is given and the data holds no images", SHAPE))
+                }
+                (ImageInput::OnOff | ImageInput::White, _) => {
+                    Err(wrong("network.input", "is of images and the data holds none", SHAPE))
+                }
+            };
+        };
+        let coding = self.input.coding(image, convolution.is_some());
+        if let Some(Convolved { shape, .. }) = convolution {
+            let [height, width, _] = image;
+            let given = [height, width, coding.channels().unwrap_or_default()];
+            if given != [shape.height, shape.width, shape.channels] {
+                let found = format!(
+                    "was made for images of {} x {} with {} channels of codes",
+                    shape.height, shape.width, shape.channels
+                );
+                let allowed = format!(
+                    "those of the data are {height} x {width} with {}: say so with data.shape",
+                    given[2]
+                );
+                return Err(wrong("network.channels", found, allowed));
+            }
+        }
+        Ok(coding)
+    }
+
+    /// What becomes of training images.
+    fn augment(&self, image: Option<[usize; 3]>) -> Result<Option<Augment>, ConfigError> {
+        let (pixels, flip) = (self.shift_pixels, self.flip);
+        if pixels == 0 && !flip {
+            return Ok(None);
+        }
+        if let Some([height, width, channels]) = image {
+            return Ok(Some(Augment { pixels, height, width, channels, flip }));
+        }
+        let allowed = "the data holds no images; leave the key out";
+        Err(match pixels {
+            0 => wrong("learning.flip", "is true", allowed),
+            _ => wrong("learning.shift_pixels", format!("is {pixels}"), allowed),
+        })
+    }
+
+    /// The network between so many values and outputs, through convolutions and hidden layers of so many units.
     pub(super) fn network_of(
         &self,
         inputs: usize,
         hidden: &[usize],
         outputs: usize,
     ) -> NetworkSpec {
-        let mut sizes = vec![inputs];
+        let windows = self.convolutions.len();
+        let below = self.convolutions.last().map(|last| last.pooled().iter().product());
+        let mut sizes = vec![below.unwrap_or(inputs)];
         sizes.extend(hidden);
         sizes.push(outputs);
+        let count = windows + hidden.len() + 1;
         let behind = |activation: &Activation| match activation {
             Activation::Rms => DrivenBy::Normalised,
             _ => DrivenBy::Streams,
         };
         let driven = iter::once(DrivenBy::Shared).chain(self.activations.iter().map(behind));
-        let layers = (0..hidden.len() + 1).zip(driven).map(|(layer, driven_by)| {
-            let last = layer == hidden.len();
+        let layers = (0..count).zip(driven).map(|(layer, driven_by)| {
+            let last = layer + 1 == count;
+            let window = self.convolutions.get(layer);
+            let (inputs, units) = match window {
+                Some(window) => (window.shape.rows(), window.units),
+                None => (sizes[layer - windows], sizes[layer - windows + 1]),
+            };
             let activation = self.activations[layer];
-            let wiring =
-                self.rule.wiring(last.then(|| Readout::of(activation, OutputError::OneVsAll)));
+            let wiring = self.rule.wiring(last.then(|| Readout::of(activation, self.error)));
             LayerSpec {
-                inputs: sizes[layer],
-                units: sizes[layer + 1],
+                inputs,
+                units,
                 wiring,
                 driven_by,
                 activation,
@@ -91,24 +140,24 @@ impl Config {
                     Bias::InputRow => driven_by == DrivenBy::Shared,
                     Bias::Rows => true,
                 },
-                convolution: None,
-                pool: Pool::None,
-                homeostasis: Homeostasis::OFF,
+                convolution: window.map(|window| window.shape),
+                pool: window.map_or(Pool::None, |window| window.pool),
+                homeostasis: if last { Homeostasis::OFF } else { self.homeostasis },
             }
         });
         NetworkSpec {
             layers: layers.collect(),
             rule: self.rule,
             mode: self.mode,
-            error: OutputError::OneVsAll,
+            error: self.error,
             centre: self.centre,
             route: self.route,
             batch: self.batch,
             mantissas: self.mantissas.clone(),
             rates: self.rates.clone(),
             decay: self.decay,
-            optimisers: vec![self.optimiser; hidden.len() + 1],
-            centred: vec![false; hidden.len() + 1],
+            optimisers: vec![self.optimiser; count],
+            centred: vec![self.centred; count],
         }
     }
 

@@ -11,12 +11,22 @@ use super::quantity::{AreaKey, EnergyKey, PowerKey};
 
 /// One value for all layers, or one for each.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(untagged, expecting = "a number, or a list with one number a layer")]
+#[serde(untagged, expecting = "one value, or a list with one a layer")]
 pub enum PerLayer<T> {
     /// The same everywhere.
     All(T),
     /// Input to output.
     Each(Vec<T>),
+}
+
+/// `padding = "same"` or `1`.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(untagged, expecting = "\"same\", or a whole number")]
+pub enum PaddingFile {
+    /// By name.
+    Named(String),
+    /// So many pixels on each side.
+    Pixels(usize),
 }
 
 /// `rate_mantissa = 3`, `[3, 5]` or `"auto"`.
@@ -63,6 +73,8 @@ keys! {
         task: String,
         /// Seed of all draws.
         seed: u64,
+        /// Whose defaults the keys have that the file is silent about; without it, this program's.
+        preset: String,
         /// What is learnt.
         data: DataFile,
         /// Layers and units.
@@ -102,6 +114,8 @@ keys! {
         full_scale: u8,
         /// Number of classes; default: as many as there are different labels.
         classes: usize,
+        /// Height, width and channels of examples that are pictures; a table's values lie row after row, the channels of a pixel side by side.
+        shape: [usize; 3],
         /// CSV: `first`, `last`, a number from 0, or a header; default: told from the table, and said.
         label_column: ColumnFile,
         /// CSV: columns left out, each a number from 0 or a header; default: those without a name that number the rows.
@@ -129,18 +143,38 @@ keys! {
     }
     /// `[network]`.
     NetworkFile {
+        /// Output channels of each convolution; convolutions come before the hidden layers.
+        channels: Vec<usize>,
+        /// Convolutions: rows and columns of the window.
+        kernel: PerLayer<usize>,
+        /// Convolutions: pixels from a window to the next.
+        stride: PerLayer<usize>,
+        /// Convolutions: pixels of border on each side of the image, which are 0.
+        padding: PerLayer<PaddingFile>,
+        /// Convolutions: what is handed on of each square of their map.
+        pool: PerLayer<String>,
+        /// Convolutions: rows and columns of such a square.
+        pool_side: PerLayer<usize>,
         /// Units of each hidden layer; of policies, of the network that acts.
         hidden: Vec<usize>,
         /// Policies: units of each hidden layer of the network that says what a state is worth.
         critic_hidden: Vec<usize>,
         /// Output units.
         outputs: usize,
-        /// Policies: how numbers become drives, which have no sign.
+        /// How values become drives, which have no sign.
         input: String,
-        /// Function of hidden units; outputs are sigmoid, those of policies sums.
+        /// Function of hidden units, convolutions among them; outputs are sigmoid, sums with `softmax` and of policies.
         activation: String,
         /// Sigmoid width of each layer.
         alpha: PerLayer<f64>,
+        /// Whether each hidden unit takes the running mean of its own sum off it.
+        threshold: bool,
+        /// How the step of the table of hidden units is found.
+        gain: String,
+        /// Gain `fixed`: the table reaches 2^gain_spread times as far.
+        gain_spread: u32,
+        /// Samples after which thresholds and gains have come all the way, were they not to turn.
+        homeostasis_window: i64,
         /// Weight of the level after the greatest, of each layer.
         weight_max: PerLayer<f64>,
         /// Whether a constant input is learnt from.
@@ -166,7 +200,7 @@ keys! {
         optimiser: String,
         /// Optimiser `sign`: sums below the root mean square of their layer ask for nothing.
         dead_zone: bool,
-        /// Policies: whether hidden layers of the network that acts learn from what differs from the mean of each row.
+        /// Whether layers learn from what differs from the mean of each row; of policies, hidden layers of the network that acts.
         centred: bool,
         /// Rate, before multipliers; of the optimiser `sign` the probability of a pulse, of `rms` and `adam_fx` a step of weights.
         rate: f64,
@@ -176,6 +210,10 @@ keys! {
         rate_mantissa: MantissaFile,
         /// How the rate falls over the run.
         decay: String,
+        /// What the error of an output is.
+        error: String,
+        /// Error `softmax`: what outputs are divided by before they share.
+        temperature: f64,
         /// What is subtracted from errors.
         centre: String,
         /// How errors reach hidden units.
@@ -186,6 +224,8 @@ keys! {
         tap_shift: u32,
         /// Training images move by up to so many pixels.
         shift_pixels: u32,
+        /// Whether left and right of training images are exchanged, each time with a chance of a half.
+        flip: bool,
         /// What is learnt from.
         train_on: String,
         /// The epoch whose state reads the test set.

@@ -17,7 +17,7 @@ use crate::learn::network::NetworkSpec;
 use crate::learn::route::Route;
 use crate::learn::rule::{Rule, UpdateMode};
 use crate::num::tables::{Activation, Decay};
-use crate::task::classify::Experiment;
+use crate::task::classify::{Augment, Coding, Experiment, WHITE_NAME};
 use crate::task::policy::{Evaluating, Evolution, InputCoding, Method, PolicyExperiment, Ppo};
 
 /// Frozen defaults: of keys of a layer under `layer`, whatever its number.
@@ -81,6 +81,8 @@ const FROZEN: &[(&str, &str)] = &[
     ("learning.error", "one_vs_all"),
     ("actor.error", "one_vs_all"),
     ("critic.error", "one_vs_all"),
+    ("network.input", "values"),
+    ("learning.flip", "false"),
 ];
 
 /// Key and word.
@@ -108,18 +110,34 @@ impl Config {
 /// Everything a classification run was given, the data aside.
 fn classify(experiment: &Experiment, train_on: TrainOn, select: Select) -> Vec<Given> {
     // without `..`, here and below: what a run is given is listed or does not compile
-    let Experiment { seed, hardware, network, epochs, augment } = experiment;
+    let Experiment { seed, hardware, network, epochs, coding, augment } = experiment;
     let mut list = List::default();
     list.put("task", "classify");
     list.put("seed", seed);
     list.network("learning", 0, network);
     list.put("learning.epochs", epochs);
+    let of = |[height, width, channels]: [usize; 3]| format!("of {height} x {width} x {channels}");
     list.put(
-        "learning.shift_pixels",
-        augment.map_or("0".into(), |a| {
-            format!("{} of {} x {} x {}", a.pixels, a.height, a.width, a.channels)
-        }),
+        "network.input",
+        match *coding {
+            Coding::Values => "values".into(),
+            Coding::Pixels { image } => format!("pixels {}", of(image)),
+            Coding::OnOff { image } => format!("on_off {}", of(image)),
+            Coding::White { image } => format!("white ({WHITE_NAME}) {}", of(image)),
+        },
     );
+    let (mut shifts, mut flips) = ("0".to_owned(), "false".to_owned());
+    if let Some(Augment { pixels, height, width, channels, flip }) = *augment {
+        let image = of([height, width, channels]);
+        if pixels > 0 {
+            shifts = format!("{pixels} {image}");
+        }
+        if flip {
+            flips = image;
+        }
+    }
+    list.put("learning.shift_pixels", shifts);
+    list.put("learning.flip", flips);
     list.put(
         "learning.train_on",
         match train_on {

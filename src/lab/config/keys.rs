@@ -56,6 +56,8 @@ pub struct KeyEntry {
     pub values: KeyValues,
     /// Whether it takes one value a layer in place of one.
     pub layers: bool,
+    /// Whether it takes one value a convolution in place of one.
+    pub windows: bool,
     /// Unit; empty when it has none.
     pub unit: &'static str,
     /// Default as TOML; empty when a file that is silent has no value.
@@ -101,6 +103,7 @@ const fn key(name: &'static str, values: KeyValues) -> KeyEntry {
         name,
         values,
         layers: false,
+        windows: false,
         unit: "",
         default: "",
         otherwise: "",
@@ -133,6 +136,11 @@ const fn other(name: &'static str, what: &'static str) -> KeyEntry {
 impl KeyEntry {
     const fn layers(mut self) -> Self {
         self.layers = true;
+        self
+    }
+
+    const fn windows(mut self) -> Self {
+        self.windows = true;
         self
     }
 

@@ -358,7 +358,12 @@ mod tests {
                     let experiment = Some((&*name, &*text));
                     let config = load(&Sources { experiment, ..Sources::default() }).unwrap();
                     let classes = if name.contains("kaneko") { 2 } else { 10 };
-                    let made = config.networks(784, classes, Some([28, 28, 1]));
+                    let image = match config.data.set.as_deref() {
+                        Some("cifar10") => [32, 32, 3],
+                        _ => [28, 28, 1],
+                    };
+                    let features = image.iter().product();
+                    let made = config.networks(features, classes, Some(image));
                     assert!(made.is_ok(), "{name}: {made:?}");
                     assert_eq!(load_again(&config).to_toml(), config.to_toml());
                     seen += 1;

@@ -332,7 +332,7 @@ pub enum DataError {
     },
     /// A picture of another size than the example.
     #[error(
-        "a picture of {} x {} x {} does not fit examples of {features} values; mend `image`",
+        "a picture of {} x {} x {} does not fit examples of {features} values; mend `data.shape`",
         .image.height, .image.width, .image.channels
     )]
     Image {
@@ -340,6 +340,19 @@ pub enum DataError {
         image: ImageShape,
         /// Values of an example.
         features: usize,
+    },
+    /// A shape that a file contradicts.
+    #[error(
+        "`data.shape` is {} x {} x {}, but {path} holds pictures of {} x {} x {}; leave the key out, or mend it",
+        .stated.height, .stated.width, .stated.channels, .found.height, .found.width, .found.channels
+    )]
+    Shape {
+        /// The file.
+        path: PathBuf,
+        /// The shape stated.
+        stated: ImageShape,
+        /// The shape found.
+        found: ImageShape,
     },
     /// Too few examples to cut parts from.
     #[error(

@@ -6,7 +6,7 @@
 //! ```
 //!
 //! Numbers have their little end first. The validation part of a known set is the last twelfth of its
-//! training half, rounded down: 5,000 of 60,000.
+//! training half, rounded down: 5,000 of 60,000. Of CIFAR-10 it is the last 5,000 of 50,000.
 #![expect(clippy::disallowed_methods, reason = "data sets live in files")]
 
 use std::{
@@ -144,9 +144,14 @@ fn named(set: NamedSet, root: &DataRoot) -> Result<Data, DataError> {
         NamedSet::Optdigits => {
             (cut_tail(builtin::optdigits()), Some(builtin::OPTDIGITS_IMAGE), TAIL_NOTE)
         }
-        NamedSet::Mnist | NamedSet::FashionMnist | NamedSet::Cifar10 => {
+        NamedSet::Mnist | NamedSet::FashionMnist => {
             let entry = CatalogEntry::of(set).expect("every fetched set is in the catalogue");
             (cut_tail(fetched(entry, root)?), Some(entry.image), TAIL_NOTE)
+        }
+        NamedSet::Cifar10 => {
+            let entry = CatalogEntry::of(set).expect("every fetched set is in the catalogue");
+            let note = "; validation is the last 5,000 of the training half";
+            (cut_last(fetched(entry, root)?, 5_000), Some(entry.image), note)
         }
     };
     Ok(finish(&set.to_string(), split, image, note))
@@ -154,8 +159,13 @@ fn named(set: NamedSet, root: &DataRoot) -> Result<Data, DataError> {
 
 const TAIL_NOTE: &str = "; validation is the last twelfth of the training half";
 
-fn cut_tail([train, test]: [Examples; 2]) -> Split {
-    let at = train.len() - train.len() / 12;
+fn cut_tail(halves: [Examples; 2]) -> Split {
+    let twelfth = halves[0].len() / 12;
+    cut_last(halves, twelfth)
+}
+
+fn cut_last([train, test]: [Examples; 2], count: usize) -> Split {
+    let at = train.len() - count;
     let (train, validation) = train.split_at(at);
     Split { train, validation, test }
 }

@@ -12,7 +12,7 @@ use std::path::Path;
 
 mod parts;
 
-use self::parts::{OwnPart, Reader};
+use self::parts::{OwnPart, Reader, planes};
 use super::arrays::PartName;
 use super::error::DataError;
 use super::labels::{self, Classes, Labels};
@@ -85,7 +85,8 @@ pub(crate) fn load(files: &FileSet) -> Result<Data, DataError> {
         source: Box::new(source),
     })?;
     said.extend(named(&classes));
-    let (features, image) = (parts[0].1.features, files.image.or(parts[0].1.image));
+    let features = parts[0].1.features;
+    let image = pictures(files.image, &mut parts)?;
     if let Some(image) = image.filter(|image| image.values() != Some(features)) {
         return Err(DataError::Image { image, features });
     }
@@ -135,6 +136,31 @@ pub(crate) fn load(files: &FileSet) -> Result<Data, DataError> {
     }
     let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy();
     Ok(Data { names, said, told, ..finish(&name, split, image, &note) })
+}
+
+/// What the examples are as pictures. Flat examples of a stated shape hold the channels of a pixel side by side, and are put
+/// plane after plane.
+fn pictures(
+    stated: Option<ImageShape>,
+    parts: &mut [(PartName, OwnPart)],
+) -> Result<Option<ImageShape>, DataError> {
+    let Some(image) = stated else { return Ok(parts[0].1.image) };
+    for (_, part) in parts {
+        if image.values() != Some(part.features) {
+            return Err(DataError::Image { image, features: part.features });
+        }
+        match part.image {
+            Some(found) if found == image => {}
+            Some(found) => {
+                return Err(DataError::Shape { path: part.path.clone(), stated: image, found });
+            }
+            None if image.channels > 1 => {
+                part.values = planes(&part.values, part.features, image.channels);
+            }
+            None => {}
+        }
+    }
+    Ok(stated)
 }
 
 /// The one full scale of all parts.

@@ -243,3 +243,28 @@ fn the_arrays_of_known_archives_are_the_parts_they_name() {
     let error = loaded(twice).unwrap_err();
     assert!(error.contains("the same examples") && error.contains("data.test_array"), "{error}");
 }
+
+/// `data.shape`: the channels of a pixel stand side by side in a table, and examples lie plane by plane.
+#[test]
+fn a_table_of_a_stated_shape_holds_pictures() {
+    let files = Files::new();
+    // 1 x 2 pixels of 3 channels, of which the last tells the class
+    let line = |at: u8| format!("{},{at},1,2,3,4,{}\n", at % 2, at % 2);
+    let text: String = (0..36).map(line).collect();
+    let shape = |height, width, channels| Some(ImageShape { height, width, channels });
+    let set = |image| FileSet { image, ..only(files.csv("all.csv", &text)) };
+    let stated = loaded(set(shape(1, 2, 3))).unwrap();
+    assert_eq!(stated.image, shape(1, 2, 3));
+    assert_eq!(stated.split.train.values(1), [1, 3, 1, 4, 2, 1]);
+    let flat = loaded(set(None)).unwrap();
+    assert_eq!((flat.image, flat.split.train.values(1)), (None, &[1, 1, 2, 3, 4, 1][..]));
+    let grey = loaded(set(shape(2, 3, 1))).unwrap();
+    assert_eq!(grey.split.train.values(1), flat.split.train.values(1));
+    let error = loaded(set(shape(2, 2, 2))).unwrap_err();
+    assert!(error.contains("2 x 2 x 2") && error.contains("`data.shape`"), "{error}");
+    let values: Vec<u8> = (0..24).collect();
+    let own = files.idx("a", &[12, 1, 2], &values, &[0, 1, 0, 1, 0, 1, 0, 1, 0, 1, 0, 1]);
+    let error = loaded(FileSet { image: shape(2, 1, 1), ..only(own.clone()) }).unwrap_err();
+    assert!(error.contains("holds pictures of 1 x 2 x 1"), "{error}");
+    assert!(loaded(FileSet { image: shape(1, 2, 1), ..only(own) }).is_ok());
+}

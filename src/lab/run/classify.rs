@@ -56,8 +56,10 @@ impl Classify {
             let hint = "choose the last epoch with learning.select = \"last\"";
             return Err(RunError::Empty { part: "validation", hint });
         }
-        super::weigh(&experiment.network.layers, &experiment.hardware, super::Memory::left())?;
-        let seeded = experiment.build(machine.backend(), train.len())?;
+        let network = &experiment.network;
+        let left = super::Memory::left();
+        super::weigh(&network.layers, &experiment.hardware, network.batch, left)?;
+        let seeded = experiment.build(machine.backend(), &train)?;
         let mut trainer = Trainer::new(experiment, seeded);
         let (threads, engine) = (machine.threads(), trainer.driver_mut().engine_mut());
         engine.set_threads(threads).map_err(|error| RunError::NoThreads { threads, error })?;
@@ -201,6 +203,10 @@ impl Task for Classify {
         let (first, _) = self.train.clone().split_at(1);
         let _ = self.trainer.evaluate(&first);
         Ok(())
+    }
+
+    fn middles(&self) -> Vec<u8> {
+        self.trainer.middles().to_vec()
     }
 
     fn examples(&self) -> Option<&Examples> {

@@ -36,7 +36,8 @@ impl Policy {
         if matches!(experiment.method, Method::Ppo(_)) {
             layers.extend(experiment.critic.layers.clone());
         }
-        super::weigh(&layers, &experiment.hardware, super::Memory::left())?;
+        let batch = experiment.actor.batch;
+        super::weigh(&layers, &experiment.hardware, batch, super::Memory::left())?;
         let mut trainer = PolicyTrainer::new(experiment, machine.backend(), source)?;
         let threads = machine.threads();
         for network in trainer.networks_mut() {

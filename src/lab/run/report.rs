@@ -6,6 +6,7 @@
 //!
 //! What stands in brackets may be missing; figures that need it are then left out.
 
+use std::iter;
 use std::path::{Path, PathBuf};
 
 use super::again::read_config;
@@ -209,6 +210,7 @@ impl Parts<'_> {
             heats: &heats,
             pictures: &pictures,
             inputs: &inputs,
+            windows: !self.config.convolutions.is_empty(),
             film: self.film,
             class_names: &self.receipt.data.names,
             ledger: self.counted.map(|(ledger, _)| ledger),
@@ -229,9 +231,17 @@ impl Parts<'_> {
             let sizes = std::iter::once(&first).chain(units).map(usize::to_string);
             sizes.collect::<Vec<_>>().join("-")
         };
+        let windows = &self.config.convolutions;
+        let (windowed, dense) = sizes.split_at(windows.len().min(sizes.len()));
         // of a policy, the layers of the critic follow those of the actor
-        let networks = sizes.chunks(self.config.hidden.len() + 1).map(of_network);
-        let networks: Vec<String> = networks.collect();
+        let networks = dense.chunks(self.config.hidden.len() + 1).map(of_network);
+        let mut networks: Vec<String> = networks.collect();
+        if let (Some(first), false) = (windows.first(), windowed.is_empty()) {
+            let channels = windows.iter().map(|window| window.units);
+            let channels: Vec<_> = iter::once(first.shape.channels).chain(channels).collect();
+            let channels: Vec<_> = channels.iter().map(usize::to_string).collect();
+            networks.insert(0, format!("convolutions {}", channels.join("-")));
+        }
         let differs = self.config.differences_text();
         format!(
             "{} by {}: {} on {}{}{differs}",

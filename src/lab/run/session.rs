@@ -70,9 +70,10 @@ impl Session {
         machine: Machine,
         source: EnvSource,
     ) -> Result<Self, RunError> {
-        let record = DataRecord::of(&data);
+        let mut record = DataRecord::of(&data);
         let given = config.given(record.features, record.classes, record.image)?;
         let task = task::build(config, data, machine, source)?;
+        record.middles = task.middles();
         let rates = rates(config, &record, &task.networks())?;
         let run = address::key(given, &record.hash);
         let notes = task.notes();

@@ -95,6 +95,11 @@ pub(super) trait Task: fmt::Debug {
     /// Reads one sample as an inference does, or makes one decision.
     fn infer(&mut self) -> Result<(), RunError>;
 
+    /// Means that inputs lie above and below, of each channel; none where they are coded otherwise.
+    fn middles(&self) -> Vec<u8> {
+        vec![]
+    }
+
     /// Test examples, where mistakes can be shown as pictures.
     fn examples(&self) -> Option<&Examples> {
         None

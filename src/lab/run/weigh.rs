@@ -2,10 +2,13 @@
 //!
 //! ```text
 //! wanted = sum over arrays of cells x ( 1 or 2 planes + 2 of a residual + 1 of pruned bits + 4 of a checkpoint )
+//!        + sum over convolutions of reads x ( drive sets x rows + target streams x units x 10 )
 //! left   = least of: memory the system can give, what the group of processes may take, what this process may address
 //! ```
 //!
-//! Each cell of a checkpoint is two bytes, once as a tensor and once in the file. What is small is not weighed.
+//! Each cell of a checkpoint is two bytes, once as a tensor and once in the file. Reads are positions times the samples that
+//! are read together: 256, or a batch where that is more. Of a unit a read keeps a sum, activity, slope, words and gates: ten
+//! bytes, roughly. What is small is not weighed.
 #![expect(clippy::disallowed_methods, reason = "the system tells its memory in files")]
 
 use std::fmt;
@@ -15,9 +18,14 @@ use super::RunError;
 use crate::chip::crossbar::layout::Layout;
 use crate::chip::hardware::{FloorKind, Hardware};
 use crate::chip::layer::LayerSpec;
+use crate::num::fixed::Batch;
 
 /// Bytes that every system has: runs below are not weighed.
 const SMALL: u64 = 64 << 20;
+/// Samples that are read together when nothing is learnt.
+const READ_TOGETHER: u64 = 256;
+/// Bytes that are kept of a unit and read.
+const UNIT_BYTES: usize = 10;
 
 /// An amount of memory.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -56,9 +64,9 @@ impl Memory {
         [free, group, own].into_iter().flatten().min().map(Self)
     }
 
-    /// What the arrays of a network take, and a copy of their state.
+    /// What the arrays of a network take, a copy of their state, and what is kept of the samples that convolutions read together.
     #[must_use]
-    pub fn of_network(layers: &[LayerSpec], hardware: &Hardware) -> Self {
+    pub fn of_network(layers: &[LayerSpec], hardware: &Hardware, batch: Batch) -> Self {
         let planes = if hardware.cell.level_bits.get() > 8 { 2 } else { 1 };
         let residual = if hardware.write.residual_bits.get() > 0 { 2 } else { 0 };
         let pruned = u64::from(hardware.cell.floor_kind == FloorKind::Absorbing);
@@ -68,7 +76,15 @@ impl Memory {
             let arrays = layer.wiring.pathways().len() as u64;
             let cells = |cells: usize| (cells as u64).saturating_mul(arrays);
             let stored = cells(layout.cells_padded()).saturating_mul(planes + residual + pruned);
-            stored.saturating_add(cells(layout.cells()).saturating_mul(4))
+            let together = u64::from(batch.get()).max(READ_TOGETHER);
+            let reads = together.saturating_mul(layer.positions() as u64);
+            let sets = layer.drive_sets().len() * rows;
+            let of_units = layer.wiring.targets().len() * layer.units * UNIT_BYTES;
+            let kept = match layer.convolution {
+                Some(_) => reads.saturating_mul((sets + of_units) as u64),
+                None => 0,
+            };
+            stored.saturating_add(cells(layout.cells()).saturating_mul(4)).saturating_add(kept)
         };
         Self(layers.iter().map(of).fold(0, u64::saturating_add))
     }
@@ -95,9 +111,10 @@ impl fmt::Display for Memory {
 pub(crate) fn weigh(
     layers: &[LayerSpec],
     hardware: &Hardware,
+    batch: Batch,
     left: Option<Memory>,
 ) -> Result<(), RunError> {
-    let wanted = Memory::of_network(layers, hardware);
+    let wanted = Memory::of_network(layers, hardware, batch);
     match left {
         Some(left) if wanted.0 > SMALL && wanted > left => Err(RunError::Memory { wanted, left }),
         _ => Ok(()),
@@ -122,15 +139,31 @@ mod tests {
         let config = load(&Sources { settings: &settings, ..Sources::default() }).unwrap();
         let experiment = config.experiment(64, 10, None).unwrap();
         let (layers, hardware) = (&experiment.network.layers, &experiment.hardware);
+        let batch = experiment.network.batch;
         // two layers of 65535 x 65535 in four pathways: a byte, a plane padded, and four of the checkpoint
-        let wanted = Memory::of_network(layers, hardware);
+        let wanted = Memory::of_network(layers, hardware, batch);
         let cells = 2 * 4 * 65_535u64.pow(2);
         assert!((5 * cells..6 * cells).contains(&wanted.bytes()), "{wanted}");
-        let error = weigh(layers, hardware, Some(Memory::of(24 << 30))).unwrap_err().to_string();
+        let error =
+            weigh(layers, hardware, batch, Some(Memory::of(24 << 30))).unwrap_err().to_string();
         assert!(error.contains("160.") && error.contains("24.0 GiB"), "{error}");
-        assert!(weigh(layers, hardware, None).is_ok(), "who knows nothing refuses nothing");
+        assert!(weigh(layers, hardware, batch, None).is_ok(), "who knows nothing refuses nothing");
         let small = config.experiment(4, 10, None);
         assert!(small.is_ok());
+    }
+
+    #[test]
+    fn what_convolutions_read_together_counts() {
+        let settings = ["network.channels=[10]".to_owned(), "network.hidden=[]".to_owned()];
+        let config = load(&Sources { settings: &settings, ..Sources::default() }).unwrap();
+        let network = config.experiment(64, 10, Some([8, 8, 1])).unwrap().network;
+        let of = |batch| {
+            let batch = Batch::new(batch).unwrap();
+            Memory::of_network(&network.layers, config.hardware(), batch).bytes()
+        };
+        // 9 rows of one set, 10 units in two streams, at 64 positions
+        assert_eq!(of(257) - of(256), 64 * (9 + 2 * 10 * 10));
+        assert_eq!(of(1), of(256), "as many are read together when nothing is learnt");
     }
 
     #[cfg(target_os = "linux")]

@@ -270,6 +270,9 @@ pub struct DataRecord {
     /// What the classes are called, where it is not by their numbers.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub names: Vec<String>,
+    /// Mean of each channel over what was learnt from, where inputs lie above and below it.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub middles: Vec<u8>,
 }
 
 impl DataRecord {
@@ -285,6 +288,7 @@ impl DataRecord {
             classes: train.classes(),
             image: data.image.map(|shape| [shape.height, shape.width, shape.channels]),
             names: data.names.clone(),
+            middles: vec![],
         }
     }
 }

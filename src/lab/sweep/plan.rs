@@ -196,11 +196,12 @@ fn check(config: &Config, data: &Data, left: Option<Memory>) -> Result<(String, 
     let record = DataRecord::of(data);
     let networks = config.networks(record.features, record.classes, record.image)?;
     let layers: Vec<_> = networks.into_iter().flat_map(|network| network.layers).collect();
-    run::weigh(&layers, &config.hardware, left)?;
+    run::weigh(&layers, &config.hardware, config.batch, left)?;
     let key =
         address::key(config.given(record.features, record.classes, record.image)?, &record.hash);
     let cells = |layer: &crate::chip::layer::LayerSpec| {
-        layer.wiring.pathways().len() as f64 * layer.inputs as f64 * layer.units as f64
+        let reads = layer.wiring.pathways().len() as f64 * layer.positions() as f64;
+        reads * layer.inputs as f64 * layer.units as f64
     };
     // levels of more than a byte take about twice the time
     let planes = if config.hardware.cell.level_bits.get() > 8 { 2.0 } else { 1.0 };

@@ -13,7 +13,7 @@ use crate::learn::network::NetworkError;
 ///
 /// ```
 /// use dalean::network::{
-///     Activation, Centre, Decay, DrivenBy, Homeostasis, InitialLevels, LayerSpec, Pool, Wiring,
+///     Activation, Centre, Coding, Decay, DrivenBy, Homeostasis, InitialLevels, LayerSpec, Pool, Wiring,
 /// };
 /// use dalean::network::{
 ///     Batch, Optimiser, OutputError, Positive, RateMantissa, Route, Rule, UpdateMode,
@@ -55,7 +55,8 @@ use crate::learn::network::NetworkError;
 ///     centred: vec![false; 2],
 /// };
 /// let hardware = Hardware::reference();
-/// let experiment = Experiment { seed: 1, hardware, network, epochs: 3, augment: None };
+/// let coding = Coding::Values;
+/// let experiment = Experiment { seed: 1, hardware, network, epochs: 3, coding, augment: None };
 /// let mut classifier = Classifier::new(experiment, &xor, Backend::best())?;
 /// for _ in 0..3 {
 ///     classifier.learn(&mut |_progress| true).expect("nobody asks it to stop");
@@ -80,9 +81,8 @@ impl Classifier {
         train: &Examples,
         backend: Backend,
     ) -> Result<Self, NetworkError> {
-        let seeded = experiment.build(backend, train.len())?;
+        let seeded = experiment.build(backend, train)?;
         let mut trainer = Trainer::new(experiment, seeded);
-        trainer.fits(train)?;
         trainer.calibrate(train);
         Ok(Self { trainer, train: train.clone() })
     }
@@ -111,7 +111,7 @@ impl Classifier {
     /// # Errors
     /// When they do not fit the network.
     pub fn evaluate(&mut self, examples: &Examples) -> Result<Evaluation, NetworkError> {
-        self.trainer.fits(examples)?;
+        self.trainer.experiment().fits(examples)?;
         Ok(self.trainer.evaluate(examples))
     }
 

@@ -215,12 +215,17 @@ impl Examples {
     /// The drive code of every possible value.
     #[must_use]
     pub fn codes(&self, bits: DriveBits) -> [u8; 256] {
-        let (scale, code_max) = (u32::from(self.full_scale), u32::from(bits.code_max()));
-        std::array::from_fn(|value| {
-            let value = (value as u32).min(scale);
-            u8::try_from((2 * value * code_max + scale) / (2 * scale)).expect("code <= code_max")
-        })
+        codes_of(self.full_scale, bits)
     }
+}
+
+/// The drive code of every possible value of a full scale.
+pub(super) fn codes_of(full_scale: u8, bits: DriveBits) -> [u8; 256] {
+    let (scale, code_max) = (u32::from(full_scale), u32::from(bits.code_max()));
+    std::array::from_fn(|value| {
+        let value = (value as u32).min(scale);
+        u8::try_from((2 * value * code_max + scale) / (2 * scale)).expect("code <= code_max")
+    })
 }
 
 /// A data set: what is learnt from, what is chosen on, and what is read once at the end.

@@ -1,16 +1,16 @@
 //! Epochs over examples.
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
+use super::augment::Moves;
+use super::coding::Coder;
 use super::examples::Examples;
-use super::experiment::{Augment, Experiment, Seeded};
+use super::experiment::{Experiment, Seeded};
 use crate::chip::engine::{Calibration, Currents, Engine, Phase};
-use crate::chip::layer::LayerSpec;
 use crate::chip::state::{Piece, Section, State, StateError, Visitor};
 use crate::learn::driver::Driver;
 use crate::learn::error;
-use crate::learn::network::NetworkError;
 use crate::learn::statistics::{self, FloorMap, PathwayRecord};
-use crate::num::draw::{self, Place, Site, below};
+use crate::num::draw;
 use crate::num::fixed::narrow;
 
 /// Samples read together when nothing is learnt. Does not change a result.
@@ -60,6 +60,7 @@ pub struct Evaluation {
 pub struct Trainer {
     experiment: Experiment,
     driver: Driver,
+    coder: Coder,
     start: FloorMap,
     epoch: u32,
 }
@@ -67,9 +68,9 @@ pub struct Trainer {
 impl Trainer {
     /// Starts from initial levels.
     #[must_use]
-    pub fn new(experiment: Experiment, Seeded(driver): Seeded) -> Self {
+    pub fn new(experiment: Experiment, Seeded(driver, coder): Seeded) -> Self {
         let start = statistics::floor_map(driver.engine());
-        Self { experiment, driver, start, epoch: 0 }
+        Self { experiment, driver, coder, start, epoch: 0 }
     }
 
     /// What decides the result.
@@ -95,32 +96,10 @@ impl Trainer {
         self.epoch
     }
 
-    /// Checks that examples have the values and classes that the network is for.
-    ///
-    /// # Errors
-    /// When they do not.
-    pub fn fits(&self, examples: &Examples) -> Result<(), NetworkError> {
-        let layers = &self.experiment.network.layers;
-        let inputs = layers.first().map_or(0, LayerSpec::sample_inputs);
-        let outputs = layers.last().map_or(0, |layer| layer.units);
-        let (features, classes) = (examples.features(), examples.classes());
-        if features != inputs {
-            let found = format!("has {inputs} inputs");
-            let allowed = format!("the examples have {features} values each");
-            return Err(NetworkError::misfit("network.hidden", found, allowed));
-        }
-        // a single output answers 0 or 1
-        if classes == 1 {
-            let allowed = "there is nothing to tell apart; give it at least 2";
-            return Err(NetworkError::misfit("data.classes", "is 1", allowed));
-        }
-        if outputs != classes && !(outputs == 1 && classes == 2) {
-            let found = format!("is {outputs}");
-            let allowed =
-                format!("the data has {classes} classes: use {classes}, or 1 for two classes");
-            return Err(NetworkError::misfit("network.outputs", found, allowed));
-        }
-        Ok(())
+    /// Mean of each channel over what is learnt from, where inputs lie above and below it; else nothing.
+    #[must_use]
+    pub fn middles(&self) -> &[u8] {
+        self.coder.middles()
     }
 
     /// Statistics of every pathway now.
@@ -135,11 +114,12 @@ impl Trainer {
         self.driver.engine_mut().calibrate(&codes)
     }
 
-    fn codes(&self, examples: &Examples, which: impl Iterator<Item = usize>) -> Vec<u8> {
-        let table = examples.codes(self.experiment.hardware.drive.bits);
-        which
-            .flat_map(|example| examples.values(example).iter().map(|&v| table[usize::from(v)]))
-            .collect()
+    fn codes(&mut self, examples: &Examples, which: impl Iterator<Item = usize>) -> Vec<u8> {
+        let mut codes = Vec::new();
+        for example in which {
+            self.coder.code(examples.values(example), &mut codes);
+        }
+        codes
     }
 
     /// One pass over the training set, in the epoch's order. Returns right answers given while learning.
@@ -155,31 +135,23 @@ impl Trainer {
         let samples = narrow(total, "fewer than 2^32 examples");
         let seed = self.experiment.seed;
         let order = draw::shuffled(seed, u64::from(self.epoch), samples);
-        let shifts = self.experiment.augment.map(|augment| shifts(augment, seed, self.epoch));
-        let table = train.codes(self.experiment.hardware.drive.bits);
-        let same = table.iter().zip(0..=u8::MAX).all(|(&code, value)| code == value);
+        let mut moves = self.experiment.augment.map(|way| Moves::of(way, seed, self.epoch));
         let (mut correct, mut done) = (0, 0);
-        let mut codes = Vec::new();
+        let (mut codes, mut moved) = (Vec::new(), Vec::new());
         let (mut sums, mut shares) = (Vec::new(), Vec::new());
-        let mut shifts = shifts;
         self.driver.engine_mut().set_phase(Phase::Training);
         for batch in order.chunks(self.experiment.network.batch.get() as usize) {
             codes.clear();
             for &example in batch {
-                let start = codes.len();
                 let values = train.values(example as usize);
-                match (&mut shifts, self.experiment.augment) {
-                    (Some(shifts), Some(augment)) => {
-                        let by = shifts.next().expect("the stream has no end");
-                        shift_into(values, augment, by, &mut codes);
+                let values = match &mut moves {
+                    Some(moves) => {
+                        moves.next_of(values, &mut moved);
+                        &moved
                     }
-                    _ => codes.extend_from_slice(values),
-                }
-                if !same {
-                    for code in &mut codes[start..] {
-                        *code = table[usize::from(*code)];
-                    }
-                }
+                    None => values,
+                };
+                self.coder.code(values, &mut codes);
             }
             self.driver.learn(&codes, |engine, first, errors| {
                 for sample in 0..engine.samples() {
@@ -273,51 +245,4 @@ fn predict(engine: &Engine, sample: usize) -> (usize, i64) {
         }
     }
     best
-}
-
-/// Shifts of an epoch's samples in batch order: right and down, two words a sample.
-fn shifts(augment: Augment, seed: u64, epoch: u32) -> impl Iterator<Item = [i64; 2]> {
-    let mut words = Place::global(seed, Site::Augment, u64::from(epoch)).words();
-    let span = 2 * augment.pixels + 1;
-    let mut next = move || {
-        let word = words.next().expect("the stream has no end");
-        i64::from(below(word, span)) - i64::from(augment.pixels)
-    };
-    std::iter::from_fn(move || Some([next(), next()]))
-}
-
-/// Appends an image moved by `[right, down]` pixels; what comes in from outside is 0.
-fn shift_into(values: &[u8], augment: Augment, [right, down]: [i64; 2], out: &mut Vec<u8>) {
-    let Augment { height, width, channels, .. } = augment;
-    let inside = |at: i64, size: usize| usize::try_from(at).ok().filter(|&at| at < size);
-    for plane in values.chunks_exact(height * width).take(channels) {
-        for y in 0..height {
-            let from_row = inside(y as i64 - down, height);
-            for x in 0..width {
-                let from = from_row.zip(inside(x as i64 - right, width));
-                out.push(from.map_or(0, |(y, x)| plane[y * width + x]));
-            }
-        }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn an_image_moves_right_and_down_and_loses_its_edge() {
-        let augment = Augment { pixels: 1, height: 2, width: 3, channels: 1 };
-        let mut out = Vec::new();
-        shift_into(&[1, 2, 3, 4, 5, 6], augment, [1, 0], &mut out);
-        shift_into(&[1, 2, 3, 4, 5, 6], augment, [0, -1], &mut out);
-        assert_eq!(out, [0, 1, 2, 0, 4, 5, 4, 5, 6, 0, 0, 0]);
-    }
-
-    #[test]
-    fn shifts_stay_within_their_pixels_and_use_all_of_them() {
-        let augment = Augment { pixels: 1, height: 2, width: 3, channels: 1 };
-        let some: Vec<_> = shifts(augment, 1, 0).take(500).flatten().collect();
-        assert!((-1..=1).all(|by| some.contains(&by)) && some.iter().all(|by| by.abs() <= 1));
-    }
 }

@@ -11,8 +11,9 @@ use dalean::hardware::{
     SliceTimes, Subtract, TileSpec, Timing, Window, WriteScheme, WriteSpec,
 };
 use dalean::network::{
-    Activation, Augment, Batch, Centre, Decay, DrivenBy, Homeostasis, InitialLevels, LayerSpec,
-    Optimiser, OutputError, Pool, Positive, RateMantissa, Route, Rule, UpdateMode, Wiring,
+    Activation, Augment, Batch, Centre, Coding, Decay, DrivenBy, Homeostasis, InitialLevels,
+    LayerSpec, Optimiser, OutputError, Pool, Positive, RateMantissa, Route, Rule, UpdateMode,
+    Wiring,
 };
 use dalean::{
     Backend, Classifier, Config, Data, DataRoot, Examples, Experiment, Hardware, HardwareSpec,
@@ -283,10 +284,19 @@ fn classify(c: &mut Choices<'_>) {
         height: c.size(1, 4),
         width: c.size(1, 4),
         channels: c.size(1, 1),
+        flip: c.one_in(2),
     });
+    let image = [c.size(1, 4), c.size(1, 4), c.size(1, 3)];
+    let coding = c.of(&[
+        Coding::Values,
+        Coding::Values,
+        Coding::Pixels { image },
+        Coding::OnOff { image },
+        Coding::White { image },
+    ]);
     // a cosine is tabulated update by update
     let epochs = if network.decay == Decay::Constant { c.word() as u32 } else { c.byte().into() };
-    let experiment = Experiment { seed: c.word(), hardware, network, epochs, augment };
+    let experiment = Experiment { seed: c.word(), hardware, network, epochs, coding, augment };
     let _ = experiment.updates_per_epoch(c.size(0, 9));
     let Some(train) = examples(c, features, classes) else { return };
     let _ = train.codes(experiment.hardware.drive.bits);
@@ -464,7 +474,16 @@ fn own(c: &mut Choices<'_>) -> Option<Data> {
         height: c.size(1, 3),
         width: c.size(1, 3),
         channels: c.size(1, 1),
+        flip: c.one_in(2),
     });
+    let image = [c.size(1, 4), c.size(1, 4), c.size(1, 3)];
+    let coding = c.of(&[
+        Coding::Values,
+        Coding::Values,
+        Coding::Pixels { image },
+        Coding::OnOff { image },
+        Coding::White { image },
+    ]);
     Data::new("own", Split { train, validation, test }, image).map_err(|e| shown(&e)).ok()
 }
 

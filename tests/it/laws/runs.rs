@@ -12,7 +12,7 @@ use dalean::learn::route::Route;
 use dalean::learn::rule::{Rule, UpdateMode};
 use dalean::num::fixed::{Batch, RateMantissa};
 use dalean::num::tables::{Decay, Positive};
-use dalean::task::classify::{Augment, Examples, Experiment, Trainer};
+use dalean::task::classify::{Augment, Coding, Examples, Experiment, Trainer};
 use proptest::prelude::*;
 
 use super::choose::{Numbers, activation, hardware, side};
@@ -56,7 +56,8 @@ fn route(raw: [u8; 2], outputs: usize, rule: Rule) -> Option<Route> {
 /// Examples of `values` values as images that can be moved by a pixel, if there is such a shape.
 fn moved(values: usize) -> Option<Augment> {
     let height = (2..=values / 2).find(|height| values.is_multiple_of(*height))?;
-    Some(Augment { pixels: 1, height, width: values / height, channels: 1 })
+    let (width, flip) = (values / height, values.is_multiple_of(2));
+    Some(Augment { pixels: 1, height, width, channels: 1, flip })
 }
 
 fn run() -> impl Strategy<Value = Run> {
@@ -138,7 +139,8 @@ fn run() -> impl Strategy<Value = Run> {
                 centred: vec![false; count],
             };
             let augment = image.then(|| moved(sides[0])).flatten();
-            let experiment = Experiment { seed, hardware, network, epochs, augment };
+            let coding = Coding::Values;
+            let experiment = Experiment { seed, hardware, network, epochs, coding, augment };
             let data = examples(seed, sides[0], outputs.max(2));
             Run { experiment, data, stop: stop.min(epochs) }
         })
@@ -153,7 +155,7 @@ fn run() -> impl Strategy<Value = Run> {
 const IDENTITY: Identity<'_> = Identity { run: "run", data: "data" };
 
 fn fresh(run: &Run, backend: Backend) -> Trainer {
-    let seeded = run.experiment.build(backend, run.data.len()).unwrap();
+    let seeded = run.experiment.build(backend, &run.data).unwrap();
     let mut trainer = Trainer::new(run.experiment.clone(), seeded);
     trainer.calibrate(&run.data);
     trainer

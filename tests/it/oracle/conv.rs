@@ -146,6 +146,7 @@ fn experiment(s: &Value) -> Experiment {
         hardware: hardware(s),
         network,
         epochs: int(&s["epochs"]) as u32,
+        coding: Coding::Values,
         augment: None,
     }
 }
@@ -191,7 +192,7 @@ fn run(case: &Value, backend: Backend) -> Vec<String> {
     let s = &case["settings"];
     let data = images(s);
     let experiment = experiment(s);
-    let seeded = match experiment.build(backend, data.len()) {
+    let seeded = match experiment.build(backend, &data) {
         Ok(seeded) => seeded,
         Err(refused) => return vec![refused.to_string()],
     };

@@ -1,11 +1,12 @@
 //! `[learning]`: rule, batches, rates, and which state is kept.
 
+use super::style::Style;
 use super::{Select, TrainOn, one_a_layer, per_layer, positive, range, route, word, wrong};
 use crate::chip::layer::Optimiser;
 use crate::lab::config::ConfigError;
-use crate::lab::config::defaults::{SetDefaults, policy};
+use crate::lab::config::defaults::policy;
 use crate::lab::config::file::{LearningFile, MantissaFile};
-use crate::learn::error::Centre;
+use crate::learn::error::{Centre, OutputError};
 use crate::learn::route::Route;
 use crate::learn::rule::{Rule, UpdateMode};
 use crate::num::fixed::{Batch, RateMantissa};
@@ -73,11 +74,24 @@ const OPTIMISERS: [(&str, Optimiser); 5] = [
     ("adam_fx", Optimiser::AdamFx { first_decay: 3, second_decay: 8 }),
 ];
 
+/// `learning.error`.
+const ERRORS: [(&str, OutputError); 2] = [
+    ("one_vs_all", OutputError::OneVsAll),
+    ("softmax", OutputError::Softmax { temperature: Positive::ONE }),
+];
+
+/// Rate of optimisers whose rate is a step of weights, of nets that keep to middles; and of `plain`, whose rate is one of
+/// slopes of 1.
+const RATE_RMS: f64 = 0.1;
+const RATE_OF_RAMPS: f64 = 0.3;
+
 /// Checked numbers of `[learning]`.
 pub(super) struct Learning {
     pub(super) kind: Kind,
     pub(super) mode: UpdateMode,
     pub(super) centre: Centre,
+    pub(super) centred: bool,
+    pub(super) error: OutputError,
     pub(super) route: Option<Route>,
     pub(super) batch: Batch,
     pub(super) rates: Vec<Positive>,
@@ -85,6 +99,7 @@ pub(super) struct Learning {
     pub(super) optimiser: Optimiser,
     pub(super) epochs: u32,
     pub(super) shift_pixels: u32,
+    pub(super) flip: bool,
     pub(super) train_on: TrainOn,
     pub(super) select: Select,
 }
@@ -96,6 +111,8 @@ impl Learning {
             kind: Kind { rule: Rule::Ed, seeded: false },
             mode: UpdateMode::Accumulate,
             centre: Centre::None,
+            centred: false,
+            error: OutputError::OneVsAll,
             route: Some(Route::Modulo { taps: 1, shift: None }),
             batch: Batch::new(1).expect("in range"),
             rates: vec![],
@@ -103,17 +120,18 @@ impl Learning {
             optimiser: Optimiser::Plain,
             epochs: 0,
             shift_pixels: 0,
+            flip: false,
             train_on: TrainOn::Train,
             select: Select::Last,
         }
     }
 }
 
-/// Checks how a network of such hidden layers learns and writes defaults back.
+/// Checks how a network of such dense hidden layers learns and writes defaults back.
 pub(super) fn resolve(
     file: &mut LearningFile,
     hidden: &[usize],
-    defaults: &SetDefaults,
+    style: Style,
 ) -> Result<Learning, ConfigError> {
     let kind = match word("learning.rule", &mut file.rule, "ed", &RULES)? {
         Named::Rule(rule) => Kind { rule, seeded: false },
@@ -124,11 +142,13 @@ pub(super) fn resolve(
         }
     };
     let mode = word("learning.mode", &mut file.mode, "accumulate", &MODES)?;
-    let (train_on, select) = selection(file, defaults)?;
-    let batch = range("learning.batch", Batch::new(*file.batch.get_or_insert(defaults.batch)))?;
-    let optimiser = optimiser(file, "plain", false)?;
+    let (train_on, select) = selection(file, style.data.select)?;
+    let batch = range("learning.batch", Batch::new(*file.batch.get_or_insert(style.batch())))?;
+    let optimiser = optimiser(file, style.optimiser(), false)?;
     file.rate.get_or_insert_with(|| match optimiser {
-        Optimiser::Plain | Optimiser::Momentum { .. } => defaults.rate_of(batch),
+        Optimiser::Plain | Optimiser::Momentum { .. } if style.keeps_middles() => RATE_OF_RAMPS,
+        Optimiser::Plain | Optimiser::Momentum { .. } => style.data.rate_of(batch),
+        Optimiser::Rms if style.keeps_middles() => RATE_RMS,
         // a chance, or a step of weights, is one whatever is learnt
         other => policy::rate(other),
     });
@@ -140,20 +160,43 @@ pub(super) fn resolve(
         (false, false) => "batch",
     };
     let centre = word("learning.centre", &mut file.centre, default, &CENTRES)?;
+    let error = output_error(file, if style.keeps_middles() { "softmax" } else { "one_vs_all" })?;
     Ok(Learning {
         kind,
         mode,
         centre,
-        route: route::resolve(file, kind.rule, defaults.taps)?,
+        centred: *file.centred.get_or_insert(style.keeps_middles()),
+        error,
+        route: route::resolve(file, kind.rule, style.taps())?,
         batch,
-        rates: rates(file, hidden, defaults)?,
+        rates: rates(file, hidden, style)?,
         decay: word("learning.decay", &mut file.decay, "cosine", &DECAYS)?,
         optimiser,
-        epochs: *file.epochs.get_or_insert(defaults.epochs),
+        epochs: *file.epochs.get_or_insert(style.data.epochs),
         shift_pixels: *file.shift_pixels.get_or_insert(0),
+        flip: *file.flip.get_or_insert(false),
         train_on,
         select,
     })
+}
+
+/// What the error of an output is, with a key that belongs to one of them.
+fn output_error(file: &mut LearningFile, default: &str) -> Result<OutputError, ConfigError> {
+    const KEY: &str = "learning.temperature";
+    match word("learning.error", &mut file.error, default, &ERRORS)? {
+        OutputError::Softmax { .. } => {
+            let temperature = positive(KEY, *file.temperature.get_or_insert(1.0))?;
+            Ok(OutputError::Softmax { temperature })
+        }
+        other => match file.temperature {
+            None => Ok(other),
+            Some(found) => {
+                let allowed =
+                    "it belongs to learning.error = \"softmax\": say that, or take it out";
+                Err(wrong(KEY, format!("is {found}"), allowed))
+            }
+        },
+    }
 }
 
 /// What makes requests of sums, with keys that belong to one of them.
@@ -182,12 +225,13 @@ pub(super) fn optimiser(
 fn rates(
     file: &mut LearningFile,
     hidden: &[usize],
-    defaults: &SetDefaults,
+    style: Style,
 ) -> Result<Vec<Positive>, ConfigError> {
     const KEY: &str = "learning.rate_multipliers";
-    let rate = positive("learning.rate", *file.rate.get_or_insert(defaults.rate))?;
-    file.rate_multipliers.get_or_insert_with(|| defaults.multipliers(hidden));
-    let factors = per_layer(KEY, &mut file.rate_multipliers, 1.0, hidden.len() + 1)?;
+    let rate = positive("learning.rate", *file.rate.get_or_insert(style.data.rate))?;
+    file.rate_multipliers.get_or_insert_with(|| style.multipliers(hidden));
+    let layers = style.windows + hidden.len() + 1;
+    let factors = per_layer(KEY, &mut file.rate_multipliers, 1.0, layers)?;
     products(rate, factors)
 }
 
@@ -228,14 +272,11 @@ pub(super) fn mantissas(
 }
 
 /// What is learnt from, and which epoch's state reads the test set.
-fn selection(
-    file: &mut LearningFile,
-    defaults: &SetDefaults,
-) -> Result<(TrainOn, Select), ConfigError> {
+fn selection(file: &mut LearningFile, chosen: &str) -> Result<(TrainOn, Select), ConfigError> {
     let halves = [("train", TrainOn::Train), ("all", TrainOn::All)];
     let train_on = word("learning.train_on", &mut file.train_on, "train", &halves)?;
     let states = [("best_validation", Select::BestValidation), ("last", Select::Last)];
-    let default = if train_on == TrainOn::All { "last" } else { defaults.select };
+    let default = if train_on == TrainOn::All { "last" } else { chosen };
     let select = word("learning.select", &mut file.select, default, &states)?;
     if train_on == TrainOn::All && select == Select::BestValidation {
         let allowed = "validation examples are learnt from (train_on = \"all\"); use \"last\"";

@@ -1,10 +1,12 @@
 //! `[network]`: units and what they are made of.
 
 use super::learning::Kind;
-use super::{Bias, per_layer, positive, word, wrong};
+use super::style::Style;
+use super::{Bias, between, per_layer, positive, word, wrong};
+use crate::chip::layer::{Gain, Homeostasis};
 use crate::lab::config::ConfigError;
-use crate::lab::config::defaults::SetDefaults;
-use crate::lab::config::file::NetworkFile;
+use crate::lab::config::file::{NetworkFile, PerLayer};
+use crate::learn::error::OutputError;
 use crate::learn::network::{GAIN_64THS, WEIGHT_MAX_LOG2};
 use crate::num::tables::Activation;
 
@@ -14,6 +16,7 @@ pub(super) struct Network {
     pub(super) weight_max_log2: Vec<i32>,
     pub(super) bias: Bias,
     pub(super) gain_64ths: [[u32; 2]; 2],
+    pub(super) homeostasis: Homeostasis,
 }
 
 /// `network.bias`.
@@ -21,19 +24,29 @@ pub(super) const BIASES: [(&str, Bias); 3] =
     [("none", Bias::None), ("input_row", Bias::InputRow), ("rows", Bias::Rows)];
 
 /// `network.activation`: nothing for a sigmoid, which has a width.
-pub(super) const ACTIVATIONS: [(&str, Option<Activation>); 4] = [
+pub(super) const ACTIVATIONS: [(&str, Option<Activation>); 5] = [
     ("sigmoid", None),
     ("relu", Some(Activation::Relu)),
     ("identity", Some(Activation::Identity)),
     ("rms", Some(Activation::Rms)),
+    ("ramp", Some(Activation::Ramp)),
 ];
 
-/// Checks a network of so many layers and writes defaults back.
+/// `network.gain`, but for how far the table reaches.
+pub(super) const GAINS: [(&str, Gain); 3] =
+    [("table", Gain::Table), ("fixed", Gain::Fixed { spread: 0 }), ("tracking", Gain::Tracking)];
+/// Greatest `network.gain_spread`.
+const SPREAD_MAX: i64 = 2;
+/// `log2` of the greatest `network.homeostasis_window`.
+const WINDOW_LOG2_MAX: u32 = 24;
+
+/// Checks a network whose layers have so many inputs and writes defaults back.
 pub(super) fn resolve(
     file: &mut NetworkFile,
-    layers: usize,
+    fan_ins: &[usize],
     kind: Kind,
-    defaults: &SetDefaults,
+    error: OutputError,
+    style: Style,
 ) -> Result<Network, ConfigError> {
     let bias = word("network.bias", &mut file.bias, "none", &BIASES)?;
     if word("network.readout", &mut file.readout, "p", &[("p", false), ("p-n", true)])? {
@@ -46,24 +59,91 @@ pub(super) fn resolve(
         gains("network.init_gain_output", *file.init_gain_output.get_or_insert([1.0, 1.0]))?,
     ];
     Ok(Network {
-        activations: activations(file, layers, kind, defaults)?,
-        weight_max_log2: weights(file, layers, defaults)?,
+        activations: activations(file, fan_ins.len(), kind, error, style)?,
+        weight_max_log2: weights(file, fan_ins, style)?,
         bias,
         gain_64ths,
+        homeostasis: homeostasis(file, fan_ins.len() > 1, style)?,
     })
 }
 
-/// The functions of all layers; outputs are sigmoid.
+/// What hidden units do beside their table.
+fn homeostasis(
+    file: &mut NetworkFile,
+    hidden: bool,
+    style: Style,
+) -> Result<Homeostasis, ConfigError> {
+    let ramp = file.activation.as_deref() == Some("ramp") && hidden;
+    let default = match (ramp, style.windows) {
+        (false, _) => "table",
+        // a ramp has no step of its own
+        (true, 0) => "fixed",
+        (true, _) => "tracking",
+    };
+    let threshold = *file.threshold.get_or_insert(ramp && style.keeps_middles());
+    let gain = word("network.gain", &mut file.gain, default, &GAINS)?;
+    let gain = match (gain, file.gain_spread) {
+        (Gain::Fixed { .. }, _) => {
+            let spread = i64::from(*file.gain_spread.get_or_insert(0));
+            let spread = between("network.gain_spread", spread, 0, SPREAD_MAX)?;
+            Gain::Fixed { spread: u32::try_from(spread).expect("its range was checked") }
+        }
+        (other, None) => other,
+        (_, Some(spread)) => {
+            let allowed = "it belongs to network.gain = \"fixed\": say that, or take it out";
+            return Err(wrong("network.gain_spread", format!("is {spread}"), allowed));
+        }
+    };
+    let mut homeostasis = Homeostasis { threshold, gain, ..Homeostasis::OFF };
+    if homeostasis.is_on() && !hidden {
+        let key = if threshold { "network.threshold" } else { "network.gain" };
+        let allowed =
+            "hidden units alone keep to a middle, and there is no hidden layer: take it out";
+        return Err(wrong(key, "is given", allowed));
+    }
+    let moves = threshold || gain == Gain::Tracking;
+    match (moves, file.homeostasis_window) {
+        (true, _) => {
+            let window = *file.homeostasis_window.get_or_insert(1 << Homeostasis::OFF.window_log2);
+            let log2 = (0..=WINDOW_LOG2_MAX).find(|log2| window == 1 << log2);
+            homeostasis.window_log2 = log2.ok_or_else(|| {
+                let allowed = format!("it must be a power of two, 1..={}", 1 << WINDOW_LOG2_MAX);
+                wrong("network.homeostasis_window", format!("is {window}"), allowed)
+            })?;
+        }
+        (false, None) => {}
+        (false, Some(window)) => {
+            let allowed = "neither thresholds nor a gain that tracks move: take it out, or use network.threshold = true";
+            return Err(wrong("network.homeostasis_window", format!("is {window}"), allowed));
+        }
+    }
+    Ok(homeostasis)
+}
+
+/// The functions of all layers; outputs are sigmoid, or sums of which an error is made for all together.
 fn activations(
     file: &mut NetworkFile,
     layers: usize,
     kind: Kind,
-    defaults: &SetDefaults,
+    error: OutputError,
+    style: Style,
 ) -> Result<Vec<Activation>, ConfigError> {
-    let alpha = if kind.seeded { 1.0 } else { defaults.alpha };
-    let alphas = per_layer("network.alpha", &mut file.alpha, alpha, layers)?;
-    let hidden = word("network.activation", &mut file.activation, "sigmoid", &ACTIVATIONS)?;
+    let hidden =
+        word("network.activation", &mut file.activation, style.activation(), &ACTIVATIONS)?;
+    let sums = matches!(error, OutputError::Softmax { .. });
+    let sigmoid = (hidden.is_none() && layers > 1) || !sums;
+    if let (false, Some(_)) = (sigmoid, &file.alpha) {
+        let allowed = "it is the width of a sigmoid, and no layer has one: take it out (--set network.alpha=default)";
+        return Err(wrong("network.alpha", "is given", allowed));
+    }
+    let mut alphas = vec![1.0; layers];
+    if sigmoid {
+        let own = if kind.seeded { PerLayer::All(1.0) } else { style.alpha(layers) };
+        file.alpha.get_or_insert(own);
+        alphas = per_layer("network.alpha", &mut file.alpha, 1.0, layers)?;
+    }
     let layers = alphas.into_iter().enumerate().map(|(layer, alpha)| match hidden {
+        _ if layer + 1 == layers && sums => Ok(Activation::Accumulator),
         Some(activation) if layer + 1 < layers => Ok(activation),
         _ => positive("network.alpha", alpha).map(Activation::Sigmoid),
     });
@@ -72,12 +152,11 @@ fn activations(
 
 fn weights(
     file: &mut NetworkFile,
-    layers: usize,
-    defaults: &SetDefaults,
+    fan_ins: &[usize],
+    style: Style,
 ) -> Result<Vec<i32>, ConfigError> {
-    let weights =
-        per_layer("network.weight_max", &mut file.weight_max, defaults.weight_max, layers)?;
-    logarithms(weights)
+    file.weight_max.get_or_insert_with(|| style.weight_max(fan_ins));
+    logarithms(per_layer("network.weight_max", &mut file.weight_max, 1.0, fan_ins.len())?)
 }
 
 /// `log2` of weights that are powers of two.

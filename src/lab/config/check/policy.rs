@@ -3,8 +3,8 @@
 
 use super::learning::{Kind, Learning, Named};
 use super::{
-    DataConfig, Learnt, Select, between, learning, mantissas, per_layer, positive, range, route,
-    word, wrong,
+    DataConfig, ImageInput, Learnt, Select, between, learning, mantissas, per_layer, positive,
+    range, route, word, wrong,
 };
 use crate::chip::hardware::Hardware;
 use crate::lab::config::ConfigError;
@@ -38,26 +38,66 @@ fn refuse(keys: &[(&str, bool, &str)]) -> Result<(), ConfigError> {
 /// Refuses keys of policies where examples are learnt from.
 pub(super) fn refused_in_classification(file: &ExperimentFile) -> Result<(), ConfigError> {
     const USE: &str = "it belongs to task = \"policy\": say that, or take it out";
-    let (network, learning) = (file.network.as_ref(), file.learning.as_ref());
+    let network = file.network.as_ref();
     refuse(&[
         ("environment", file.environment.is_some(), USE),
         ("ppo", file.ppo.is_some(), USE),
         ("es", file.es.is_some(), USE),
         ("evaluation", file.evaluation.is_some(), USE),
         ("network.critic_hidden", network.is_some_and(|n| n.critic_hidden.is_some()), USE),
-        ("network.input", network.is_some_and(|n| n.input.is_some()), USE),
-        ("learning.centred", learning.is_some_and(|l| l.centred.is_some()), USE),
     ])
 }
 
 /// Refuses keys of classification.
 fn refused_here(file: &ExperimentFile) -> Result<(), ConfigError> {
+    const WINDOWS: &str =
+        "it belongs to convolutions, and policies have dense layers alone: take the key out";
+    const MIDDLES: &str = "units of policies are normalised (network.activation = \"rms\"), they keep to no middle of \
+                           their own: take the key out";
     let (network, learning) = (file.network.as_ref(), file.learning.as_ref());
     refuse(&[
         (
             "data",
             file.data.is_some(),
             "a policy learns from no examples: environment.id says what it acts on",
+        ),
+        (
+            "preset",
+            file.preset.is_some(),
+            "it says whose defaults networks have that learn from examples: take the key out",
+        ),
+        (
+            "network.channels",
+            network.is_some_and(|n| n.channels.is_some()),
+            "policies have dense layers alone: take the key out",
+        ),
+        ("network.kernel", network.is_some_and(|n| n.kernel.is_some()), WINDOWS),
+        ("network.stride", network.is_some_and(|n| n.stride.is_some()), WINDOWS),
+        ("network.padding", network.is_some_and(|n| n.padding.is_some()), WINDOWS),
+        ("network.pool", network.is_some_and(|n| n.pool.is_some()), WINDOWS),
+        ("network.pool_side", network.is_some_and(|n| n.pool_side.is_some()), WINDOWS),
+        ("network.threshold", network.is_some_and(|n| n.threshold.is_some()), MIDDLES),
+        ("network.gain", network.is_some_and(|n| n.gain.is_some()), MIDDLES),
+        ("network.gain_spread", network.is_some_and(|n| n.gain_spread.is_some()), MIDDLES),
+        (
+            "network.homeostasis_window",
+            network.is_some_and(|n| n.homeostasis_window.is_some()),
+            MIDDLES,
+        ),
+        (
+            "learning.error",
+            learning.is_some_and(|l| l.error.is_some()),
+            "what came of acting makes the errors of a policy: take the key out",
+        ),
+        (
+            "learning.temperature",
+            learning.is_some_and(|l| l.temperature.is_some()),
+            "what came of acting makes the errors of a policy: take the key out",
+        ),
+        (
+            "learning.flip",
+            learning.is_some_and(|l| l.flip.is_some()),
+            "a policy is shown no images: take the key out",
         ),
         (
             "network.outputs",
@@ -138,7 +178,7 @@ pub(super) fn resolve(
     };
     let mantissas = match evolution {
         true => vec![RateMantissa::new(1).expect("in range"); layers],
-        false => mantissas(learning, &learnt, &made.network, hardware)?,
+        false => mantissas(learning, &learnt, &made.network, &[], hardware)?,
     };
     let policy = PolicySettings {
         environment: spec,
@@ -158,6 +198,8 @@ pub(super) fn resolve(
     })?;
     Ok(Learnt {
         data: DataConfig::default(),
+        input: ImageInput::Raw,
+        convolutions: vec![],
         hidden: made.hidden,
         outputs: None,
         network: made.network,

@@ -69,6 +69,8 @@ pub(super) const TABLES: &[KeyTable] = &[
 
 /// Settings that keys of policies stand beside.
 const POLICY: &[&str] = &["task=policy"];
+const WINDOWS: &[&str] = &["network.channels=[4]"];
+const ON_WINDOWS: &str = "with network.channels";
 const ON_POLICY: &str = "with task = \"policy\"";
 const CONTINUOUS: &[&str] = &["task=policy", "environment.id=Pendulum-v1"];
 const ON_CONTINUOUS: &str = "with task = \"policy\" and an environment that takes numbers";
@@ -82,6 +84,12 @@ const ROOT: &[KeyEntry] = &[
     )
     .default("\"classify\""),
     whole("seed", 0, i64::MAX).default("1"),
+    words(
+        "preset",
+        &[("paper", "sigmoids, one class against all others, units without thresholds and gains")],
+    )
+    .otherwise("this program's own defaults")
+    .law("not with task = \"policy\""),
     other("data", "a table"),
     other("network", "a table"),
     other("learning", "a table"),
@@ -155,6 +163,9 @@ const DATA: &[KeyEntry] = &[
         .only("with data.format", CSV)
         .otherwise("follows from the training values"),
     whole("classes", 2, 256).only("with data.format", CSV).otherwise("follows from the labels"),
+    other("shape", "[height, width, channels], each 1..=4096")
+        .only("with data.format", CSV)
+        .otherwise("what the file says; a table says nothing"),
     other("label_column", "`first`, `last`, a number from 0, or a header")
         .only("with data.format = \"csv\"", CSV)
         .otherwise("told from the table, and said"),
@@ -176,10 +187,48 @@ const DATA: &[KeyEntry] = &[
 ];
 
 const NETWORK: &[KeyEntry] = &[
+    other("channels", "a list of whole numbers, each 1..=65535")
+        .default("[]")
+        .otherwise("no convolution; policies have none")
+        .law("needs images whose sizes are known: a set of pictures, or data.shape"),
+    other("kernel", "a whole number, 1..=4096")
+        .windows()
+        .unit("pixels")
+        .default("3")
+        .law("no more than the image with its border")
+        .only(ON_WINDOWS, WINDOWS),
+    other("stride", "a whole number, 1..=4096")
+        .windows()
+        .unit("pixels")
+        .default("1")
+        .only(ON_WINDOWS, WINDOWS),
+    other("padding", "`same`, or a whole number less than the kernel")
+        .windows()
+        .unit("pixels")
+        .default("\"same\"")
+        .law("`same`: half of an odd kernel, rounded down, so that a map is as large as what is below it at a stride of 1")
+        .only(ON_WINDOWS, WINDOWS),
+    words(
+        "pool",
+        &[
+            ("average", "the mean of a square's codes, halves up"),
+            ("max", "the greatest code of a square"),
+            ("none", "every code"),
+        ],
+    )
+    .windows()
+    .default("\"average\"")
+    .only(ON_WINDOWS, WINDOWS),
+    other("pool_side", "a whole number, 1..=4096")
+        .windows()
+        .unit("pixels")
+        .default("2")
+        .law("squares cover a map without a rest")
+        .only("with network.channels and a pool", WINDOWS),
     other("hidden", "a list of whole numbers, each 1..=65535")
         .unit("units")
         .default("[256]")
-        .otherwise("[64, 64] with task = \"policy\""),
+        .otherwise("[160] behind convolutions; [64, 64] with task = \"policy\""),
     other("critic_hidden", "a list of whole numbers, each 1..=65535")
         .unit("units")
         .default("[64, 64]")
@@ -193,13 +242,18 @@ const NETWORK: &[KeyEntry] = &[
     words(
         "input",
         &[
-            ("split", "two rows a number: what is above 0, and what is below"),
-            ("offset", "one row a number, half the scale added; needs a constant row"),
+            ("raw", "values as they are"),
+            ("on_off", "what is above the mean of its channel over the training part, and what is below, of images"),
+            ("white", "what a fixed filter leaves that takes from a pixel what its neighbours tell, above 0 and below, of images with three channels"),
+            ("split", "two rows a number: what is above 0, and what is below, of policies"),
+            ("offset", "one row a number, half the scale added, of policies; needs a constant row"),
         ],
     )
-    .default("\"split\"")
-    .otherwise("lines that are on or off need none")
-    .only("with task = \"policy\" and an environment that shows numbers", POLICY),
+    .default("\"raw\"")
+    .otherwise(
+        "\"white\" where convolutions see three channels, but with preset = \"paper\"; \"split\" with task = \"policy\", \
+         whose lines that are on or off need none",
+    ),
     words(
         "activation",
         &[
@@ -207,21 +261,46 @@ const NETWORK: &[KeyEntry] = &[
             ("relu", "max(z, 0)"),
             ("identity", "z, cut off at 0 and 1"),
             ("rms", "max(z, 0) over its root mean square in the layer and stream"),
+            ("ramp", "a straight line from 0, cut off at 3 standard deviations"),
         ],
     )
     .default("\"sigmoid\"")
-    .otherwise("\"rms\" with task = \"policy\""),
+    .otherwise("\"ramp\" with convolutions, but with preset = \"paper\"; \"rms\" with task = \"policy\""),
     real("alpha", 1e-6, 1e6)
         .layers()
         .default("4.0")
-        .otherwise("6.0 with other data than the built-in digits and with policies, which have it with activation = \"sigmoid\" alone; \
-             1.0 with rule = \"ed_seed\"",
+        .otherwise("6.0 with other data than the built-in digits, with preset = \"paper\" and with policies, which have it with \
+             activation = \"sigmoid\" alone; 3.0 of convolutions; 1.0 with rule = \"ed_seed\"; none where no layer is a sigmoid",
         ),
+    flag("threshold")
+        .default("false")
+        .otherwise("true with convolutions whose units are ramps, but with preset = \"paper\"")
+        .law("not with task = \"policy\""),
+    words(
+        "gain",
+        &[
+            ("table", "by the activation, once and for all"),
+            ("fixed", "so that a standard deviation of what is read before the first update is 128 indices"),
+            ("tracking", "so at first, and then by a power of two that follows what is read"),
+        ],
+    )
+    .default("\"table\"")
+    .otherwise("\"tracking\" in nets with convolutions whose units are ramps, \"fixed\" in others whose units are ramps; not with task = \"policy\""),
+    whole("gain_spread", 0, 2)
+        .unit("bits")
+        .default("0")
+        .only("with gain = \"fixed\"", &["network.activation=ramp", "network.gain=fixed"]),
+    key("homeostasis_window", KeyValues::PowerOfTwo(1, 1 << 24))
+        .unit("samples")
+        .default("512")
+        .law("no fewer than a batch")
+        .only("with thresholds, or a gain that tracks", &["network.threshold=true"]),
     key("weight_max", KeyValues::Lawful(1.0 / 256.0, 256.0, "a power of two"))
         .layers()
         .default("2.0")
         .otherwise(
-            "4.0 with other data than the built-in digits; 0.5, and 0.25 in the output layer, with task = \"policy\"",
+            "4.0 with other data than the built-in digits; with convolutions, in each layer the one nearest to 13 / sqrt(inputs); \
+             0.5, and 0.25 in the output layer, with task = \"policy\"",
         ),
     words(
         "bias",
@@ -293,19 +372,22 @@ const LEARNING: &[KeyEntry] = &[
         ],
     )
     .default("\"plain\"")
-    .otherwise("\"sign\" with task = \"policy\""),
+    .otherwise("\"rms\" with convolutions, but with preset = \"paper\"; \"sign\" with task = \"policy\""),
     flag("dead_zone")
         .default("false")
         .otherwise("true with task = \"policy\"")
         .only("with optimiser = \"sign\"", &["learning.optimiser=sign"]),
-    flag("centred").default("true").only(ON_POLICY, POLICY),
+    flag("centred")
+        .default("false")
+        .otherwise("true with convolutions, but with preset = \"paper\", and with task = \"policy\""),
     real("rate", 1e-6, 1e6).default("18.0").otherwise(
         "20.0 with other data than the built-in digits; with a batch below the default one less, in proportion; 0.25 \
-         with optimiser = \"sign\", 0.002 with \"rms\" and \"adam_fx\"; 1.0 of policies with others",
+         with optimiser = \"sign\", 0.002 with \"rms\" and \"adam_fx\"; 0.1 with convolutions and \"rms\", 0.3 with convolutions and \
+         others, but with preset = \"paper\"; 1.0 of policies with others",
     ),
     real("rate_multipliers", 1e-6, 1e6).layers().default("[1.0, 0.25]").otherwise(
         "1 in every layer, 0.25 in the last one of the built-in digits (1.0 with other data); behind more than 256 \
-         hidden units times 256 / units; 2.0 in the last one of policies with \
+         hidden units times 256 / units; 1 with convolutions; 2.0 in the last one of policies with \
          optimiser = \"sign\"",
     ),
     whole("rate_mantissa", 1, 15)
@@ -322,6 +404,18 @@ const LEARNING: &[KeyEntry] = &[
     )
     .default("\"cosine\"")
     .otherwise("\"linear\" with task = \"policy\""),
+    words(
+        "error",
+        &[
+            ("one_vs_all", "255 of the class and 0 of others, less what an output puts out"),
+            ("softmax", "the same less its share of all outputs"),
+        ],
+    )
+    .default("\"one_vs_all\"")
+    .otherwise("\"softmax\" with convolutions, but with preset = \"paper\"; policies have errors of their own"),
+    real("temperature", 1e-6, 1e6)
+        .default("1.0")
+        .only("with error = \"softmax\"", &["learning.error=softmax"]),
     words(
         "centre",
         &[
@@ -350,7 +444,7 @@ const LEARNING: &[KeyEntry] = &[
         .law("at most the number of outputs")
         .unit("words")
         .default("3")
-        .otherwise("1 with other data than the built-in digits")
+        .otherwise("1 with other data than the built-in digits, with convolutions and with preset = \"paper\"")
         .only("with route = \"modulo\"", &["learning.route=modulo"]),
     whole("tap_shift", 0, 16)
         .unit("bits")
@@ -363,6 +457,7 @@ const LEARNING: &[KeyEntry] = &[
         .unit("pixels")
         .default("0")
         .law("less than the sides of the images; needs images"),
+    flag("flip").default("false").law("needs images"),
     words(
         "train_on",
         &[

@@ -58,6 +58,9 @@ fn set(key: &KeyShown, value: &str) -> Result<Config, String> {
     if key.full() == "learning.centre" && value == "\"batch\"" {
         settings.push("learning.batch=2".into());
     }
+    if key.full() == "learning.centred" {
+        settings.push("network.threshold=true".into());
+    }
     if key.full() == "learning.batch" && value == "1" {
         settings.push("learning.centre=running".into());
     }
@@ -177,6 +180,8 @@ fn free(key: &KeyShown, value: &str) -> bool {
         }
         // ten classes have ten outputs
         "network.outputs" => true,
+        // a window holds a batch
+        "network.homeostasis_window" => true,
         // a training this long is weighed elsewhere
         "learning.epochs" => value != "0",
         _ => false,
@@ -201,6 +206,7 @@ fn words_are_taken_and_others_are_refused_with_the_whole_list() {
                 ("learning.rule", "es") | ("network.readout", "p-n") => &["task=policy"],
                 ("learning.select", "best_validation") | ("learning.rule", _) => &[],
                 ("learning.mode", "online") => &["learning.centre=none"],
+                ("network.input", "split" | "offset") => &["task=policy"],
                 _ => &[],
             };
             let mut settings: Vec<String> =

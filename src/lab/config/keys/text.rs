@@ -53,6 +53,9 @@ impl KeyEntry {
             KeyValues::Flag => "true or false".into(),
             KeyValues::Other(what) => format!("{what}{unit}"),
         };
+        if self.windows {
+            text += "; or a list, one a convolution";
+        }
         if self.layers {
             text += "; or a list, one a layer";
         }
@@ -99,7 +102,7 @@ pub fn key_json(key: &KeyShown) -> Value {
         .ok()
         .and_then(|table| serde_json::to_value(&table["x"]).ok());
     json!({"event": "key", "key": key.full(), "file": table.file.name(), "values": values,
-        "layers": entry.layers, "unit": entry.unit, "law": entry.law, "default": default,
+        "layers": entry.layers, "windows": entry.windows, "unit": entry.unit, "law": entry.law, "default": default,
         "otherwise": entry.otherwise, "only": entry.only, "meaning": meaning})
 }
 

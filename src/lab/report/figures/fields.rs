@@ -11,6 +11,10 @@ const FIELDS_MAX: usize = 40;
 const SIDE_MAX: usize = 96;
 
 pub(super) fn draw(view: &RunView<'_>) -> Option<Figure> {
+    if view.windows {
+        // rows are those of a window
+        return None;
+    }
     let first = view.heats.iter().map(|heat| heat.layer).min()?;
     let find =
         |name: &str| view.heats.iter().find(|heat| heat.layer == first && heat.pathway == name);

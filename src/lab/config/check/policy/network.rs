@@ -3,12 +3,22 @@
 use super::super::network::{self, Network};
 use super::super::{Bias, per_layer, positive, word, wrong};
 use super::refuse;
+use crate::chip::layer::Homeostasis;
 use crate::lab::config::ConfigError;
 use crate::lab::config::defaults::policy as defaults;
 use crate::lab::config::file::NetworkFile;
 use crate::num::tables::Activation;
 use crate::task::environment::{EnvSpec, Shown};
 use crate::task::policy::InputCoding;
+
+/// `network.input`: nothing for what images have.
+const INPUTS: [(&str, Option<InputCoding>); 5] = [
+    ("split", Some(InputCoding::Split)),
+    ("offset", Some(InputCoding::Offset)),
+    ("raw", None),
+    ("on_off", None),
+    ("white", None),
+];
 
 /// Checked numbers of `[network]`.
 pub(super) struct Made {
@@ -53,6 +63,7 @@ pub(super) fn resolve(
         weight_max_log2: network::logarithms(weights)?,
         bias: word("network.bias", &mut file.bias, "input_row", &network::BIASES)?,
         gain_64ths: [[64; 2]; 2],
+        homeostasis: Homeostasis::OFF,
     };
     Ok(Made { hidden, critic_hidden, input: input(file, spec, network.bias)?, network })
 }
@@ -64,8 +75,13 @@ fn input(file: &mut NetworkFile, spec: &EnvSpec, bias: Bias) -> Result<InputCodi
         refuse(&[("network.input", file.input.is_some(), why)])?;
         return Ok(InputCoding::Split);
     }
-    let codings = [("split", InputCoding::Split), ("offset", InputCoding::Offset)];
-    let coding = word("network.input", &mut file.input, "split", &codings)?;
+    let coding = match word("network.input", &mut file.input, "split", &INPUTS)? {
+        Some(coding) => coding,
+        None => {
+            let found = format!("is \"{}\"", file.input.as_deref().unwrap_or_default());
+            return Err(wrong("network.input", found, "it is of images: use split or offset"));
+        }
+    };
     if coding == InputCoding::Offset && bias == Bias::None {
         let allowed = "half the scale is added to every number, which only a constant row can take away: use bias = \
                        \"input_row\", or input = \"split\"";
