@@ -194,9 +194,7 @@ fn net() -> impl Strategy<Value = Net> {
                 h.write.residual_bits = ResidualBits::new(0).unwrap();
             };
             let chip = if sign { chip.with(whole).unwrap() } else { chip };
-            let net =
-                Net { seed, convolutions, wirings, mode, optimiser, centred, taps, batches, chip };
-            net
+            Net { seed, convolutions, wirings, mode, optimiser, centred, taps, batches, chip }
         })
 }
 
