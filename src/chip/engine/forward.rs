@@ -325,7 +325,7 @@ fn put_out_group(
                 }
                 _ => slope_one(derivatives, live, group.len()),
             }
-            keep(kept, sums.iter().map(|&sum| i64::from(sum)));
+            keep(kept, sums);
         } else {
             let mut sums = [0; Scratch::SUMS];
             let sums = &mut sums[..cells];
@@ -341,16 +341,16 @@ fn put_out_group(
                 }
                 _ => slope_one(derivatives, live, group.len()),
             }
-            keep(kept, sums.iter().copied());
+            keep(kept, sums);
         }
     }
 }
 
 /// Slopes of a panel's units that are read out, `[sample][64]`.
 fn slope_one(derivatives: &mut [u8], live: usize, samples: usize) {
+    let slopes: [u8; PANEL_COLUMNS] = std::array::from_fn(|c| if c < live { 255 } else { 0 });
     for row in derivatives.chunks_mut(BLOCK_ROWS).take(samples) {
-        row[..live].fill(255);
-        row[live..PANEL_COLUMNS].fill(0);
+        row[..PANEL_COLUMNS].copy_from_slice(&slopes);
     }
 }
 
@@ -375,10 +375,10 @@ fn look_up_wide(
 }
 
 /// Keeps a panel's accumulators, `[sample][64]`.
-fn keep(kept: Option<&mut [i64]>, sums: impl Iterator<Item = i64>) {
-    if let Some(kept) = kept {
-        for (at, sum) in sums.enumerate() {
-            kept[at / PANEL_COLUMNS * BLOCK_ROWS + at % PANEL_COLUMNS] = sum;
-        }
+fn keep<T: Copy + Into<i64>>(kept: Option<&mut [i64]>, sums: &[T]) {
+    let Some(kept) = kept else { return };
+    let rows = kept.chunks_mut(BLOCK_ROWS).zip(sums.as_chunks::<PANEL_COLUMNS>().0);
+    for (kept, sums) in rows {
+        kept.iter_mut().zip(sums).for_each(|(kept, &sum)| *kept = sum.into());
     }
 }

@@ -13,16 +13,19 @@
 use std::arch::x86_64::*;
 use std::ops::Range;
 
+use self::narrow::Vectors;
 use super::ops::{Ops, twins};
 use super::{
-    Cells, Conversion, Dither, Drives, Ends, Half, Rails, SignLaw, Squares, Sums, WriteCounts,
-    WriteLaw, lanes, peak, scalar,
+    Cells, Conversion, Dither, Drives, Ends, Half, Rails, SignLaw, Sums, WriteCounts, WriteLaw,
+    lanes, peak, scalar,
 };
 use crate::chip::crossbar::layout::{BLOCK_CELLS, BLOCK_ROWS, HALF_CELLS, HALF_COLUMNS, Layout};
-use crate::num::fixed::ErrorBits;
 
 mod dither;
 mod fused;
+mod gates;
+mod narrow;
+mod normalise;
 mod one_sample;
 mod pairs;
 mod units;
@@ -46,7 +49,11 @@ pub(super) const OPS: Ops = Ops {
     read_conv: |_, _, _, _| false,
     convert,
     look_up: units::look_up,
-    gate,
+    difference,
+    stream_squares: normalise::stream_squares,
+    scale: normalise::scale,
+    latch: gates::latch,
+    gate: gates::gate,
     turn: units::turn,
     read_columns,
     accumulate,
@@ -57,12 +64,10 @@ pub(super) const OPS: Ops = Ops {
     levels,
     offset,
     index_squares,
-    stream_squares,
-    scale,
     centre,
     gate_totals,
     drive_totals,
-    squares,
+    squares: normalise::squares,
     loud,
     signs,
     fused: fused::fused,
@@ -80,15 +85,8 @@ fn convert(currents: [&[i32]; 2], conversion: Conversion, live: usize, codes: &m
 }
 
 #[target_feature(enable = "avx2,popcnt")]
-fn gate(
-    errors: &[i16],
-    derivatives: &[u8],
-    negate: bool,
-    bits: ErrorBits,
-    stride: usize,
-    gates: &mut [i8],
-) -> u64 {
-    lanes::gate(errors, derivatives, negate, bits, stride, gates)
+fn difference(currents: [&[i32]; 2], sums: &mut [i32]) {
+    scalar::difference(currents, sums);
 }
 
 #[inline]
@@ -180,21 +178,21 @@ unsafe fn lit_quads<const N: usize>(from: *const u8, stride: usize) -> u32 {
     !(dark(any[0]) | dark(any[1]) << 8).cast_unsigned() & 0xffff
 }
 
-/// Adds the products of one quad: a word of each of N streams, and two vectors.
+/// Adds the products of one quad: a word of each of N streams, and H vectors.
 ///
 /// # Safety
 /// The word `quad` of each stream, the first at `x` and the next `stride` bytes on, and the 64 bytes `quad` at `v` lie
 /// there.
 #[inline]
 #[target_feature(enable = "avx2,popcnt")]
-unsafe fn dot<const KIND: u8, const N: usize>(
-    acc: &mut [[__m256i; 2]; N],
+unsafe fn dot<const KIND: u8, const N: usize, const H: usize>(
+    acc: &mut [[__m256i; H]; N],
     x: *const u8,
     stride: usize,
     v: *const u8,
     quad: usize,
 ) {
-    let mut w = [[_mm256_setzero_si256(); 2]; 2];
+    let mut w = [[_mm256_setzero_si256(); 2]; H];
     for (h, w) in w.iter_mut().enumerate() {
         // SAFETY: the caller says that 64 bytes lie there; each load reads half of them.
         let v = unsafe { _mm256_loadu_si256(v.add(quad * 64 + h * 32).cast()) };
@@ -212,11 +210,37 @@ unsafe fn dot<const KIND: u8, const N: usize>(
     }
 }
 
-/// `out[i] = sum over runs and quads of dot4(stream i, vector)`, 16 lanes a vector and up to 4 streams.
+/// [`dot`], or that of pairs that fit.
+///
+/// # Safety
+/// As [`dot`].
 #[inline]
 #[target_feature(enable = "avx2,popcnt")]
-fn dots<const KIND: u8, const N: usize>(
+unsafe fn either<const KIND: u8, const N: usize, const H: usize>(
+    fits: bool,
+    acc: &mut [[__m256i; H]; N],
+    x: *const u8,
+    stride: usize,
+    v: *const u8,
+    quad: usize,
+) {
+    match (fits, KIND) {
+        // SAFETY: what the caller says.
+        (false, _) => unsafe { dot::<KIND, N, H>(acc, x, stride, v, quad) },
+        // SAFETY: what the caller says.
+        (true, READ) => unsafe { narrow::dot::<true, N, H>(acc, x, stride, v, quad) },
+        // SAFETY: what the caller says.
+        (true, _) => unsafe { narrow::dot::<false, N, H>(acc, x, stride, v, quad) },
+    }
+}
+
+/// `out[i] = sum over runs and quads of dot4(stream i, vector)`, 16 lanes a vector and up to 4 streams. Of the 16, the upper 8
+/// are dark where H is 1.
+#[inline]
+#[target_feature(enable = "avx2,popcnt")]
+fn dots<const KIND: u8, const N: usize, const H: usize>(
     walk: Walk,
+    pair_max: u16,
     streams: &[u8],
     vectors: &[u8],
     out: &mut [i32],
@@ -229,7 +253,9 @@ fn dots<const KIND: u8, const N: usize>(
     );
     assert!(vectors.len() >= (runs - 1) * run + quads * 64, "every vector lies inside");
     assert!(out.len() >= (N - 1) * out_stride + 16, "every sum has its place");
-    let mut acc = [[_mm256_setzero_si256(); 2]; N];
+    let mut acc = [[_mm256_setzero_si256(); H]; N];
+    // of what met levels that were taken 128 below what they are
+    let mut below = [_mm256_setzero_si256(); N];
     for r in 0..runs {
         for first in (0..quads).step_by(QUADS) {
             let count = (quads - first).min(QUADS);
@@ -238,31 +264,55 @@ fn dots<const KIND: u8, const N: usize>(
             // of the N streams, and the second 64 * count bytes of the vectors.
             let (x, v) = unsafe { (streams.as_ptr().add(x), vectors.as_ptr().add(v)) };
             if KIND != TURNED && count == QUADS {
-                // SAFETY: 64 bytes of each stream lie there, as above.
-                let mut lit = unsafe { lit_quads::<N>(x, stride) };
+                let (lit, pair) = if pair_max > 0 {
+                    // SAFETY: 64 bytes of each stream lie there, as above.
+                    unsafe { narrow::look::<N>(x, stride) }
+                } else {
+                    // SAFETY: 64 bytes of each stream lie there, as above.
+                    (unsafe { lit_quads::<N>(x, stride) }, u16::MAX)
+                };
+                let fits = pair <= pair_max;
+                if fits && KIND == READ {
+                    // SAFETY: 64 bytes of each stream lie there, as above.
+                    unsafe { narrow::add_up::<N>(&mut below, x, stride) };
+                }
                 if lit.count_ones() <= FEW {
+                    let mut lit = lit;
                     while lit != 0 {
-                        // SAFETY: a quad below 16, whose bytes lie there, as above.
-                        unsafe {
-                            dot::<KIND, N>(&mut acc, x, stride, v, lit.trailing_zeros() as usize)
-                        };
+                        let quad = lit.trailing_zeros() as usize;
+                        // SAFETY: a quad below 16, whose bytes lie there, as above; pairs fit where that is said.
+                        unsafe { either::<KIND, N, H>(fits, &mut acc, x, stride, v, quad) };
                         lit &= lit - 1;
+                    }
+                    continue;
+                }
+                if fits {
+                    for quad in 0..QUADS {
+                        // SAFETY: as above.
+                        unsafe { either::<KIND, N, H>(true, &mut acc, x, stride, v, quad) };
                     }
                     continue;
                 }
             }
             for quad in 0..count {
                 // SAFETY: a quad below `count`, whose bytes lie there, as above.
-                unsafe { dot::<KIND, N>(&mut acc, x, stride, v, quad) };
+                unsafe { dot::<KIND, N, H>(&mut acc, x, stride, v, quad) };
             }
         }
     }
-    for (i, acc) in acc.iter().enumerate() {
-        for (h, sum) in acc.iter().enumerate() {
+    for (i, (acc, below)) in acc.iter().zip(below).enumerate() {
+        for h in 0..2 {
+            let mut sum = _mm256_setzero_si256();
+            if h < H {
+                sum = acc[h];
+                if KIND == READ {
+                    sum = _mm256_add_epi32(sum, narrow::raised(below));
+                }
+            }
             // SAFETY: i < N and h < 2, so the third assertion above bounds these 8 sums, and `out` is borrowed for
             // writing.
             unsafe {
-                _mm256_storeu_si256(out.as_mut_ptr().add(i * out_stride + h * 8).cast(), *sum);
+                _mm256_storeu_si256(out.as_mut_ptr().add(i * out_stride + h * 8).cast(), sum);
             }
         }
     }
@@ -273,18 +323,29 @@ fn dots<const KIND: u8, const N: usize>(
 fn dots_batch<const KIND: u8>(
     walk: Walk,
     samples: usize,
+    Vectors { pair_max, live }: Vectors,
     streams: &[u8],
     vectors: &[u8],
     out: &mut [i32],
 ) {
+    if live == 0 {
+        for out in out.chunks_mut(walk.out).take(samples) {
+            out[..HALF_COLUMNS].fill(0);
+        }
+        return;
+    }
     for from in (0..samples).step_by(4) {
         let x = &streams[from * walk.stride..];
         let out = &mut out[from * walk.out..];
-        match samples - from {
-            1 => dots::<KIND, 1>(walk, x, vectors, out),
-            2 => dots::<KIND, 2>(walk, x, vectors, out),
-            3 => dots::<KIND, 3>(walk, x, vectors, out),
-            _ => dots::<KIND, 4>(walk, x, vectors, out),
+        match ((samples - from).min(4), live) {
+            (1, 1) => dots::<KIND, 1, 1>(walk, pair_max, x, vectors, out),
+            (2, 1) => dots::<KIND, 2, 1>(walk, pair_max, x, vectors, out),
+            (3, 1) => dots::<KIND, 3, 1>(walk, pair_max, x, vectors, out),
+            (_, 1) => dots::<KIND, 4, 1>(walk, pair_max, x, vectors, out),
+            (1, _) => dots::<KIND, 1, 2>(walk, pair_max, x, vectors, out),
+            (2, _) => dots::<KIND, 2, 2>(walk, pair_max, x, vectors, out),
+            (3, _) => dots::<KIND, 3, 2>(walk, pair_max, x, vectors, out),
+            (_, _) => dots::<KIND, 4, 2>(walk, pair_max, x, vectors, out),
         }
     }
 }
@@ -296,7 +357,7 @@ fn read(cells: &[u8], drives: Drives<'_>, samples: Range<usize>, out: &mut [i32]
     }
     let walk = Walk {
         runs: drives.blocks(),
-        quads: 16,
+        quads: QUADS,
         run: BLOCK_CELLS,
         words: drives.samples() * BLOCK_ROWS,
         stride: BLOCK_ROWS,
@@ -306,10 +367,20 @@ fn read(cells: &[u8], drives: Drives<'_>, samples: Range<usize>, out: &mut [i32]
     let together = pairs::together(drives.greatest());
     for half in 0..2 {
         let (out, vectors) = (&mut out[half * HALF_COLUMNS..], &cells[half * HALF_CELLS..]);
-        match together {
-            Some(together) => pairs::batch(together, walk, samples.len(), streams, vectors, out),
-            None => dots_batch::<READ>(walk, samples.len(), streams, vectors, out),
+        if let Some(together) = together {
+            pairs::batch(together, walk, samples.len(), streams, vectors, out);
+            continue;
         }
+        // looked at once for all samples: of few, that would take longer than it saves
+        let known = if samples.len() < 4 {
+            Vectors::ANY
+        } else {
+            Vectors::of_levels(narrow::greatest::<false>(
+                vectors,
+                (walk.runs, walk.run, walk.quads),
+            ))
+        };
+        dots_batch::<READ>(walk, samples.len(), known, streams, vectors, out);
     }
 }
 
@@ -319,7 +390,8 @@ fn accumulate(turned: &[u8], stride: usize, gates: &[i8], sums: &mut Half<i32>) 
         Walk { runs: 1, quads: gates.len() / 64, run: 0, words: 0, stride, out: HALF_COLUMNS };
     // SAFETY: i8 and u8 have the same size and every bit pattern is valid for both.
     let gates = unsafe { std::slice::from_raw_parts(gates.as_ptr().cast::<u8>(), gates.len()) };
-    dots_batch::<GATES>(walk, BLOCK_ROWS, turned, gates, sums);
+    let known = Vectors::of_gates(narrow::greatest::<true>(gates, (1, 0, walk.quads)));
+    dots_batch::<GATES>(walk, BLOCK_ROWS, known, turned, gates, sums);
 }
 
 /// The transposed read: levels are turned, 4 columns of a row to a word, once for all samples.
@@ -346,7 +418,8 @@ fn read_columns(plane: &[u8], layout: Layout, gates: Drives<'_>, out: &mut [i32]
         for (group, vectors) in turned.chunks_exact(quads).enumerate() {
             let out = &mut out[block * BLOCK_ROWS + 16 * group..];
             let gates = (gates.samples(), gates.codes());
-            dots_batch::<TURNED>(walk, gates.0, gates.1, vectors.as_flattened(), out);
+            let turned = vectors.as_flattened();
+            dots_batch::<TURNED>(walk, gates.0, Vectors::ANY, gates.1, turned, out);
         }
     }
 }

@@ -17,7 +17,7 @@ use std::ops::Range;
 
 use super::ops::{Ops, twins};
 use super::{
-    Cells, Dither, Drives, Ends, Half, SignLaw, Squares, Sums, WriteCounts, WriteLaw, peak, scalar,
+    Cells, Dither, Drives, Ends, Half, SignLaw, Sums, WriteCounts, WriteLaw, peak, scalar,
 };
 use crate::chip::crossbar::layout::{BLOCK_CELLS, BLOCK_ROWS, HALF_CELLS, HALF_COLUMNS};
 
@@ -26,6 +26,7 @@ mod conv;
 mod dither;
 mod few_samples;
 mod fused;
+mod normalise;
 mod one_sample;
 mod peaks;
 mod turn;
@@ -71,12 +72,12 @@ pub(super) const OPS: Ops = Ops {
     levels,
     offset,
     index_squares,
-    stream_squares,
-    scale,
+    stream_squares: normalise::stream_squares,
+    scale: normalise::scale,
     centre,
     gate_totals,
     drive_totals,
-    squares,
+    squares: normalise::squares,
     loud,
     signs,
     fused: fused::fused,

@@ -3,7 +3,10 @@
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
 use super::{Conversion, Rails};
-use crate::chip::crossbar::layout::{BLOCK_ROWS, HALF_COLUMNS, PANEL_COLUMNS};
+use crate::chip::crossbar::layout::PANEL_COLUMNS;
+#[cfg(target_arch = "aarch64")]
+use crate::chip::crossbar::layout::{BLOCK_ROWS, HALF_COLUMNS};
+#[cfg(target_arch = "aarch64")]
 use crate::num::fixed::ErrorBits;
 
 /// [`super::scalar::convert`] where half a step and a current fit 32 bits: see [`Conversion::SHIFT_MAX`].
@@ -38,6 +41,7 @@ pub(super) fn convert(
 
 /// [`super::scalar::gate`]. An error of at most `2^(bits-1) - 1` times a derivative of at most 255 rounds to at most
 /// 127 in size, for every width from 2 to 9: no gate saturates.
+#[cfg(target_arch = "aarch64")]
 #[inline(always)]
 pub(super) fn gate(
     errors: &[i16],

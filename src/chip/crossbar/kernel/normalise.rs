@@ -6,7 +6,7 @@
 //! ```
 //!
 //! The law is `chip::periphery::normalise`, one unit after the other; its twin is written so that compilers make vectors of
-//! it. See docs/MODEL.md, 2.3.
+//! it; x86 has its own. See docs/MODEL.md, 2.3.
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
 use crate::chip::crossbar::layout::{BLOCK_ROWS, PANEL_COLUMNS};
@@ -17,9 +17,9 @@ use crate::num::fixed::DriveBits;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct HandOn {
     /// Bits that are rounded off.
-    shift: u32,
+    pub(super) shift: u32,
     /// Greatest value.
-    max: u32,
+    pub(super) max: u32,
 }
 
 impl HandOn {
@@ -69,6 +69,7 @@ pub(super) fn law_scale(
     saturated
 }
 
+#[cfg(target_arch = "aarch64")]
 #[inline(always)]
 pub(super) fn stream_squares(sums: &[i32], squares: &mut [u64]) {
     for (square, sums) in squares.iter_mut().zip(sums.as_chunks::<PANEL_COLUMNS>().0) {
@@ -81,6 +82,7 @@ pub(super) fn stream_squares(sums: &[i32], squares: &mut [u64]) {
     }
 }
 
+#[cfg(target_arch = "aarch64")]
 #[inline(always)]
 pub(super) fn scale(
     sums: &[i32],

@@ -82,8 +82,8 @@ pub(super) struct Ops {
     pub(super) peak: unsafe fn(usize) -> u64,
 }
 
-/// Compiles twins, of a write's steps, of offsets and of normalised activities, for features of the processor. Where the whole program is compiled for them,
-/// tables have the twins themselves.
+/// Compiles twins of a write's steps and of offsets for features of the processor. Where the whole program is compiled for them, tables have
+/// the twins themselves.
 #[cfg(target_arch = "x86_64")]
 macro_rules! twins {
     ($features:literal) => {
@@ -124,23 +124,6 @@ macro_rules! twins {
         }
 
         #[target_feature(enable = $features)]
-        fn stream_squares(sums: &[i32], squares: &mut [u64]) {
-            crate::chip::crossbar::kernel::normalise::stream_squares(sums, squares);
-        }
-
-        #[target_feature(enable = $features)]
-        fn scale(
-            sums: &[i32],
-            reciprocals: &[u64],
-            hand_on: crate::chip::crossbar::kernel::HandOn,
-            values: &mut [u8],
-            derivatives: &mut [u8],
-        ) -> u64 {
-            use crate::chip::crossbar::kernel::normalise;
-            normalise::scale(sums, reciprocals, hand_on, values, derivatives)
-        }
-
-        #[target_feature(enable = $features)]
         fn centre(sums: &mut Half<i32>, means: &[i32; BLOCK_ROWS], totals: &[i32; HALF_COLUMNS]) {
             crate::chip::crossbar::kernel::optimise::centre(sums, means, totals)
         }
@@ -153,11 +136,6 @@ macro_rules! twins {
         #[target_feature(enable = $features)]
         fn drive_totals(turned: &[u8], stride: usize) -> [u32; BLOCK_ROWS] {
             crate::chip::crossbar::kernel::optimise::drive_totals(turned, stride)
-        }
-
-        #[target_feature(enable = $features)]
-        fn squares(sums: &Half<i32>, wide: bool) -> Squares {
-            crate::chip::crossbar::kernel::optimise::squares(sums, wide)
         }
 
         #[target_feature(enable = $features)]

@@ -67,6 +67,23 @@ fn the_largest_wide_sums_saturate_alike() {
     }
 }
 
+#[test]
+fn squares_of_sums_are_the_law() {
+    for (seed, wide) in (0..40).flat_map(|seed| [(seed, false), (seed, true)]) {
+        let raw = bytes(seed, HALF_CELLS * 4);
+        let most = 4096 * 255 * 127 * if wide { 16 } else { 1 };
+        let sums: Vec<i32> =
+            raw.as_chunks().0.iter().map(|word| i32::from_le_bytes(*word)).collect();
+        let sums: Vec<i32> =
+            sums.iter().map(|&sum| (sum >> (seed % 20)).clamp(-most, most)).collect();
+        let sums = half(&sums);
+        let want = law().squares(&sums, wide);
+        for (name, kernel) in others() {
+            assert_eq!(kernel.squares(&sums, wide), want, "{name} {seed} {wide}");
+        }
+    }
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
 
