@@ -155,7 +155,7 @@ fault "3 a section has another one's tag" $layer_state \
 fault "3 a draw depends on the tile" $update \
     'layer: index,' 'layer: index + (self.hardware.tile.rows & 1) as u16,' laws::runs
 fault "4 layers wait for one another" $schedule \
-    '*again = (*again).max(front);' '*again += front;' laws::law_4
+    '(*again).max(shape.positions * front).max(shape.stage)' '*again + shape.positions * front + shape.stage' laws::law_4
 fault "4 updates one after the other" $schedule \
     'self.longest = self.longest.max(cycles);' 'self.longest += cycles;' laws::law_4
 fault "4 all words are shared" $schedule \

@@ -17,7 +17,7 @@ const NAMED: usize = 5;
 /// Share of the total from which memory of digital sums is explained.
 const SHOWN: f64 = 0.05;
 /// What that memory is, and what does without.
-const SUMS: &str = "a product is added to a 32-bit sum, 64 bits out and in; learning.mode = \"online\" or \"replay\" does without";
+const SUMS: &str = "a product is added to a 32-bit sum, 64 bits out and in; learning.mode = \"online\" or \"replay\" does without in dense layers";
 
 #[derive(Debug, Args)]
 pub(super) struct PriceArgs {

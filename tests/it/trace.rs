@@ -12,6 +12,9 @@ use dalean::lab::wave::{Look, record};
 
 use super::program::{dalean, run};
 
+/// Two convolutions, whose layers are read more than once a sample.
+const WINDOWS: &str = "network.channels=[3, 2]";
+
 /// A slice of a trace, with the name of its track.
 struct Slice {
     layer: u64,
@@ -76,13 +79,27 @@ fn check_tracks(slices: &[Slice]) {
 #[test]
 fn no_slice_of_a_track_overlaps_another_and_parts_are_at_work_as_long_as_the_ledger_counts() {
     let tile = TileAt { layer: 0, target: 0, down: 0, across: 0 };
-    let cases: [&[&str]; 5] = [
+    let cases: [&[&str]; 7] = [
         &["hw.tile.rows=40"],
         &["hw.tile.rows=40", "hw.tile.columns=16", "hw.timing.lanes=1"],
         &["hw.drive.dac_bits=2", "hw.adc.bits=6"],
         // a fault: of an update that loads its samples one by one, the last one alone was played
         &["learning.mode=online", "learning.centre=none"],
         &["learning.rule=bp", "learning.taps=default", "learning.mode=replay"],
+        &[
+            WINDOWS,
+            "network.alpha=default",
+            "learning.rate_multipliers=default",
+            "hw.tile.columns=2",
+        ],
+        &[
+            WINDOWS,
+            "network.alpha=default",
+            "learning.rate_multipliers=default",
+            "learning.mode=replay",
+            "learning.optimiser=plain",
+            "learning.centred=false",
+        ],
     ];
     for case in cases {
         let mut settings: Vec<String> =

@@ -54,7 +54,7 @@ pub(super) fn draw(view: &RunView<'_>) -> Option<Figure> {
     let sums = cost.sums_share.map_or_else(String::new, |share| {
         format!(
             " <b>{}</b> is memory of the digital sums: with <code>learning.mode = \"accumulate\"</code> a product is \
-             added to a sum of 32 bits, 64 bits out and in; <code>online</code> and <code>replay</code> do without.",
+             added to a sum of 32 bits, 64 bits out and in; <code>online</code> and <code>replay</code> do without in dense layers.",
             percent(share, 0)
         )
     });

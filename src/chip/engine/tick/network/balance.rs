@@ -63,6 +63,12 @@ impl TickLayer {
         (first..first + self.grid()[2]).collect()
     }
 
+    /// Tiles whose lanes have a group of columns.
+    fn tiles_with(&self, group: usize) -> Vec<usize> {
+        let heads = self.targets().into_iter().flat_map(|target| self.head_tiles(target));
+        heads.filter(|&tile| self.tiles[tile].has_group(group)).collect()
+    }
+
     /// The reads that come are added up, or are not.
     pub(super) fn note(&mut self, on: bool) {
         if self.balancing.is_some() {
@@ -153,8 +159,11 @@ impl Network {
                 }
                 self.cycles().occupy(layer, During::Update, 1);
                 self.cycles().engage(layer, Part::Lanes, 1);
+                let group = usize::try_from(cycle / beat).expect("few groups");
+                for tile in self.layers[layer].tiles_with(group) {
+                    self.watch.part(self.clock, [layer, tile], Part::Lanes, [None; 2]);
+                }
                 if (cycle + 1).is_multiple_of(beat) {
-                    let group = usize::try_from(cycle / beat).expect("few groups");
                     self.layers[layer].move_group(group);
                 }
             }

@@ -19,7 +19,8 @@ impl Network {
         layers.clone().for_each(|layer| self.layers[layer].note(training));
         let positions: Vec<usize> = self.layers.iter().map(TickLayer::positions).collect();
         // reads that commands were given for, reads that lanes have seen, and samples that were handed on
-        let (mut issued, mut seen, mut done) = (vec![0; count], vec![0; count], vec![0; count]);
+        let (mut issued, mut seen, mut done) =
+            (vec![0usize; count], vec![0usize; count], vec![0; count]);
         // cycles for which the next command has been offered
         let mut offered = vec![0; count];
         let mut started = vec![vec![]; count];
@@ -32,7 +33,7 @@ impl Network {
                 let there = layer == layers.start || done[layer - 1] > sample;
                 let offer = sample < samples && there && self.layers[layer].ready(&command);
                 offered[layer] = if offer { offered[layer] + 1 } else { 0 };
-                if offered[layer] == 1 && issued[layer] % positions[layer] == 0 {
+                if offered[layer] == 1 && issued[layer].is_multiple_of(positions[layer]) {
                     started[layer].push(self.clock);
                 }
                 let given = (offered[layer] == beat).then_some(command);
@@ -51,7 +52,7 @@ impl Network {
                 if self.layers[layer].looked_up() {
                     seen[layer] += 1;
                     // the last read of a sample
-                    if seen[layer] % positions[layer] == 0 {
+                    if seen[layer].is_multiple_of(positions[layer]) {
                         let sample = seen[layer] / positions[layer] - 1;
                         done[layer] += usize::from(self.put_out(layer, sample));
                         let (start, end) = (started[layer][sample], self.clock);

@@ -8,7 +8,7 @@ use crate::chip::engine::{Engine, Operation, Phase, Side, Write, WritesDone};
 use crate::chip::hardware::timing::{PulseCode, Timing};
 use crate::chip::hardware::{Adc, AdcRange, Hardware, Subtract, Window};
 use crate::chip::layer::{
-    Delivery, DrivenBy, Homeostasis, InitialLevels, Layer, LayerSpec, Optimiser, Pool, Taps,
+    Delivery, DrivenBy, Gain, Homeostasis, InitialLevels, Layer, LayerSpec, Optimiser, Pool, Taps,
 };
 use crate::chip::population::{Stream, Wiring};
 use crate::num::fixed::{AdcBits, DriveBits, LevelBits, ResidualBits};
@@ -50,8 +50,26 @@ fn wish() -> impl Strategy<Value = Wish> {
     (1usize..=3, 1usize..=2, 0usize..=2, 1usize..=4, 1usize..=2, any::<bool>())
 }
 
+fn law() -> impl Strategy<Value = Homeostasis> {
+    let gain = prop_oneof![
+        Just(Gain::Table),
+        (0u32..=2).prop_map(|spread| Gain::Fixed { spread }),
+        Just(Gain::Tracking),
+    ];
+    (any::<bool>(), gain, 2u32..=5).prop_map(|(threshold, gain, window_log2)| Homeostasis {
+        threshold,
+        gain,
+        window_log2,
+    })
+}
+
 /// A convolution of an image, as near to a wish as the image allows.
-fn convolution(channels: usize, [height, width]: [usize; 2], wish: Wish, rows: bool) -> LayerSpec {
+fn convolution(
+    channels: usize,
+    [height, width]: [usize; 2],
+    (wish, law): (Wish, Homeostasis),
+    rows: bool,
+) -> LayerSpec {
     let (side, stride, pad, units, pool, greatest) = wish;
     let side = side.min(height).min(width);
     let shape = ConvShape { channels, height, width, side, stride, pad: pad.min(side - 1) };
@@ -61,7 +79,7 @@ fn convolution(channels: usize, [height, width]: [usize; 2], wish: Wish, rows: b
         units,
         wiring: Wiring::Dual,
         driven_by: DrivenBy::Streams,
-        activation: Activation::Relu,
+        activation: if law.gain == Gain::Table { Activation::Relu } else { Activation::Ramp },
         weight_max_log2: 0,
         initial: InitialLevels::Uniform { gain_64ths: [64, 64] },
         constant_row: rows,
@@ -71,7 +89,7 @@ fn convolution(channels: usize, [height, width]: [usize; 2], wish: Wish, rows: b
             (true, true) => Pool::Max { side: pool },
             (true, false) => Pool::Average { side: pool },
         },
-        homeostasis: Homeostasis::OFF,
+        homeostasis: law,
     }
 }
 
@@ -150,7 +168,7 @@ fn net() -> impl Strategy<Value = Net> {
     (
         any::<u64>(),
         (1usize..=3, [2usize..=6, 2usize..=6]),
-        prop::collection::vec(wish(), 1..=2),
+        prop::collection::vec((wish(), law()), 1..=2),
         prop::sample::select(wirings),
         (modes, prop::sample::select(optimisers), any::<bool>()),
         (1usize..=2, prop::collection::vec(1usize..=3, 1..=2), any::<bool>()),
@@ -176,9 +194,7 @@ fn net() -> impl Strategy<Value = Net> {
                 h.write.residual_bits = ResidualBits::new(0).unwrap();
             };
             let chip = if sign { chip.with(whole).unwrap() } else { chip };
-            let net =
-                Net { seed, convolutions, wirings, mode, optimiser, centred, taps, batches, chip };
-            net
+            Net { seed, convolutions, wirings, mode, optimiser, centred, taps, batches, chip }
         })
 }
 
@@ -192,6 +208,8 @@ impl Net {
             driven_by: DrivenBy::Streams,
             convolution: None,
             pool: Pool::None,
+            activation: Activation::Relu,
+            homeostasis: Homeostasis::OFF,
             ..last.clone()
         };
         let specs = self.convolutions.iter().cloned().chain([output]);
@@ -273,11 +291,15 @@ impl Net {
         engine.written(if online { WritesDone::Sample } else { WritesDone::Batch });
     }
 
-    fn batch(&self, engine: &mut Engine, batch: usize) {
-        let (samples, inputs) = (self.batches[batch], self.convolutions[0].sample_inputs());
+    fn codes(&self, batch: usize, samples: usize) -> Vec<u8> {
         let top = usize::from(self.chip.drive.bits.code_max()) + 1;
         let code = |at| number(!self.seed, batch * 10_000 + at, top) as u8;
-        let codes: Vec<u8> = (0..samples * inputs).map(code).collect();
+        (0..samples * self.convolutions[0].sample_inputs()).map(code).collect()
+    }
+
+    fn batch(&self, engine: &mut Engine, batch: usize) {
+        let (samples, inputs) = (self.batches[batch], self.convolutions[0].sample_inputs());
+        let codes = self.codes(batch, samples);
         let together = if self.mode == Mode::Online { 1 } else { samples };
         for codes in codes.chunks(together * inputs) {
             engine.execute(&Operation::LoadDrives { codes });
@@ -292,6 +314,7 @@ proptest! {
     #[test]
     fn a_convolution_takes_the_cycles_of_its_closed_form(net in net()) {
         let mut engine = net.engine();
+        let _ = engine.calibrate(&net.codes(9, 3));
         let slots = *net.batches.iter().max().unwrap();
         let mut tick = Network::new(&net.chip, net.seed, engine.layers(), slots);
         for batch in 0..net.batches.len() {
@@ -312,6 +335,14 @@ proptest! {
                     prop_assert!(left.is_empty() || left == tick.residuals(at, array));
                 }
                 prop_assert_eq!(&layer.adc_shifts[..], tick.adc_shifts(at));
+                let balance = &layer.balance;
+                for &target in layer.spec.wiring.targets() {
+                    prop_assert_eq!(balance.thresholds(target), tick.thresholds(at, target));
+                }
+                if balance.law().is_on() {
+                    let variance = balance.tracks().then_some(balance.variance());
+                    prop_assert_eq!((balance.shift(), variance), tick.table_step(at));
+                }
                 let followed = layer.requests.followed();
                 prop_assert_eq!([followed.power, followed.ends], tick.followed(at));
                 for set in [Stream::P, Stream::N] {

@@ -76,16 +76,27 @@ impl Watch {
 
     /// What the parts of a layer do in the cycle that begins.
     pub(super) fn parts(&mut self, clock: u64, layer: usize, tiles: &TickLayer) {
-        let Some(open) = self.open.get_mut(layer) else { return };
-        for (tile, part, on) in tiles.doing() {
-            let open = &mut open[tile];
-            let same = |span: &&mut PartSpan| (span.part, span.on, span.end) == (part, on, clock);
-            if let Some(span) = open.iter_mut().find(same) {
-                span.end += 1;
-            } else {
-                self.over.extend(open.extract_if(.., |span| span.end < clock));
-                open.push(PartSpan { layer, tile, part, on, start: clock, end: clock + 1 });
-            }
+        if self.open.is_empty() {
+            return;
+        }
+        tiles.doing().for_each(|(tile, part, on)| self.part(clock, [layer, tile], part, on));
+    }
+
+    /// What a part of a tile of a layer is at in the cycle that begins.
+    pub(super) fn part(
+        &mut self,
+        clock: u64,
+        [layer, tile]: [usize; 2],
+        part: Part,
+        on: [Option<usize>; 2],
+    ) {
+        let Some(open) = self.open.get_mut(layer).map(|tiles| &mut tiles[tile]) else { return };
+        let same = |span: &&mut PartSpan| (span.part, span.on, span.end) == (part, on, clock);
+        if let Some(span) = open.iter_mut().find(same) {
+            span.end += 1;
+        } else {
+            self.over.extend(open.extract_if(.., |span| span.end < clock));
+            open.push(PartSpan { layer, tile, part, on, start: clock, end: clock + 1 });
         }
     }
 

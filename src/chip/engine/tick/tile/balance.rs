@@ -71,6 +71,11 @@ impl Tile {
         self.config.more.balance.as_ref()
     }
 
+    /// Whether the lanes have columns of a group.
+    pub(in super::super) fn has_group(&self, group: usize) -> bool {
+        !self.group(group, self.config.columns).is_empty()
+    }
+
     /// Thresholds of a group of the lanes move, in a window of so many reads as a power of two.
     pub(in super::super) fn move_thresholds(&mut self, group: usize, window_log2: u32) {
         let columns = self.group(group, self.config.columns);

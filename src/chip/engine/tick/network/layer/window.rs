@@ -23,9 +23,9 @@ pub(super) struct Window {
 
 impl Window {
     pub(super) fn new(spec: &LayerSpec, samples: usize) -> Self {
-        let images = vec![vec![0; spec.sample_inputs()]; samples];
-        let none = spec.convolution.map_or(vec![], |_| images);
-        Self { shape: spec.convolution, images: [none.clone(), none] }
+        let image = |_| vec![vec![0; spec.sample_inputs()]; samples];
+        let images = spec.convolution.map_or_else(Vec::new, image);
+        Self { shape: spec.convolution, images: [images.clone(), images] }
     }
 }
 
