@@ -532,8 +532,8 @@ const PPO: &[KeyEntry] = &[
 ];
 
 const EVOLUTION: &[KeyEntry] = &[
-    whole("pairs", 1, 4096).default("32").only(ON_EVOLUTION, BY_EVOLUTION),
-    whole("step", 1, 4095).unit("levels").default("4").only(ON_EVOLUTION, BY_EVOLUTION),
+    whole("pairs", 1, 4096).default("16").only(ON_EVOLUTION, BY_EVOLUTION),
+    whole("step", 1, 4095).unit("levels").default("16").only(ON_EVOLUTION, BY_EVOLUTION),
     whole("shift", 0, 16).unit("bits").default("4").only(ON_EVOLUTION, BY_EVOLUTION),
 ];
 
