@@ -202,9 +202,8 @@ const NETWORK: &[KeyEntry] = &[
         .unit("pixels")
         .default("1")
         .only(ON_WINDOWS, WINDOWS),
-    other("padding", "`same`, or a whole number less than the kernel")
+    other("padding", "`same`, or a number of pixels, less than the kernel")
         .windows()
-        .unit("pixels")
         .default("\"same\"")
         .law("`same`: half of an odd kernel, rounded down, so that a map is as large as what is below it at a stride of 1")
         .only(ON_WINDOWS, WINDOWS),
