@@ -91,10 +91,25 @@ pub mod network {
     pub use crate::chip::population::Wiring;
     pub use crate::learn::error::{Centre, OutputError};
     pub use crate::learn::route::Route;
-    pub use crate::learn::rule::{Rule, UpdateMode};
+    pub use crate::learn::rule::{Control, Rule, UpdateMode};
     pub use crate::num::fixed::{Batch, RateMantissa};
     pub use crate::num::tables::{Activation, Decay, Positive};
     pub use crate::task::classify::{Augment, Coding};
+}
+
+/// Policies that are trained from outside: a [`PolicyLearner`](policy::PolicyLearner) is shown what environments of one's own
+/// show, and says what they are to do.
+pub mod policy {
+    pub use crate::task::environment::{
+        Actions, EnvError, EnvSpec, Observations, Outcomes, Real, Shown, Taken,
+    };
+    pub use crate::task::policy::{
+        Evaluating, Evolution, InputCoding, Method, PolicyEpoch, PolicyError, PolicyExperiment,
+        PolicyLearner, PolicyProgress, PolicyTurn, Ppo, Share, SumOf,
+    };
+
+    #[cfg(feature = "lab")]
+    pub use crate::lab::data::{FloatDoor, FloatOutcomes};
 }
 
 #[cfg(feature = "lab")]

@@ -26,7 +26,8 @@ pub(super) struct TraceArgs {
     /// Which update of the first epoch, from 1
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u64).range(1..))]
     update: u64,
-    /// Which tile's registers: layer,stream,row,column of tiles; stream is p or n
+    /// Which tile's registers: layer,stream,row,column of tiles; stream is p or n. The layers of a critic follow those of its actor,
+    /// and the network that has the layer is shown
     #[arg(long, value_name = "L,S,R,C", default_value = "0,p,0,0")]
     tile: String,
     /// Write registers of that tile over cycles (GTKWave, Surfer)

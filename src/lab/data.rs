@@ -4,7 +4,7 @@
 //! split with a hash over their content. [`fetch`] gets a known set and puts it below a [`DataRoot`] as
 //! the authors' own files, nothing half-written; [`list`] says what is there. The readers [`idx`],
 //! [`npy`], [`npz`] and [`csv`] are functions on bytes that allocate no more than they are given; [`numbers`] and [`labels`]
-//! say what numbers and labels become.
+//! say what numbers and labels become. [`FloatDoor`] takes what environments outside show a policy.
 
 mod acting;
 pub mod arrays;
@@ -13,6 +13,7 @@ mod catalog;
 pub mod csv;
 mod error;
 mod fetch;
+mod floats;
 pub mod idx;
 mod inflate;
 pub mod labels;
@@ -28,6 +29,7 @@ mod source;
 pub use catalog::{CATALOG, CatalogEntry, CatalogFile, MirrorForm, NpmForm};
 pub use error::DataError;
 pub use fetch::{FetchError, FetchEvent, Origin, fetch};
+pub use floats::{FloatDoor, FloatOutcomes};
 pub use list::{Entry, SetState, list};
 pub use load::{Data, content_hash, load};
 pub use own::{TableKeys, Told};

@@ -240,6 +240,7 @@ impl From<PolicyError> for RunError {
             PolicyError::Environment(error) => Self::Environment(error),
             PolicyError::Unknown(error) => Self::Data(DataError::Keys(error.to_string())),
             PolicyError::Stopped => unreachable!("who stops a training knows of it"),
+            PolicyError::Turn { .. } => unreachable!("environments of this program need no turns"),
         }
     }
 }

@@ -6,7 +6,8 @@
 //! ```
 //!
 //! The update is found by the fast engine and played again by the cycle-by-cycle network of tiles, which has to reach
-//! the same state in as many cycles: a trace that does not is an error of ours, and said.
+//! the same state in as many cycles: a trace that does not is an error of ours, and said. A run of several networks, whose layers
+//! are numbered through, is played by the one that has the tile's layer.
 
 use std::cell::RefCell;
 use std::rc::Rc;
@@ -68,21 +69,24 @@ pub fn record(
     let mut after = session()?;
     after.keep_tape();
     after.updates(look.update)?;
-    let tape = after.take_tape();
-    let samples = samples_of(&tape, before.engines()[0].layers()[0].spec.sample_inputs());
+    let counts = before.engines().into_iter().map(|engine| engine.layers().len());
+    let (which, first_layer) = network_of(look.tile.layer, counts);
+    let tape = after.take_tape(which);
+    let engine = before.engines()[which];
+    let samples = samples_of(&tape, engine.layers()[0].spec.sample_inputs());
 
-    let engine = before.engines()[0];
     let mut network = Network::new(&config.hardware, config.seed, engine.layers(), samples);
     network.set_learning(engine.mantissas(), engine.potentiation_only());
     network.set_error_unit(engine.error_unit());
     network.set_unlooked(engine.unlooked());
-    let place = look.tile;
+    let place = TileAt { layer: look.tile.layer - first_layer, ..look.tile };
     let grid = (place.layer < engine.layers().len()).then(|| network.grid(place.layer));
     let inside = |[targets, downs, acrosses]: [usize; 3]| {
         place.target < targets && place.down < downs && place.across < acrosses
     };
     if !grid.is_some_and(inside) {
-        return Err(RunError::NoTile { layers: engine.layers().len(), grid });
+        let layers = first_layer + engine.layers().len();
+        return Err(RunError::NoTile { layers, grid });
     }
     network.keep_spans();
     let writer = Rc::new(RefCell::new(vcd::Writer::new(timing.clock_khz, look.all)));
@@ -93,7 +97,7 @@ pub fn record(
     });
     network.play_tape(&tape);
 
-    let reached = after.engines()[0];
+    let reached = after.engines()[which];
     for (at, layer) in reached.layers().iter().enumerate() {
         for (array, cells) in layer.arrays.iter().enumerate() {
             let same = cells.levels().eq(network.levels(at, array));
@@ -106,6 +110,18 @@ pub fn record(
     let cycles = network.ledger(Phase::Training).cycles().expect("counted").clone();
     let vcd = writer.borrow_mut().finish();
     Ok(Wave { vcd, perfetto: perfetto::text(&spans, &parts, &grids, timing.clock_khz), cycles })
+}
+
+/// Which of some networks of so many layers each has a layer, and the number of its first one; the last network where none has.
+fn network_of(layer: usize, counts: impl ExactSizeIterator<Item = usize>) -> (usize, usize) {
+    let (mut first, last) = (0, counts.len() - 1);
+    for (which, count) in counts.enumerate() {
+        if which == last || layer < first + count {
+            return (which, first);
+        }
+        first += count;
+    }
+    (last, first)
 }
 
 fn samples_of(tape: &[Recorded], inputs: usize) -> usize {

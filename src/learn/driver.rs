@@ -5,7 +5,7 @@
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
 use super::error::ErrorUnit;
-use super::rule::{Rule, Step, UpdateMode};
+use super::rule::{Control, Rule, Step, UpdateMode};
 use crate::chip::engine::{Engine, Operation, Side, Write, WritesDone};
 use crate::chip::state::{Section, State, StateError, Visitor, visit_counts};
 
@@ -16,6 +16,8 @@ pub(crate) struct Learning {
     pub(crate) rule: Rule,
     /// When a batch is written.
     pub(crate) mode: UpdateMode,
+    /// What is taken from it.
+    pub(crate) control: Control,
     /// Shifts of each layer: `(first update, k)`, in order.
     pub(crate) shifts: Vec<Vec<(u64, u32)>>,
 }
@@ -108,7 +110,8 @@ impl Driver {
         let words = self.engine.output_words(errors);
         let loaded = self.engine.samples();
         let mut heard = false;
-        for step in self.learning.rule.steps(self.learning.mode, layers, loaded) {
+        let Learning { rule, mode, control, .. } = self.learning;
+        for step in rule.steps(control, mode, layers, loaded) {
             match step {
                 Step::Error { layer, samples } => {
                     let delivery = &self.engine.layers()[layer].delivery;
@@ -190,7 +193,7 @@ mod tests {
         let layers = layers.collect();
         let engine = Engine::new(hardware, Backend::Scalar, 1, layers);
         let shifts = vec![shifts.to_vec(); 2];
-        let learning = Learning { rule, mode, shifts };
+        let learning = Learning { rule, mode, control: Control::None, shifts };
         Driver::new(engine, learning, ErrorUnit::new(Centre::None, bits, 2))
     }
 

@@ -16,7 +16,7 @@ pub use check::{GAIN_64THS, WEIGHT_MAX_LOG2};
 use super::driver::{Driver, Learning};
 use super::error::{Centre, ErrorUnit, OutputError};
 use super::route::Route;
-use super::rule::{Rule, UpdateMode};
+use super::rule::{Control, Rule, UpdateMode};
 use crate::chip::crossbar::kernel::Backend;
 use crate::chip::crossbar::{InitialLaw, initial_levels, initial_scale};
 use crate::chip::engine::{Engine, Operation};
@@ -61,6 +61,8 @@ pub struct NetworkSpec {
     /// Whether the updates of each layer are centred: the mean drive of each row is taken off. The mean runs, an eighth of
     /// the way to that of each batch.
     pub centred: Vec<bool>,
+    /// What is taken from it, to see whether it is needed.
+    pub control: Control,
 }
 
 /// Where a network stands in a run.
@@ -77,7 +79,7 @@ pub struct NetworkPlace {
 /// A network that does not fit together, or not on the chip.
 ///
 /// ```
-/// use dalean::network::{Batch, Centre, Decay, OutputError, Rule, UpdateMode};
+/// use dalean::network::{Batch, Centre, Control, Decay, OutputError, Rule, UpdateMode};
 /// use dalean::{Hardware, NetworkSpec};
 ///
 /// let nothing = NetworkSpec {
@@ -93,6 +95,7 @@ pub struct NetworkPlace {
 ///     decay: Decay::Constant,
 ///     optimisers: vec![],
 ///     centred: vec![],
+///     control: Control::None,
 /// };
 /// let error = nothing.check(&Hardware::reference()).unwrap_err();
 /// assert_eq!(error.key(), "network.hidden");
@@ -217,7 +220,8 @@ impl NetworkSpec {
             }
             _ => ErrorUnit::new(self.centre, bits, self.outputs()),
         };
-        let learning = Learning { rule: self.rule, mode: self.mode, shifts };
+        let Self { rule, mode, control, .. } = *self;
+        let learning = Learning { rule, mode, control, shifts };
         Ok(Driver::new(engine, learning, unit))
     }
 
@@ -241,10 +245,13 @@ impl NetworkSpec {
     fn deliveries(&self, seed: u64, numbers: &[u16]) -> Vec<Delivery> {
         let (outputs, last) = (self.outputs(), self.layers.len() - 1);
         let layers = self.layers.iter().zip(numbers).enumerate();
-        let delivery = layers.map(|(at, (spec, &number))| match self.route {
-            _ if at == last => Delivery::output(outputs),
-            None => Delivery::above(spec.units),
-            Some(route) => route.delivery(spec.units, outputs, seed, number),
+        let delivery = layers.map(|(at, (spec, &number))| {
+            let delivery = match self.route {
+                _ if at == last => Delivery::output(outputs),
+                None => Delivery::above(spec.units),
+                Some(route) => route.delivery(spec.units, outputs, seed, number),
+            };
+            Delivery { alike: self.control.is_alike(at == last), ..delivery }
         });
         delivery.collect()
     }

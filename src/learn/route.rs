@@ -59,7 +59,7 @@ impl Route {
             Self::ScalarBroadcast => {
                 let taps = Taps { width: 1, per_unit: 1, words: vec![0; units], shift: 0 };
                 let source = WordSource::Sum { outputs, shift: log2_ceil(outputs as u64) };
-                Delivery { source, taps }
+                Delivery { source, taps, alike: false }
             }
             Self::RandomDense { shift } => {
                 // drawn unit by unit
@@ -70,7 +70,7 @@ impl Route {
                 }
                 let shift = shift.unwrap_or(log2_ceil(outputs as u64).div_ceil(2));
                 let source = WordSource::Signed { signs, shift };
-                Delivery { source, taps: Taps::identity(units) }
+                Delivery { source, taps: Taps::identity(units), alike: false }
             }
         }
     }

@@ -48,6 +48,33 @@ pub enum UpdateMode {
     Online,
 }
 
+/// What is taken from a network to see whether it is needed: a control that has to fail where it is.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Control {
+    /// Nothing.
+    #[default]
+    None,
+    /// Hidden layers hear no error and are not written: the last layer alone learns.
+    FrozenHidden,
+    /// Stream n hears errors as stream p does, and not negated, in hidden layers.
+    SameSignHidden,
+    /// The same in all layers.
+    SameSign,
+}
+
+impl Control {
+    /// Whether stream n of a layer hears the wrong sign.
+    #[must_use]
+    pub(crate) const fn is_alike(self, last: bool) -> bool {
+        match self {
+            Self::None | Self::FrozenHidden => false,
+            Self::SameSignHidden => !last,
+            Self::SameSign => true,
+        }
+    }
+}
+
 /// What a last layer is read out of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Readout {
@@ -106,7 +133,25 @@ impl Rule {
 
     /// The steps of one update of `layers` layers over a batch whose forward pass is done.
     #[must_use]
-    pub(crate) fn steps(self, mode: UpdateMode, layers: usize, samples: usize) -> Vec<Step> {
+    pub(crate) fn steps(
+        self,
+        control: Control,
+        mode: UpdateMode,
+        layers: usize,
+        samples: usize,
+    ) -> Vec<Step> {
+        let mut steps = self.all_steps(mode, layers, samples);
+        if control == Control::FrozenHidden {
+            steps.retain(|step| match step {
+                Step::Error { layer, .. } | Step::Update { layer, .. } => layer + 1 == layers,
+                // what is read backwards is for a layer below
+                Step::ReadColumns { .. } => false,
+            });
+        }
+        steps
+    }
+
+    fn all_steps(self, mode: UpdateMode, layers: usize, samples: usize) -> Vec<Step> {
         match self {
             Self::Ed | Self::EdNonDalean | Self::Kaneko | Self::Dfa => {
                 ed::steps(mode, layers, samples)
@@ -142,7 +187,7 @@ mod tests {
     #[test]
     fn ed_delivers_each_layer_once_and_never_reads_backwards() {
         for rule in [Rule::Ed, Rule::EdNonDalean, Rule::Kaneko, Rule::Dfa] {
-            let steps = rule.steps(UpdateMode::Accumulate, 2, 5);
+            let steps = rule.steps(Control::None, UpdateMode::Accumulate, 2, 5);
             assert_eq!(
                 steps,
                 [
@@ -153,6 +198,21 @@ mod tests {
                     Step::Update { layer: 0, write: Write::Program, samples: 0..0 },
                     Step::Update { layer: 1, write: Write::Program, samples: 0..0 },
                 ]
+            );
+        }
+    }
+
+    #[test]
+    fn frozen_layers_hear_nothing_and_are_not_written() {
+        for rule in [Rule::Ed, Rule::EdNonDalean, Rule::Dfa, Rule::Bp] {
+            assert_eq!(
+                rule.steps(Control::FrozenHidden, UpdateMode::Accumulate, 3, 5),
+                [
+                    Step::Error { layer: 2, samples: 0..5 },
+                    Step::Update { layer: 2, write: Write::Add, samples: 0..5 },
+                    Step::Update { layer: 2, write: Write::Program, samples: 0..0 },
+                ],
+                "{rule:?}"
             );
         }
     }
@@ -171,7 +231,7 @@ mod tests {
 
     #[test]
     fn bp_reads_each_layer_above_before_it_is_written() {
-        let steps = Rule::Bp.steps(UpdateMode::Replay, 2, 2);
+        let steps = Rule::Bp.steps(Control::None, UpdateMode::Replay, 2, 2);
         assert_eq!(
             steps[..3],
             [

@@ -13,6 +13,7 @@
 //! many of it side by side in [`one`]. See docs/MODEL.md, 5.4.
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
+use std::borrow::Cow;
 use std::fmt;
 
 use fixed::types::I16F16;
@@ -62,7 +63,7 @@ pub enum Taken {
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct EnvSpec {
     /// What it is called, such as `CartPole-v1`.
-    pub id: &'static str,
+    pub id: Cow<'static, str>,
     /// What it shows.
     pub shown: Shown,
     /// What it takes.
@@ -109,6 +110,37 @@ impl Observations {
         self.values.extend_from_slice(&others.values);
         self.active.extend_from_slice(&others.active);
         self.ends.extend(others.ends.iter().map(|end| before + end));
+    }
+
+    /// Checks that this is what so many environments show, whoever made it.
+    ///
+    /// # Errors
+    /// When it is not.
+    pub fn check(&self, spec: &EnvSpec, count: usize) -> Result<(), EnvError> {
+        let wrong = |found: String, allowed: String| {
+            Err(EnvError { id: spec.id.to_string(), which: 0, found, allowed })
+        };
+        let (fits, lines) = match spec.shown {
+            Shown::Dense(values) => {
+                let lineless = self.ends.is_empty() && self.active.is_empty();
+                (self.values.len() == count * values && lineless, 0)
+            }
+            Shown::Sparse { lines, .. } => {
+                let ends = self.ends.len() == count
+                    && self.ends.is_sorted()
+                    && self.ends.last().copied().unwrap_or(0) == self.active.len();
+                (ends && self.values.is_empty(), lines)
+            }
+        };
+        if !fits {
+            let found = "shows more or less than it has".into();
+            let allowed = "give what the environment says that it shows, of each".into();
+            return wrong(found, allowed);
+        }
+        match self.active.iter().find(|&&line| line as usize >= lines) {
+            Some(line) => wrong(format!("shows line {line}"), format!("there are {lines}, from 0")),
+            None => Ok(()),
+        }
     }
 
     /// What environment number `which` shows, for people: its numbers, 16 fractional bits, or its lines that are on.
@@ -167,37 +199,15 @@ impl Outcomes {
     /// When they are not.
     pub fn check(&self, spec: &EnvSpec, count: usize) -> Result<(), EnvError> {
         let wrong = |which, found: String, allowed: &str| {
-            Err(EnvError { id: spec.id.into(), which, found, allowed: allowed.into() })
+            Err(EnvError { id: spec.id.to_string(), which, found, allowed: allowed.into() })
         };
         let lengths = [self.rewards.len(), self.terminated.len(), self.truncated.len()];
         if let Some(found) = lengths.iter().find(|&&length| length != count) {
             let found = format!("is one of {count}, but a list of their outcomes has {found}");
             return wrong(0, found, "give a reward, and whether it ended, of each");
         }
-        for shown in [&self.reached, &self.next] {
-            let (fits, lines) = match spec.shown {
-                Shown::Dense(values) => (
-                    shown.values.len() == count * values
-                        && shown.ends.is_empty()
-                        && shown.active.is_empty(),
-                    0,
-                ),
-                Shown::Sparse { lines, .. } => {
-                    let ends = shown.ends.len() == count
-                        && shown.ends.is_sorted()
-                        && shown.ends.last().copied().unwrap_or(0) == shown.active.len();
-                    (ends && shown.values.is_empty(), lines)
-                }
-            };
-            if !fits {
-                let found = "shows more or less than it has".into();
-                return wrong(0, found, "give what the environment says that it shows, of each");
-            }
-            if let Some(line) = shown.active.iter().find(|&&line| line as usize >= lines) {
-                let found = format!("shows line {line}");
-                return wrong(0, found, &format!("there are {lines}, from 0"));
-            }
-        }
+        self.reached.check(spec, count)?;
+        self.next.check(spec, count)?;
         let both = |(&over, &stopped): (&bool, &bool)| over && stopped;
         match self.terminated.iter().zip(&self.truncated).position(both) {
             Some(which) => {

@@ -23,12 +23,14 @@ pub mod moments;
 pub mod number;
 pub mod observe;
 mod outcome;
+mod outside;
 mod player;
 mod prefixed;
 pub mod rank;
 pub mod ratio;
 mod rollout;
 pub mod sample;
+mod start;
 mod trainer;
 pub mod value;
 
@@ -41,6 +43,7 @@ use number::{Logit, saturated};
 
 pub use experiment::{Evaluating, Evolution, InputCoding, Method, PolicyExperiment, Ppo, Share};
 pub use outcome::{PolicyEpoch, PolicyEvaluation, PolicyProgress, SumOf, WatchedStep};
+pub use outside::{PolicyLearner, PolicyTurn};
 pub use trainer::{PolicyError, PolicyTrainer};
 
 /// What the last layer put out, `[sample][output]`: `floor(readout unit 2^20 + 1/2)`, saturating.

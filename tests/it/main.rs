@@ -21,6 +21,7 @@ mod keys;
 mod laws;
 mod oracle;
 mod output;
+mod outside;
 mod own_data;
 mod own_runs;
 mod policies;

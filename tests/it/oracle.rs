@@ -16,7 +16,7 @@ use dalean::chip::population::Wiring;
 use dalean::learn::error::{Centre, OutputError};
 use dalean::learn::network::NetworkSpec;
 use dalean::learn::route::Route;
-use dalean::learn::rule::{Rule, UpdateMode};
+use dalean::learn::rule::{Control, Rule, UpdateMode};
 use dalean::num::fixed::*;
 use dalean::num::tables::{Activation, Decay, Lut, Positive, Unit};
 use dalean::task::classify::{Coding, Examples, Experiment, Trainer};
@@ -156,6 +156,7 @@ fn experiment(s: &Value) -> Experiment {
         decay: Decay::Constant,
         optimisers: vec![Optimiser::Plain; widths.len() - 1],
         centred: vec![false; widths.len() - 1],
+        control: Control::None,
     };
     Experiment {
         seed: text(&s["seed_decimal"]).parse().unwrap(),

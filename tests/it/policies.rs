@@ -122,6 +122,14 @@ fn a_seed_and_an_environment_make_another_policy() {
         of(&["ppo.gamma=0.5"]),
         of(&["environment.id=Pendulum-v1"]),
         of(&["network.input=offset"]),
+        of(&["learning.control=frozen_hidden"]),
+        of(&["learning.control=same_sign_hidden"]),
+        of(&["learning.control=same_sign"]),
+        of(&["environment.id=Pendulum-v1", "ppo.noise_steps=3"]),
+        of(&["learning.optimiser=momentum", "learning.rate=30"]),
+        of(&["learning.optimiser=momentum", "learning.rate=30", "learning.momentum_shift=1"]),
+        of(&["learning.optimiser=adam_fx", "learning.rate=0.02"]),
+        of(&["learning.optimiser=adam_fx", "learning.rate=0.02", "learning.adam_shifts=[1,4]"]),
     ];
     let all_before = all.len();
     all.sort();
@@ -208,6 +216,20 @@ fn keys_of_one_task_are_refused_in_the_other_and_say_what_to_use() {
         (&["ppo.log_sigma=0"], "ppo.log_sigma", "actions"),
         (&["network.critic_hidden=[3, 3]"], "network.critic_hidden", "as many"),
         (&["learning.rule=es", "learning.rate=1"], "ppo", "[es]"),
+        (&["ppo.noise_steps=2"], "ppo.noise_steps", "actions"),
+        (&["learning.momentum_shift=2"], "learning.momentum_shift", "optimiser = \"momentum\""),
+        (
+            &["learning.optimiser=momentum", "learning.momentum_shift=9"],
+            "learning.momentum_shift",
+            "1..=8",
+        ),
+        (&["learning.adam_shifts=[3, 8]"], "learning.adam_shifts", "optimiser = \"adam_fx\""),
+        (
+            &["learning.optimiser=adam_fx", "learning.adam_shifts=[3, 0]"],
+            "learning.adam_shifts",
+            "1..=8",
+        ),
+        (&["learning.control=frozen"], "learning.control", "frozen_hidden"),
         (&["environment.id=CartPole-v2"], "environment.id", "did you mean \"CartPole-v1\"?"),
         (&["ppo.gamma=1.5"], "ppo.gamma", "0..=1"),
         (&["network.input=offset", "network.bias=none"], "network.input", "input_row"),
@@ -221,6 +243,37 @@ fn keys_of_one_task_are_refused_in_the_other_and_say_what_to_use() {
             error.starts_with(&format!("`{key}`")) && error.contains(hint),
             "{settings:?}: {error}"
         );
+    }
+}
+
+#[test]
+fn what_cannot_be_taken_away_is_refused() {
+    for (settings, words) in [
+        (&["network.hidden=[]", "learning.control=frozen_hidden"][..], "no hidden layer"),
+        (&["network.hidden=[]", "learning.control=same_sign_hidden"], "no hidden layer"),
+        (&["learning.rule=dfa", "learning.control=same_sign"], "no layer has a stream n"),
+    ] {
+        let error = config(settings).policy_experiment().unwrap_err().to_string();
+        assert!(error.starts_with("`learning.control`") && error.contains(words), "{error}");
+    }
+    // outputs have a stream n too
+    assert!(
+        config(&["network.hidden=[]", "learning.control=same_sign"]).policy_experiment().is_ok()
+    );
+}
+
+#[test]
+fn rules_of_one_stream_of_pairs_are_pulsed_twice_as_often_by_default() {
+    for (settings, rate) in [
+        (&["learning.rule=ed"][..], "0.25"),
+        (&["learning.rule=ed_non_dalean"], "0.25"),
+        (&["learning.rule=dfa"], "0.5"),
+        (&["learning.rule=bp", "hw.tile.transposed_read=true"], "0.5"),
+        (&["learning.rule=dfa", "learning.optimiser=rms"], "0.002"),
+        (&["learning.rule=dfa", "learning.rate=0.125"], "0.125"),
+    ] {
+        let text = config(settings).to_toml();
+        assert!(text.lines().any(|line| line == format!("rate = {rate}")), "{settings:?} {text}");
     }
 }
 

@@ -177,3 +177,22 @@ fn a_tile_or_an_update_that_is_not_there_is_said() {
         assert!(!file.exists(), "nothing is written");
     }
 }
+
+#[test]
+fn the_network_that_has_the_layer_is_shown() {
+    let settings = [super::policies::TINY.to_owned()];
+    let experiment = Some(("it", settings[0].as_str()));
+    let config = Config::load(&Sources { experiment, ..Sources::default() }).unwrap();
+    let (root, machine) = (DataRoot::new("none"), || Machine::new(Backend::best(), 1).unwrap());
+    // two layers of the actor, two of the critic
+    let of = |layer| {
+        let tile = TileAt { layer, target: 0, down: 0, across: 0 };
+        record(&config, &root, machine(), Look { update: 2, tile, all: true })
+    };
+    let layers = |layer| slices(&of(layer).unwrap().perfetto).into_iter().map(|s| s.layer).max();
+    assert_eq!([0, 1, 2, 3].map(layers), [Some(1); 4]);
+    assert_eq!(of(0).unwrap().perfetto, of(1).unwrap().perfetto);
+    assert_ne!(of(1).unwrap().perfetto, of(2).unwrap().perfetto);
+    let error = of(4).unwrap_err().to_string();
+    assert!(error.contains('4'), "{error}");
+}

@@ -116,6 +116,10 @@ impl Crate {
                     _ => open_item(&part),
                 }));
             }
+            "type" => {
+                let end = words[at..].iter().position(|word| word == ";");
+                out.push(said(&words[at..at + end.expect("an item ends")]));
+            }
             other => panic!("{name} is a {other}: say here what can be seen of it"),
         }
         out.extend(self.methods((file, at), &words[at + 1].replace("name", name)));

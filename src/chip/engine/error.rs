@@ -1,7 +1,8 @@
 //! `ERR`: taps and gates.
 //!
 //! ```text
-//! err      word of the unit's tap; more than one tap: sat_eb( rsh(sum, tap_shift) ); stream n receives -err
+//! err      word of the unit's tap; more than one tap: sat_eb( rsh(sum, tap_shift) ); stream n receives -err,
+//!          or err where the delivery says that streams are alike
 //! u        sat_8( rsh( err * a', error_bits ) )
 //! ```
 //!
@@ -38,6 +39,7 @@ impl Engine {
     pub(super) fn error(&mut self, layer: usize, samples: Range<usize>, words: &[i16]) {
         let this = &self.layers[layer];
         let (taps, units, wiring) = (&this.delivery.taps, this.layout.columns, this.spec.wiring);
+        let alike = this.delivery.alike;
         assert_eq!(words.len(), samples.len() * taps.width, "a word a bus slot and sample");
         // sums are formed when they are programmed: what they are formed of must still be there
         let pending = self.registers[layer].pending;
@@ -77,7 +79,7 @@ impl Engine {
             }
             let mut saturated_gates = [0; 2];
             for (target, slopes, gates) in part {
-                let negate = target == Stream::N;
+                let negate = target == Stream::N && !alike;
                 let count = &mut saturated_gates[target.index()];
                 if all {
                     *count += kernel.gate(&errors, slopes, negate, bits, stride, gates);

@@ -5,7 +5,7 @@
 //! sum      sat_eb( rsh( sum_c S[c], shift ) )                     one word
 //! signed   sat_eb( rsh( sum_c +-S[c], shift ) )                   a word a unit, by fixed signs
 //! above    sat_eb( rsh( d, level_bits - log2(weight_max) + 8 - error_bits ) )       d: row sums of the layer above
-//! taps     err_j = S[w_j],  or  sat_eb( rsh( sum_t S[w_jt], shift ) )
+//! taps     err_j = S[w_j],  or  sat_eb( rsh( sum_t S[w_jt], shift ) );  stream n takes -err_j, or err_j where streams are alike
 //! ```
 //!
 //! Plain data: the engine forms words by it, and counts and times that. See docs/MODEL.md, 3.2 and 3.8.
@@ -63,12 +63,14 @@ pub struct Delivery {
     pub source: WordSource,
     /// What units latch of it.
     pub taps: Taps,
+    /// Whether stream n latches what stream p does, where it should be the negative: a control that has to fail.
+    pub alike: bool,
 }
 
 impl From<Taps> for Delivery {
     /// Taps on the output words.
     fn from(taps: Taps) -> Self {
-        Self { source: WordSource::Output, taps }
+        Self { source: WordSource::Output, taps, alike: false }
     }
 }
 
@@ -82,7 +84,7 @@ impl Delivery {
     /// A layer whose units get what the layer above read from its columns.
     #[must_use]
     pub fn above(units: usize) -> Self {
-        Self { source: WordSource::Above, taps: Taps::identity(units) }
+        Self { source: WordSource::Above, taps: Taps::identity(units), alike: false }
     }
 
     /// Output words that an `ERR` of the layer carries for a sample: `CE`, or none where the layer above has them.
@@ -121,10 +123,11 @@ mod tests {
     #[test]
     fn formed_words_take_a_term_an_output_and_word() {
         let signed = WordSource::Signed { signs: vec![1; 3 * 7], shift: 1 };
-        let dense = Delivery { source: signed, taps: Taps::identity(7) };
+        let dense = Delivery { source: signed, taps: Taps::identity(7), alike: false };
         assert_eq!((dense.output_words(), dense.terms(), dense.is_direct()), (3, 21, false));
         let one = Taps { width: 1, per_unit: 1, words: vec![0; 7], shift: 0 };
-        let sum = Delivery { source: WordSource::Sum { outputs: 3, shift: 2 }, taps: one };
+        let source = WordSource::Sum { outputs: 3, shift: 2 };
+        let sum = Delivery { source, taps: one, alike: false };
         assert_eq!((sum.output_words(), sum.terms()), (3, 3));
         let (output, above) = (Delivery::output(3), Delivery::above(7));
         assert_eq!((output.output_words(), output.terms(), output.is_direct()), (3, 0, true));

@@ -17,7 +17,7 @@ use crate::chip::layer::{Homeostasis, Optimiser};
 use crate::lab::near;
 use crate::learn::error::{Centre, OutputError};
 use crate::learn::route::Route;
-use crate::learn::rule::{Rule, UpdateMode};
+use crate::learn::rule::{Control, Rule, UpdateMode};
 use crate::num::fixed::{Batch, OutOfRange, RateMantissa};
 use crate::num::tables::{Activation, Decay, FullDrive, Positive, Rate, RateOf, Unit};
 
@@ -109,6 +109,8 @@ pub struct Config {
     pub(crate) error: OutputError,
     /// What is subtracted from errors.
     pub(crate) centre: Centre,
+    /// What is taken from a network, to see whether it is needed.
+    pub(crate) control: Control,
     /// Whether all layers learn from what differs from the mean of a row; of policies, [`PolicySettings`] says which.
     pub(crate) centred: bool,
     /// How errors reach hidden layers; `None` with back-propagation.
@@ -230,7 +232,8 @@ pub(super) fn config(mut file: ExperimentFile, model: &UnderModel) -> Result<Con
     let Learnt { data, input, convolutions, hidden, outputs, .. } = learnt;
     let Learnt { network, learning, mantissas, policy, .. } = learnt;
     let Network { activations, weight_max_log2, bias, gain_64ths, homeostasis } = network;
-    let Learning { kind, mode, centre, route, batch, rates, decay, optimiser, .. } = learning;
+    let Learning { kind, mode, centre, control, route, batch, rates, decay, optimiser, .. } =
+        learning;
     let Learning { error, centred, epochs, shift_pixels, flip, train_on, select, .. } = learning;
     #[cfg(feature = "grown")]
     file.learning.get_or_insert_default().grown.get_or_insert(0);
@@ -250,6 +253,7 @@ pub(super) fn config(mut file: ExperimentFile, model: &UnderModel) -> Result<Con
         mode,
         error,
         centre,
+        control,
         centred,
         route,
         batch,

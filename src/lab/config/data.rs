@@ -321,7 +321,7 @@ impl Config {
     /// When the set is unknown or a key is missing.
     pub fn source(&self) -> Result<Source, ConfigError> {
         if let Some(policy) = &self.policy {
-            return Ok(Source::Environment(policy.environment.id.into()));
+            return Ok(Source::Environment(policy.environment.id.to_string()));
         }
         let data = &self.data;
         if data.format.is_some() {
@@ -352,7 +352,7 @@ impl Config {
     #[must_use]
     pub fn data_name(&self) -> String {
         if let Some(policy) = &self.policy {
-            return policy.environment.id.into();
+            return policy.environment.id.to_string();
         }
         let own = || {
             let file = Path::new(self.data.train.as_deref()?).file_name()?.to_string_lossy();

@@ -83,7 +83,7 @@ impl Config {
             table.extend(resolved.get(said).map(|value| (said.to_owned(), value.clone())));
         }
         if let Some(policy) = &self.policy {
-            let id = toml::Value::String(policy.environment.id.into());
+            let id = toml::Value::String(policy.environment.id.to_string());
             layers::overlay(&mut table, layers::setting("environment.id", id));
         }
         let rule = toml::Value::String(self.rule_name().to_owned());

@@ -158,6 +158,7 @@ impl Config {
             decay: self.decay,
             optimisers: vec![self.optimiser; count],
             centred: vec![self.centred; count],
+            control: self.control,
         }
     }
 

@@ -200,6 +200,10 @@ keys! {
         optimiser: String,
         /// Optimiser `sign`: sums below the root mean square of their layer ask for nothing.
         dead_zone: bool,
+        /// Optimiser `momentum`: what an accumulator forgets of itself at a write, as 2^-shift.
+        momentum_shift: i64,
+        /// Optimiser `adam_fx`: what the mean of sums and the mean of their squares forget of themselves at a write, as 2^-shift.
+        adam_shifts: [i64; 2],
         /// Whether layers learn from what differs from the mean of each row; of policies, hidden layers of the network that acts.
         centred: bool,
         /// Rate, before multipliers; of the optimiser `sign` the probability of a pulse, of `rms` and `adam_fx` a step of weights.
@@ -216,6 +220,8 @@ keys! {
         temperature: f64,
         /// What is subtracted from errors.
         centre: String,
+        /// What is taken away, to see whether it is needed.
+        control: String,
         /// How errors reach hidden units.
         route: String,
         /// Words a hidden unit adds.
@@ -263,6 +269,8 @@ keys! {
         log_sigma: f64,
         /// Continuous actions: how far that logarithm moves in an update for a mean error of 1.
         log_sigma_rate: f64,
+        /// Continuous actions: steps for which what was drawn stands.
+        noise_steps: i64,
     }
     /// `[es]`: policies by evolution.
     EvolutionFile {

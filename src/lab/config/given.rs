@@ -15,7 +15,7 @@ use crate::chip::layer::{DrivenBy, Gain, Homeostasis, InitialLevels, LayerSpec, 
 use crate::learn::error::{Centre, OutputError};
 use crate::learn::network::NetworkSpec;
 use crate::learn::route::Route;
-use crate::learn::rule::{Rule, UpdateMode};
+use crate::learn::rule::{Control, Rule, UpdateMode};
 use crate::num::tables::{Activation, Decay};
 use crate::task::classify::{Augment, Coding, Experiment, WHITE_NAME};
 use crate::task::policy::{Evaluating, Evolution, InputCoding, Method, PolicyExperiment, Ppo};
@@ -74,6 +74,10 @@ const FROZEN: &[(&str, &str)] = &[
     ("layer.mantissa", "1"),
     ("layer.optimiser", "plain"),
     ("layer.centred", "false"),
+    ("learning.control", "none"),
+    ("actor.control", "none"),
+    ("critic.control", "none"),
+    ("ppo.noise_steps", "1"),
     ("layer.pool", "none"),
     ("layer.threshold", "false"),
     ("layer.gain", "table"),
@@ -191,8 +195,17 @@ fn policy(experiment: &PolicyExperiment) -> Vec<Given> {
     list.network("actor", 0, actor);
     match method {
         Method::Ppo(ppo) => {
-            let Ppo { passes, discount, lambda, clip, entropy, log_sigma_start, log_sigma_rate } =
-                ppo;
+            let Ppo {
+                passes,
+                discount,
+                lambda,
+                clip,
+                entropy,
+                log_sigma_start,
+                log_sigma_rate,
+                noise_steps,
+            } = ppo;
+            list.put("ppo.noise_steps", noise_steps);
             list.network("critic", actor.layers.len(), critic);
             list.put("ppo.passes", passes);
             // as the core has them: units of 2^-31
@@ -254,6 +267,7 @@ impl List {
             decay,
             optimisers,
             centred,
+            control,
         } = network;
         for (number, (layer, rate)) in (first..).zip(layers.iter().zip(rates)) {
             self.layer(number, layer);
@@ -299,6 +313,13 @@ impl List {
             Some(Route::ScalarBroadcast) => "scalar_broadcast".into(),
             Some(Route::RandomDense { shift }) => format!("random_dense{}", shifted(shift)),
         };
+        let control = match control {
+            Control::None => "none",
+            Control::FrozenHidden => "frozen_hidden",
+            Control::SameSignHidden => "same_sign_hidden",
+            Control::SameSign => "same_sign",
+        };
+        self.put(&format!("{head}.control"), control);
         self.put(&format!("{head}.rule"), rule);
         self.put(&format!("{head}.mode"), mode);
         let error = match error {

@@ -86,7 +86,7 @@ impl Config {
         let experiment = PolicyExperiment {
             seed: self.seed,
             hardware: self.hardware.clone(),
-            environment: policy.environment.id.into(),
+            environment: policy.environment.id.to_string(),
             environments: policy.environments,
             input: policy.input,
             actor,

@@ -118,9 +118,9 @@ impl Session {
         }
     }
 
-    /// What the first network executed in its last update.
-    pub(crate) fn take_tape(&mut self) -> Vec<Recorded> {
-        let mut networks = self.task.networks_mut().into_iter();
+    /// What a network executed in its last update.
+    pub(crate) fn take_tape(&mut self, network: usize) -> Vec<Recorded> {
+        let mut networks = self.task.networks_mut().into_iter().skip(network);
         networks.next().map_or_else(Vec::new, |network| network.engine_mut().record(false))
     }
 

@@ -4,10 +4,10 @@
 use super::{NetworkError, NetworkSpec};
 use crate::chip::hardware::{Adc, Hardware, WriteScheme};
 use crate::chip::layer::{self, DrivenBy, InitialLevels, LayerSpec, Optimiser};
-use crate::chip::population::Wiring;
+use crate::chip::population::{Stream, Wiring};
 use crate::learn::error::{Centre, OutputError};
 use crate::learn::route::Route;
-use crate::learn::rule::{Readout, Rule, UpdateMode};
+use crate::learn::rule::{Control, Readout, Rule, UpdateMode};
 use crate::num::fixed::OutOfRange;
 use crate::num::tables::{Activation, Lut, SHIFT_MAX, STEP_SHIFT_MAX};
 
@@ -44,6 +44,7 @@ pub(super) fn check(network: &NetworkSpec, hardware: &Hardware) -> Checked {
     batches(network, hardware)?;
     convolutions(network, hardware)?;
     routes(network)?;
+    control(network)?;
     optimisers(network, hardware)?;
     rates(network, hardware)
 }
@@ -352,6 +353,32 @@ fn routes(network: &NetworkSpec) -> Checked {
         Some(shift) if shift > TAP_SHIFT_MAX => {
             let allowed = format!("a sum of words needs at most {TAP_SHIFT_MAX}");
             misfit("learning.tap_shift", format!("is {shift}"), allowed)
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Something to take away.
+fn control(network: &NetworkSpec) -> Checked {
+    const KEY: &str = "learning.control";
+    let hidden = network.layers.len() > 1;
+    match network.control {
+        Control::FrozenHidden if !hidden => {
+            let allowed = "there is no hidden layer to freeze; add one, or take the key out";
+            misfit(KEY, "is \"frozen_hidden\"", allowed)
+        }
+        Control::SameSignHidden if !hidden => {
+            let allowed = "there is no hidden layer that could hear the wrong sign; add one, or take the key out";
+            misfit(KEY, "is \"same_sign_hidden\"", allowed)
+        }
+        control if control.is_alike(false) => {
+            let hears_n = |layer: &LayerSpec| layer.wiring.targets().contains(&Stream::N);
+            if network.layers.iter().any(hears_n) {
+                return Ok(());
+            }
+            let allowed = "no layer has a stream n that could hear the wrong sign: it belongs to rules with two \
+                           populations and hidden layers, or outputs read as \"p-n\"; take the key out";
+            misfit(KEY, "is a wrong sign in stream n", allowed)
         }
         _ => Ok(()),
     }

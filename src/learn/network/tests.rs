@@ -40,6 +40,7 @@ fn plain() -> NetworkSpec {
         decay: Decay::Constant,
         optimisers: vec![Optimiser::Plain; 2],
         centred: vec![false; 2],
+        control: Control::None,
     }
 }
 
@@ -78,7 +79,7 @@ fn refused(network: &NetworkSpec) -> NetworkError {
 #[test]
 fn everything_that_does_not_fit_together_is_refused_with_its_key() {
     type Change = fn(&mut NetworkSpec);
-    let cases: [(&str, &str, Change); 56] = [
+    let cases: [(&str, &str, Change); 60] = [
         ("network.hidden", "0 layers", |n| n.layers.clear()),
         ("network.hidden", "a layer of 0 units", |n| n.layers[1].units = 0),
         ("network.hidden", "a layer of 0 inputs", |n| n.layers[0].inputs = 0),
@@ -148,6 +149,24 @@ fn everything_that_does_not_fit_together_is_refused_with_its_key() {
         ("learning.taps", "in 1..=3", |n| n.route = modulo(4, None)),
         ("learning.tap_shift", "no sum", |n| n.route = modulo(1, Some(0))),
         ("learning.tap_shift", "at most 16", |n| n.route = modulo(2, Some(17))),
+        ("learning.control", "no hidden layer to freeze", |n| {
+            n.layers.remove(0);
+            n.layers[0].driven_by = DrivenBy::Shared;
+            n.control = Control::FrozenHidden;
+        }),
+        ("learning.control", "no hidden layer that could hear", |n| {
+            n.layers.remove(0);
+            n.layers[0].driven_by = DrivenBy::Shared;
+            n.control = Control::SameSignHidden;
+        }),
+        ("learning.control", "no layer has a stream n", |n| {
+            n.layers.remove(0);
+            n.layers[0].driven_by = DrivenBy::Shared;
+            n.control = Control::SameSign;
+        }),
+        ("learning.control", "no layer has a stream n", |n| {
+            *n = NetworkSpec { control: Control::SameSignHidden, ..baseline(Rule::Dfa) };
+        }),
         ("learning.rate_multipliers", "makes 1 rates", |n| n.rates.truncate(1)),
         ("learning.rate", "layer 1 a k of 33", |n| {
             n.rates[1] = Positive::new(5e-6).unwrap();
@@ -269,6 +288,10 @@ fn what_lies_at_the_edge_is_built() {
         NetworkSpec { batch: Batch::new(1).unwrap(), centre: Centre::None, ..plain() },
         baseline(Rule::Dfa),
         baseline(Rule::Bp),
+        NetworkSpec { control: Control::FrozenHidden, ..baseline(Rule::Bp) },
+        NetworkSpec { control: Control::FrozenHidden, ..plain() },
+        NetworkSpec { control: Control::SameSignHidden, ..plain() },
+        NetworkSpec { control: Control::SameSign, ..plain() },
         NetworkSpec {
             optimisers: vec![Optimiser::Sign { dead_zone: true }; 2],
             rates: vec![Positive::ONE, Positive::new(1.0 / 65_536.0).unwrap()],

@@ -13,10 +13,11 @@ use crate::learn::network::NetworkError;
 ///
 /// ```
 /// use dalean::network::{
-///     Activation, Centre, Coding, Decay, DrivenBy, Homeostasis, InitialLevels, LayerSpec, Pool, Wiring,
+///     Activation, Centre, Coding, Control, Decay, DrivenBy, Homeostasis, InitialLevels, LayerSpec,
+///     Pool,
 /// };
 /// use dalean::network::{
-///     Batch, Optimiser, OutputError, Positive, RateMantissa, Route, Rule, UpdateMode,
+///     Batch, Optimiser, OutputError, Positive, RateMantissa, Route, Rule, UpdateMode, Wiring,
 /// };
 /// use dalean::{Backend, Classifier, Examples, Experiment, Hardware, NetworkSpec};
 ///
@@ -53,6 +54,7 @@ use crate::learn::network::NetworkError;
 ///     decay: Decay::Constant,
 ///     optimisers: vec![Optimiser::Plain; 2],
 ///     centred: vec![false; 2],
+///     control: Control::None,
 /// };
 /// let hardware = Hardware::reference();
 /// let coding = Coding::Values;

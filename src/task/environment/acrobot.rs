@@ -67,7 +67,7 @@ fn moved(from: [Fine; 4], time: Fine, change: [Fine; 4]) -> [Fine; 4] {
 impl Environment for Acrobot {
     fn spec() -> EnvSpec {
         EnvSpec {
-            id: "Acrobot-v1",
+            id: "Acrobot-v1".into(),
             shown: Shown::Dense(6),
             taken: Taken::Discrete(3),
             steps_max: 500,

@@ -52,7 +52,7 @@ fn held(speed: Fine) -> Fine {
 impl Environment for CartPole {
     fn spec() -> EnvSpec {
         EnvSpec {
-            id: "CartPole-v1",
+            id: "CartPole-v1".into(),
             shown: Shown::Dense(4),
             taken: Taken::Discrete(2),
             steps_max: 500,

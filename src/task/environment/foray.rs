@@ -197,7 +197,7 @@ fn line(number: usize) -> u32 {
 impl Environment for Foray {
     fn spec() -> EnvSpec {
         EnvSpec {
-            id: "Foray-v0",
+            id: "Foray-v0".into(),
             shown: Shown::Sparse { lines: LINES, active: SEEN + 1 + CARRIED + 1 },
             taken: Taken::Discrete(DIRECTIONS.len()),
             steps_max: 300,

@@ -35,7 +35,7 @@ pub struct MountainCar {
 impl Environment for MountainCar {
     fn spec() -> EnvSpec {
         EnvSpec {
-            id: "MountainCarContinuous-v0",
+            id: "MountainCarContinuous-v0".into(),
             shown: Shown::Dense(2),
             taken: Taken::Continuous(1),
             steps_max: 999,

@@ -147,7 +147,7 @@ impl<E: Environment> SideBySide<E> {
     /// When they are more or fewer numbers than the state has, or one of them is out of its range.
     pub fn put(&mut self, which: usize, numbers: &[i64]) -> Result<(), EnvError> {
         let wrong = |found: String, allowed: String| EnvError {
-            id: self.spec.id.into(),
+            id: self.spec.id.to_string(),
             which,
             found,
             allowed,
@@ -176,7 +176,7 @@ impl<E: Environment> SideBySide<E> {
     /// Of what kind, how many and how large actions are.
     fn check(&self, actions: Actions<'_>) -> Result<(), EnvError> {
         let wrong = |which, found: String, allowed: String| {
-            Err(EnvError { id: self.spec.id.into(), which, found, allowed })
+            Err(EnvError { id: self.spec.id.to_string(), which, found, allowed })
         };
         let (each, given) = match (self.spec.taken, actions) {
             (Taken::Discrete(choices), Actions::Discrete(actions)) => {

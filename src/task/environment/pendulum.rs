@@ -39,7 +39,7 @@ pub struct Pendulum {
 impl Environment for Pendulum {
     fn spec() -> EnvSpec {
         EnvSpec {
-            id: "Pendulum-v1",
+            id: "Pendulum-v1".into(),
             shown: Shown::Dense(3),
             taken: Taken::Continuous(1),
             steps_max: 200,

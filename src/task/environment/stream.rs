@@ -398,7 +398,7 @@ impl VecEnv for ReplayedEnv {
 
     fn step(&mut self, _: Actions<'_>, outcomes: &mut Outcomes) -> Result<(), EnvError> {
         self.next(false, outcomes).ok_or_else(|| EnvError {
-            id: self.spec.id.into(),
+            id: self.spec.id.to_string(),
             which: 0,
             found: "is replayed from a record that has no such step".into(),
             allowed: "a record can be replayed by the configuration alone that it was made with"

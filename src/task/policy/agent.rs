@@ -7,7 +7,7 @@
 //!         then the rollout joins the statistics that the next one is standardised by
 //! ```
 //!
-//! Draws: exploration at site 7, sub = environment, count = step since the start; order of steps at site 2, count = pass since
+//! Draws: exploration at site 7, sub = environment, count = step since the start, of continuous actions over `noise_steps`; order of steps at site 2, count = pass since
 //! the start. See docs/MODEL.md, 5.
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
@@ -20,7 +20,7 @@ use super::rollout::Rollout;
 use crate::chip::state::{Piece, Section, State, StateError, Visitor, visit_counts};
 use crate::num::draw::{self, Place, Site};
 use crate::num::fixed::narrow;
-use crate::task::environment::{EnvError, Observations, Outcomes};
+use crate::task::environment::{EnvError, Observations, Outcomes, Taken};
 
 /// A policy that learns.
 #[derive(Debug)]
@@ -91,7 +91,11 @@ impl Agent {
         }
         rollout.shown.extend_from_slice(&shown.values);
         let _ = player.actor.read(&rollout.codes[from..]);
-        let place = Place::global(settings.seed, Site::Exploration, self.steps);
+        let drawn = match player.spec.taken {
+            Taken::Discrete(_) => self.steps,
+            Taken::Continuous(_) => self.steps / u64::from(settings.ppo.noise_steps),
+        };
+        let place = Place::global(settings.seed, Site::Exploration, drawn);
         player.actor.act(&player.tables, place, rollout)
     }
 
@@ -127,6 +131,11 @@ impl Agent {
         self.shown.clone_from(&outcomes.next);
         self.steps += 1;
         Ok(())
+    }
+
+    /// Steps of each environment since the start.
+    pub(super) const fn steps(&self) -> u64 {
+        self.steps
     }
 
     /// Whether it is time to learn.
@@ -183,8 +192,9 @@ impl State for Agent {
         };
         if let Some(going) = visitor.numbers(&piece, &going)? {
             self.going = going.as_chunks::<2>().0.to_vec();
+            // a state is put back as it was between rollouts; who looks alone forgets nothing
+            self.rollout.clear();
         }
-        self.rollout.clear();
         Ok(())
     }
 }

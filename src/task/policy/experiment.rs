@@ -22,6 +22,9 @@ pub enum InputCoding {
     Offset,
 }
 
+/// Steps of a run, at most.
+const STEPS_MAX: u64 = 1 << 40;
+
 /// Everything that decides a result.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PolicyExperiment {
@@ -85,7 +88,7 @@ impl PolicyExperiment {
     #[must_use]
     pub const fn rows(&self, spec: &EnvSpec) -> usize {
         match (spec.shown, self.input) {
-            (Shown::Dense(values), InputCoding::Split) => 2 * values,
+            (Shown::Dense(values), InputCoding::Split) => values.saturating_mul(2),
             (Shown::Dense(values), InputCoding::Offset) => values,
             (Shown::Sparse { lines, .. }, _) => lines,
         }
@@ -98,6 +101,23 @@ impl PolicyExperiment {
             Taken::Discrete(actions) => actions,
             Taken::Continuous(values) => values,
         }
+    }
+
+    /// The same on another environment: what is acted on, inputs of the first layers and outputs of the actor are as that has
+    /// them.
+    #[must_use]
+    pub fn facing(mut self, spec: &EnvSpec) -> Self {
+        self.environment = spec.id.to_string();
+        let (rows, outputs) = (self.rows(spec), Self::outputs(spec));
+        for (network, units) in [(&mut self.actor, outputs), (&mut self.critic, 1)] {
+            if let Some(first) = network.layers.first_mut() {
+                first.inputs = rows;
+            }
+            if let Some(last) = network.layers.last_mut() {
+                last.units = units;
+            }
+        }
+        self
     }
 
     /// Checks that everything fits together, on the chip, and with the environment.
@@ -119,11 +139,14 @@ impl PolicyExperiment {
             return Err(NetworkError::misfit(key, "is 0", "give at least 1"));
         }
         let epoch = self.steps_per_epoch();
-        if self.steps == 0 || self.steps.div_ceil(epoch) > u64::from(u32::MAX) || epoch > 1 << 24 {
+        let few = self.steps > STEPS_MAX || self.steps.div_ceil(epoch) > u64::from(u32::MAX);
+        if self.steps == 0 || few || epoch > 1 << 24 {
             let found = format!("is {}, in epochs of {epoch}", self.steps);
-            let allowed = "give 1 step or more, in 2^32 epochs at most of 2^24 steps at most";
+            let allowed =
+                "give 1 step or more, 2^40 at most, in 2^32 epochs at most of 2^24 steps at most";
             return Err(NetworkError::misfit("environment.steps", found, allowed));
         }
+        self.method.check()?;
         let networks = [(&self.actor, Self::outputs(spec)), (&self.critic, 1)];
         for (network, outputs) in networks {
             network.check(&self.hardware)?;
@@ -160,6 +183,53 @@ pub enum Method {
     Evolution(Evolution),
 }
 
+impl Method {
+    /// Checks that every number is one that it can be.
+    fn check(self) -> Result<(), NetworkError> {
+        let wrong = |key, found: &dyn std::fmt::Display, allowed: &str| {
+            Err(NetworkError::misfit(key, format_args!("is {found}"), allowed))
+        };
+        match self {
+            Self::Ppo(ppo) => {
+                let shares = [
+                    ("ppo.gamma", ppo.discount),
+                    ("ppo.lambda", ppo.lambda),
+                    ("ppo.clip", ppo.clip),
+                    ("ppo.entropy", ppo.entropy),
+                    ("ppo.log_sigma_rate", ppo.log_sigma_rate),
+                ];
+                if let Some((key, share)) =
+                    shares.into_iter().find(|(_, share)| *share > Share::ONE)
+                {
+                    return wrong(key, &share, "it must lie in 0..=1");
+                }
+                if !(1..=1000).contains(&ppo.passes) {
+                    return wrong("ppo.passes", &ppo.passes, "it must lie in 1..=1000");
+                }
+                if !(-4 << 16..=1 << 16).contains(&ppo.log_sigma_start) {
+                    let allowed = "in units of 2^-16 it must lie in -4..=1";
+                    return wrong("ppo.log_sigma", &ppo.log_sigma_start, allowed);
+                }
+                if !(1..=1024).contains(&ppo.noise_steps) {
+                    return wrong("ppo.noise_steps", &ppo.noise_steps, "it must lie in 1..=1024");
+                }
+            }
+            Self::Evolution(Evolution { pairs, step, shift }) => {
+                if !(1..=4096).contains(&pairs) {
+                    return wrong("es.pairs", &pairs, "it must lie in 1..=4096");
+                }
+                if !(1..=4095).contains(&step) {
+                    return wrong("es.step", &step, "it must lie in 1..=4095");
+                }
+                if shift > 16 {
+                    return wrong("es.shift", &shift, "it must lie in 0..=16");
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
 /// Proximal policy optimisation (Schulman et al. 2017). The minibatch is the batch of both networks.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Ppo {
@@ -177,6 +247,8 @@ pub struct Ppo {
     pub log_sigma_start: i32,
     /// Continuous actions: how far `ln sigma` moves in an update for a mean error of 1.
     pub log_sigma_rate: Share,
+    /// Continuous actions: steps for which what was drawn stands, so that what is tried lasts.
+    pub noise_steps: u32,
 }
 
 /// Antithetic evolution strategies with ranks (Salimans et al. 2017), in integers.

@@ -15,10 +15,12 @@ use crate::chip::state::{Piece, Seen, State, Visitor};
 use crate::learn::error::{Centre, OutputError};
 use crate::learn::network::{NetworkPlace, NetworkSpec};
 use crate::learn::route::Route;
-use crate::learn::rule::{Rule, UpdateMode};
+use crate::learn::rule::{Control, Rule, UpdateMode};
 use crate::num::fixed::{Batch, RateMantissa};
 use crate::num::tables::{Activation, Decay, Positive};
 use crate::task::environment::{self, EnvSource, EnvSpec, Replaying};
+
+mod outside;
 
 /// Everything that a state shows, as text; and, where it is told to, what a state is to be replaced by.
 #[derive(Default)]
@@ -77,7 +79,7 @@ impl Visitor for Book {
     }
 }
 
-fn book(trainer: &mut PolicyTrainer) -> Book {
+fn book(trainer: &mut dyn State) -> Book {
     let mut book = Book::default();
     trainer.visit(&mut book).expect("nothing is replaced");
     book
@@ -116,6 +118,7 @@ fn network(inputs: usize, outputs: usize, rule: Rule) -> NetworkSpec {
         decay: Decay::Linear,
         optimisers: vec![Optimiser::Sign { dead_zone: true }; 2],
         centred: vec![outputs > 1, false],
+        control: Control::None,
     }
 }
 
@@ -129,6 +132,7 @@ fn experiment(id: &str, rule: Rule, method: Option<Method>) -> PolicyExperiment 
         entropy: Share::from_num(0.01),
         log_sigma_start: 0,
         log_sigma_rate: Share::from_num(0.01),
+        noise_steps: 1,
     };
     let hardware = Hardware::reference().with(|chip| chip.tile.transposed_read = true).unwrap();
     let outputs = PolicyExperiment::outputs(&spec);

@@ -1,42 +1,34 @@
 //! A training in native environments: rollouts, updates, and episodes without learning.
 //!
 //! ```text
-//! calibration   256 steps in all under uniform actions; both networks' converters look at them; then all begin anew
+//! calibration   uniform actions; both networks' converters look at what they lead to; then all begin anew
 //! epoch         `rollouts` rollouts with their updates, or so many generations
 //! evaluation    environments of their own, whose seed has its highest bit turned: the same episodes at every look
 //! ```
 //!
-//! Draws beside those of a policy that learns: uniform actions at site 7, pathway 1, sub = environment, count = step; drawn
-//! actions of episodes without learning at pathway 2. See docs/MODEL.md, 5.
+//! Actions of episodes without learning that are drawn are drawn at site 7, pathway 2. See docs/MODEL.md, 5.
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
-use super::actor::{Actor, ActorLaw, Chosen};
 use super::agent::Agent;
-use super::critic::Critic;
 use super::evolution::Evolver;
 use super::experiment::{Method, PolicyExperiment};
-use super::observe::Statistics;
 use super::outcome::{PolicyEpoch, PolicyEvaluation, PolicyProgress, WatchedStep};
 use super::player::{Manner, Player};
-use super::rollout::Coding;
+use super::start;
 use crate::chip::crossbar::kernel::Backend;
 use crate::chip::engine::Phase;
 use crate::chip::state::{Piece, Section, State, StateError, Visitor};
 use crate::learn::driver::Driver;
-use crate::learn::network::{NetworkError, NetworkPlace, NetworkSpec};
+use crate::learn::network::NetworkError;
 use crate::learn::statistics::{self, FloorMap, PathwayRecord};
-use crate::num::draw::{Place, Site, below};
-use crate::num::fixed::narrow;
-use crate::num::tables::PolicyTables;
+use crate::num::draw::{Place, Site};
 use crate::task::environment::{
-    self, EnvError, EnvSource, EnvSpec, Observations, Outcomes, Purpose, Real, Record, Taken,
+    self, EnvError, EnvSource, EnvSpec, Observations, Outcomes, Purpose, Record,
     UnknownEnvironment, VecEnv,
 };
 
-/// Steps whose observations are looked at before anything is learnt.
-const CALIBRATION: usize = 256;
 /// What distinguishes the environments of evaluation.
-const ELSEWHERE: u64 = 1 << 63;
+pub(super) const ELSEWHERE: u64 = 1 << 63;
 
 /// Why a policy cannot be trained, or not further.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -51,6 +43,14 @@ pub enum PolicyError {
     /// An environment that cannot go on. The state is that before the step.
     #[error(transparent)]
     Environment(#[from] EnvError),
+    /// Something that is not waited for now. Nothing has moved.
+    #[error("`{call}` is called out of turn; {allowed}")]
+    Turn {
+        /// What was called.
+        call: &'static str,
+        /// What is to be called.
+        allowed: &'static str,
+    },
     /// Stopped by the caller inside an epoch, or no epoch is left.
     #[error("stopped")]
     Stopped,
@@ -133,30 +133,10 @@ impl PolicyTrainer {
     ) -> Result<Self, PolicyError> {
         let (id, count) = (&experiment.environment, experiment.environments as usize);
         let environments = source.make(id, experiment.seed, count, Purpose::Training)?;
-        let spec = environments.spec().clone();
-        experiment.check(&spec)?;
-        let first_layer = narrow(experiment.actor.layers.len(), "at most 64 layers");
-        let build = |network: &NetworkSpec, first_layer| {
-            let updates = experiment.updates();
-            let place = NetworkPlace { seed: experiment.seed, first_layer, updates };
-            network.build(&experiment.hardware, backend, place)
-        };
-        let law = match experiment.method {
-            Method::Ppo(ppo) => ppo.into(),
-            Method::Evolution(_) => ActorLaw::default(),
-        };
-        let statistics = Statistics::new(spec.values());
-        let player = Player {
-            actor: Actor::new(build(&experiment.actor, 0)?, spec.taken, law),
-            coding: Coding::new(experiment.input, experiment.hardware.drive.bits, &spec),
-            tables: PolicyTables::build(),
-            standard: statistics.freeze(),
-            statistics,
-            spec,
-        };
+        let player = start::player(&experiment, environments.spec().clone(), backend)?;
         let learner = match experiment.method {
             Method::Ppo(ppo) => {
-                let critic = Critic::new(build(&experiment.critic, first_layer)?);
+                let critic = start::critic(&experiment, backend)?;
                 Learner::Ppo(Box::new(Agent::new(&experiment, ppo, player, critic)))
             }
             Method::Evolution(law) => {
@@ -180,17 +160,13 @@ impl PolicyTrainer {
         let mut seen = Observations::default();
         let mut shown = Observations::default();
         environments.reset(&mut shown);
-        for step in 0..CALIBRATION.div_ceil(count) as u64 {
+        for step in 0..start::steps(count) {
             seen.append(&shown);
-            let place = Place::global(experiment.seed, Site::Exploration, step);
-            let actions = uniform(learner.spec().taken, count, place);
+            let actions = start::uniform(learner.spec().taken, count, experiment.seed, step);
             environments.step(actions.actions(), outcomes)?;
             std::mem::swap(&mut shown, &mut outcomes.next);
         }
-        let player = learner.player();
-        player.look(&seen);
-        let mut codes = Vec::new();
-        player.codes(&seen, &Vec::from_iter(0..CALIBRATION), &mut codes);
+        let codes = start::look(learner.player(), &seen);
         for driver in learner.networks_mut() {
             let _ = driver.engine_mut().calibrate(&codes);
         }
@@ -393,34 +369,8 @@ impl PolicyTrainer {
 }
 
 /// Where the actions of an episode are drawn that is not learnt from.
-const fn drawn_at(seed: u64) -> Place {
+pub(super) const fn drawn_at(seed: u64) -> Place {
     Place { pathway: 2, ..Place::global(seed, Site::Exploration, 0) }
-}
-
-/// Any action, each as likely as another: from the first word, or words, of the environment.
-fn uniform(taken: Taken, count: usize, place: Place) -> Chosen {
-    let words = |environment: u32| Place { pathway: 1, sub: environment, ..place }.words();
-    let environments = 0..narrow(count, "at most 1024");
-    match taken {
-        Taken::Discrete(actions) => {
-            let bound = narrow(actions, "an action has 16 bits");
-            let one = |environment| {
-                let word = words(environment).next().expect("the stream has no end");
-                narrow(below(word, bound), "an action has 16 bits")
-            };
-            Chosen::Discrete(environments.map(one).collect())
-        }
-        Taken::Continuous(values) => {
-            // from -1 to 1 in steps of 2^-16
-            let one = |word: u32| {
-                Real::from_bits(narrow(
-                    i64::from(below(word, (2 << 16) + 1)) - (1 << 16),
-                    "17 bits",
-                ))
-            };
-            Chosen::Continuous(environments.flat_map(|e| words(e).take(values).map(one)).collect())
-        }
-    }
 }
 
 impl State for PolicyTrainer {

@@ -11,14 +11,19 @@ use dalean::hardware::{
     SliceTimes, Subtract, TileSpec, Timing, Window, WriteScheme, WriteSpec,
 };
 use dalean::network::{
-    Activation, Augment, Batch, Centre, Coding, Decay, DrivenBy, Homeostasis, InitialLevels,
-    LayerSpec, Optimiser, OutputError, Pool, Positive, RateMantissa, Route, Rule, UpdateMode,
-    Wiring,
+    Activation, Augment, Batch, Centre, Coding, Control, Decay, DrivenBy, Homeostasis,
+    InitialLevels, LayerSpec, Optimiser, OutputError, Pool, Positive, RateMantissa, Route, Rule,
+    UpdateMode, Wiring,
 };
 use dalean::{
     Backend, Classifier, Config, Data, DataRoot, Examples, Experiment, Hardware, HardwareSpec,
     ImageShape, Machine, NetworkSpec, Session, Sources, Split,
 };
+
+const CONTROLS: [Control; 3] = [Control::FrozenHidden, Control::SameSign, Control::SameSignHidden];
+
+#[path = "outside.rs"]
+mod outside;
 
 /// What bytes are turned into; zeros follow the last one.
 struct Choices<'a>(&'a [u8]);
@@ -257,6 +262,7 @@ fn network(c: &mut Choices<'_>, inputs: usize, outputs: usize) -> NetworkSpec {
         decay: c.of(&[Decay::Constant, Decay::Cosine, Decay::Linear]),
         optimisers: (0..count).map(|_| c.of(&optimisers)).collect(),
         centred: (0..count).map(|_| c.one_in(16)).collect(),
+        control: if c.one_in(8) { c.of(&CONTROLS) } else { Control::None },
     }
 }
 
@@ -474,16 +480,7 @@ fn own(c: &mut Choices<'_>) -> Option<Data> {
         height: c.size(1, 3),
         width: c.size(1, 3),
         channels: c.size(1, 1),
-        flip: c.one_in(2),
     });
-    let image = [c.size(1, 4), c.size(1, 4), c.size(1, 3)];
-    let coding = c.of(&[
-        Coding::Values,
-        Coding::Values,
-        Coding::Pixels { image },
-        Coding::OnOff { image },
-        Coding::White { image },
-    ]);
     Data::new("own", Split { train, validation, test }, image).map_err(|e| shown(&e)).ok()
 }
 
@@ -492,6 +489,7 @@ pub(super) fn play(bytes: &[u8]) {
     let mut c = Choices(bytes);
     match c.byte() % 8 {
         0 => configure(&mut c),
+        4 => outside::policy(&mut c),
         1..=3 => run(&mut c),
         _ => classify(&mut c),
     }

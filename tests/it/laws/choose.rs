@@ -182,13 +182,13 @@ fn delivery(numbers: &mut Numbers, units: usize, above: bool) -> Delivery {
         5 => {
             let taps = Taps { width: 1, per_unit: 1, words: vec![0; units], shift: 0 };
             let outputs = numbers.within(1, 17) as usize;
-            Delivery { source: WordSource::Sum { outputs, shift }, taps }
+            Delivery { source: WordSource::Sum { outputs, shift }, taps, alike: false }
         }
         6 | 7 => {
             let signs = units * numbers.within(1, 17) as usize;
             let signs = (0..signs).map(|_| 1 - 2 * numbers.within(0, 1) as i16).collect();
             let source = WordSource::Signed { signs, shift };
-            Delivery { source, taps: Taps::identity(units) }
+            Delivery { source, taps: Taps::identity(units), alike: false }
         }
         _ => {
             let width = numbers.within(1, 17);
@@ -255,6 +255,8 @@ pub(crate) fn net(sides: impl Strategy<Value = Vec<usize>>) -> impl Strategy<Val
                     }
                 }
             }
+            // now and then, stream n hears what stream p does
+            deliveries.iter_mut().for_each(|made| made.alike = numbers.within(0, 5) == 0);
             Net {
                 seed,
                 hardware,

@@ -9,7 +9,7 @@ use dalean::lab::store::hash;
 use dalean::learn::error::{Centre, OutputError};
 use dalean::learn::network::NetworkSpec;
 use dalean::learn::route::Route;
-use dalean::learn::rule::{Rule, UpdateMode};
+use dalean::learn::rule::{Control, Rule, UpdateMode};
 use dalean::num::fixed::{Batch, RateMantissa};
 use dalean::num::tables::{Decay, Positive};
 use dalean::task::classify::{Augment, Coding, Examples, Experiment, Trainer};
@@ -101,6 +101,11 @@ fn run() -> impl Strategy<Value = Run> {
                 hardware = hardware.with(both_sides).unwrap();
             }
             let count = layers.len();
+            let control = match raw[1] >> 5 {
+                0 if count > 1 => Control::FrozenHidden,
+                1 if count > 1 && !matches!(rule, Rule::Dfa | Rule::Bp) => Control::SameSign,
+                _ => Control::None,
+            };
             let rates = [1.0, 20.0, 300.0, 5000.0];
             let rates = layers.iter().map(|layer| Positive::new(rates[layer.3]).unwrap()).collect();
             let specs = layers.into_iter().enumerate().map(|(at, (activation, weight, row, _))| {
@@ -137,6 +142,7 @@ fn run() -> impl Strategy<Value = Run> {
                 decay,
                 optimisers: vec![Optimiser::Plain; count],
                 centred: vec![false; count],
+                control,
             };
             let augment = image.then(|| moved(sides[0])).flatten();
             let coding = Coding::Values;

@@ -1,14 +1,16 @@
 //! `[learning]`: rule, batches, rates, and which state is kept.
 
 use super::style::Style;
-use super::{Select, TrainOn, one_a_layer, per_layer, positive, range, route, word, wrong};
+use super::{
+    Select, TrainOn, between, one_a_layer, per_layer, positive, range, route, word, wrong,
+};
 use crate::chip::layer::Optimiser;
 use crate::lab::config::ConfigError;
 use crate::lab::config::defaults::policy;
 use crate::lab::config::file::{LearningFile, MantissaFile};
 use crate::learn::error::{Centre, OutputError};
 use crate::learn::route::Route;
-use crate::learn::rule::{Rule, UpdateMode};
+use crate::learn::rule::{Control, Rule, UpdateMode};
 use crate::num::fixed::{Batch, RateMantissa};
 use crate::num::tables::{Decay, Positive, Rate};
 
@@ -62,6 +64,13 @@ pub(super) const MODES: [(&str, UpdateMode); 3] = [
 /// `learning.centre`.
 pub(super) const CENTRES: [(&str, Centre); 3] =
     [("none", Centre::None), ("batch", Centre::Batch), ("running", Centre::Running)];
+/// `learning.control`.
+pub(super) const CONTROLS: [(&str, Control); 4] = [
+    ("none", Control::None),
+    ("frozen_hidden", Control::FrozenHidden),
+    ("same_sign_hidden", Control::SameSignHidden),
+    ("same_sign", Control::SameSign),
+];
 /// `learning.decay`.
 pub(super) const DECAYS: [(&str, Decay); 3] =
     [("cosine", Decay::Cosine), ("linear", Decay::Linear), ("constant", Decay::Constant)];
@@ -90,6 +99,7 @@ pub(super) struct Learning {
     pub(super) kind: Kind,
     pub(super) mode: UpdateMode,
     pub(super) centre: Centre,
+    pub(super) control: Control,
     pub(super) centred: bool,
     pub(super) error: OutputError,
     pub(super) route: Option<Route>,
@@ -111,6 +121,7 @@ impl Learning {
             kind: Kind { rule: Rule::Ed, seeded: false },
             mode: UpdateMode::Accumulate,
             centre: Centre::None,
+            control: Control::None,
             centred: false,
             error: OutputError::OneVsAll,
             route: Some(Route::Modulo { taps: 1, shift: None }),
@@ -165,6 +176,7 @@ pub(super) fn resolve(
         kind,
         mode,
         centre,
+        control: word("learning.control", &mut file.control, "none", &CONTROLS)?,
         centred: *file.centred.get_or_insert(style.keeps_middles()),
         error,
         route: route::resolve(file, kind.rule, style.taps())?,
@@ -205,20 +217,47 @@ pub(super) fn optimiser(
     default: &str,
     dead_zone: bool,
 ) -> Result<Optimiser, ConfigError> {
-    match word("learning.optimiser", &mut file.optimiser, default, &OPTIMISERS)? {
-        Optimiser::Sign { .. } => {
-            let dead_zone = *file.dead_zone.get_or_insert(dead_zone);
-            Ok(Optimiser::Sign { dead_zone })
+    let chosen = word("learning.optimiser", &mut file.optimiser, default, &OPTIMISERS)?;
+    let refused = |key: &str, optimiser: &str, found: Option<String>| match found {
+        None => Ok(()),
+        Some(found) => {
+            let allowed = format!(
+                "it belongs to optimiser = \"{optimiser}\": take the key out (--set {key}=default), or choose that optimiser"
+            );
+            Err(wrong(key, format!("is {found}"), allowed))
         }
-        other => match file.dead_zone {
-            None => Ok(other),
-            Some(found) => {
-                let allowed = "it belongs to optimiser = \"sign\": take the key out (--set learning.dead_zone=default), or \
-                               choose that optimiser";
-                Err(wrong("learning.dead_zone", format!("is {found}"), allowed))
-            }
-        },
+    };
+    if !matches!(chosen, Optimiser::Sign { .. }) {
+        refused("learning.dead_zone", "sign", file.dead_zone.map(|found| found.to_string()))?;
     }
+    if !matches!(chosen, Optimiser::Momentum { .. }) {
+        let found = file.momentum_shift.map(|found| found.to_string());
+        refused("learning.momentum_shift", "momentum", found)?;
+    }
+    if !matches!(chosen, Optimiser::AdamFx { .. }) {
+        let found = file.adam_shifts.map(|found| format!("{found:?}"));
+        refused("learning.adam_shifts", "adam_fx", found)?;
+    }
+    let shift = |key, found| {
+        let shift = between(key, found, 1, 8)?;
+        Ok::<_, ConfigError>(u32::try_from(shift).expect("its range was checked"))
+    };
+    Ok(match chosen {
+        Optimiser::Sign { .. } => {
+            Optimiser::Sign { dead_zone: *file.dead_zone.get_or_insert(dead_zone) }
+        }
+        Optimiser::Momentum { decay } => {
+            let found = *file.momentum_shift.get_or_insert(decay.into());
+            Optimiser::Momentum { decay: shift("learning.momentum_shift", found)? }
+        }
+        Optimiser::AdamFx { first_decay, second_decay } => {
+            let [first, second] =
+                *file.adam_shifts.get_or_insert([first_decay, second_decay].map(i64::from));
+            let first_decay = shift("learning.adam_shifts", first)?;
+            Optimiser::AdamFx { first_decay, second_decay: shift("learning.adam_shifts", second)? }
+        }
+        other => other,
+    })
 }
 
 /// Rate times multiplier, of each layer.

@@ -163,7 +163,7 @@ pub(super) fn resolve(
         }
         Named::Rule(_) => {
             refuse(&[("es", file.es.is_some(), "it belongs to learning.rule = \"es\"")])?;
-            let defaults = PolicyDefaults::of(spec.id);
+            let defaults = PolicyDefaults::of(&spec.id);
             Method::Ppo(ppo(file.ppo.get_or_insert_default(), continuous, defaults)?)
         }
     };
@@ -220,7 +220,7 @@ fn learns(file: &mut LearningFile, rule: Rule, layers: usize) -> Result<Learning
     }
     let batch = *file.batch.get_or_insert(defaults::BATCH);
     let optimiser = learning::optimiser(file, "sign", true)?;
-    let rate = *file.rate.get_or_insert(defaults::rate(optimiser));
+    let rate = *file.rate.get_or_insert(defaults::rate_of(optimiser, rule));
     let rate = positive("learning.rate", rate)?;
     file.rate_multipliers.get_or_insert_with(|| defaults::multipliers(optimiser, layers));
     let factors = per_layer(MULTIPLIERS, &mut file.rate_multipliers, 1.0, layers)?;
@@ -228,6 +228,7 @@ fn learns(file: &mut LearningFile, rule: Rule, layers: usize) -> Result<Learning
         kind: Kind { rule, seeded: false },
         mode: word("learning.mode", &mut file.mode, "accumulate", &learning::MODES)?,
         centre,
+        control: word("learning.control", &mut file.control, "none", &learning::CONTROLS)?,
         route: route::resolve(file, rule, 1)?,
         batch: range("learning.batch", Batch::new(batch))?,
         rates: learning::products(rate, factors)?,
@@ -248,11 +249,14 @@ fn evolves(file: &mut LearningFile, layers: usize) -> Result<Learning, ConfigErr
         ("learning.centred", file.centred.is_some(), WHY),
         ("learning.optimiser", file.optimiser.is_some(), WHY),
         ("learning.dead_zone", file.dead_zone.is_some(), WHY),
+        ("learning.momentum_shift", file.momentum_shift.is_some(), WHY),
+        ("learning.adam_shifts", file.adam_shifts.is_some(), WHY),
         ("learning.rate", file.rate.is_some(), WHY),
         ("learning.rate_multipliers", file.rate_multipliers.is_some(), WHY),
         ("learning.rate_mantissa", file.rate_mantissa.is_some(), WHY),
         ("learning.decay", file.decay.is_some(), WHY),
         ("learning.centre", file.centre.is_some(), WHY),
+        ("learning.control", file.control.is_some(), WHY),
         ("learning.route", file.route.is_some(), WHY),
         ("learning.taps", file.taps.is_some(), WHY),
         ("learning.tap_shift", file.tap_shift.is_some(), WHY),
@@ -326,7 +330,7 @@ fn ppo(
 ) -> Result<Ppo, ConfigError> {
     let entropy = if continuous { defaults::ENTROPY_OF_NUMBERS } else { defaults.entropy };
     let passes = between("ppo.passes", *file.passes.get_or_insert(10), 1, 1000)?;
-    let (mut log_sigma_start, mut log_sigma_rate) = (0, Share::ZERO);
+    let (mut log_sigma_start, mut log_sigma_rate, mut noise_steps) = (0, Share::ZERO, 1);
     if continuous {
         let start = *file.log_sigma.get_or_insert(defaults::LOG_SIGMA);
         if !(-4.0..=1.0).contains(&start) {
@@ -335,12 +339,15 @@ fn ppo(
         log_sigma_start = Real::from_num(start).to_bits();
         let rate = *file.log_sigma_rate.get_or_insert(defaults::LOG_SIGMA_RATE);
         log_sigma_rate = share("ppo.log_sigma_rate", rate, 0.0, 1.0)?;
+        let steps = *file.noise_steps.get_or_insert(defaults::NOISE_STEPS);
+        noise_steps = small(between("ppo.noise_steps", steps, 1, 1024)?);
     } else {
         const WHY: &str =
             "the environment takes one of some actions, which have no spread: take the key out";
         refuse(&[
             ("ppo.log_sigma", file.log_sigma.is_some(), WHY),
             ("ppo.log_sigma_rate", file.log_sigma_rate.is_some(), WHY),
+            ("ppo.noise_steps", file.noise_steps.is_some(), WHY),
         ])?;
     }
     Ok(Ppo {
@@ -351,6 +358,7 @@ fn ppo(
         entropy: share("ppo.entropy", *file.entropy.get_or_insert(entropy), 0.0, 1.0)?,
         log_sigma_start,
         log_sigma_rate,
+        noise_steps,
     })
 }
 

@@ -335,7 +335,6 @@ const LEARNING: &[KeyEntry] = &[
         &[
             ("ed", "error diffusion under Dale's law"),
             ("ed_seed", "the same as the paper's seed rule: width 1, raw errors, symmetric gains"),
-            ("ed_non_dalean", "error diffusion on pathways of differential pairs: what Dale's law costs"),
             ("ed_non_dalean", "the same on differential pairs in two populations: what Dale's law costs"),
             ("kaneko", "Kaneko's original, which only potentiates: one output, two classes"),
             ("dfa", "direct feedback alignment on differential pairs"),
@@ -367,8 +366,8 @@ const LEARNING: &[KeyEntry] = &[
             ("plain", "the sum over the batch, shifted"),
             ("sign", "one pulse in the direction of the sum, by chance"),
             ("rms", "the sum, scaled by the root mean square over the layer"),
-            ("momentum", "an accumulator a cell that forgets an eighth at a write"),
-            ("adam_fx", "the mean sum of a cell in units of its root mean square, over 8 and 256 writes"),
+            ("momentum", "an accumulator a cell that forgets a part of itself at a write, an eighth by default"),
+            ("adam_fx", "the mean sum of a cell in units of its root mean square, over 8 and 256 writes by default"),
         ],
     )
     .default("\"plain\"")
@@ -377,12 +376,20 @@ const LEARNING: &[KeyEntry] = &[
         .default("false")
         .otherwise("true with task = \"policy\"")
         .only("with optimiser = \"sign\"", &["learning.optimiser=sign"]),
+    whole("momentum_shift", 1, 8)
+        .unit("bits")
+        .default("3")
+        .only("with optimiser = \"momentum\"", &["learning.optimiser=momentum"]),
+    other("adam_shifts", "two whole numbers, each 1..=8")
+        .unit("bits")
+        .default("[3, 8]")
+        .only("with optimiser = \"adam_fx\"", &["learning.optimiser=adam_fx"]),
     flag("centred")
         .default("false")
         .otherwise("true with convolutions, but with preset = \"paper\", and with task = \"policy\""),
     real("rate", 1e-6, 1e6).default("18.0").otherwise(
         "20.0 with other data than the built-in digits; with a batch below the default one less, in proportion; 0.25 \
-         with optimiser = \"sign\", 0.002 with \"rms\" and \"adam_fx\"; 0.1 with convolutions and \"rms\", 0.3 with convolutions and \
+         with optimiser = \"sign\" (0.5 of policies with rule = \"dfa\" or \"bp\"), 0.002 with \"rms\" and \"adam_fx\"; 0.1 with convolutions and \"rms\", 0.3 with convolutions and \
          others, but with preset = \"paper\"; 1.0 of policies with others",
     ),
     real("rate_multipliers", 1e-6, 1e6).layers().default("[1.0, 0.25]").otherwise(
@@ -429,6 +436,16 @@ const LEARNING: &[KeyEntry] = &[
         "\"running\" with a batch of one or mode = \"online\"; \"none\" with rule = \"kaneko\" or \"ed_seed\", and of \
          policies",
     ),
+    words(
+        "control",
+        &[
+            ("none", "nothing"),
+            ("frozen_hidden", "hidden layers hear no error and are not written: outputs alone learn"),
+            ("same_sign_hidden", "in hidden layers stream n hears errors as stream p does, not negated"),
+            ("same_sign", "the same in all layers"),
+        ],
+    )
+    .default("\"none\""),
     words(
         "route",
         &[
@@ -512,11 +529,12 @@ const PPO: &[KeyEntry] = &[
         .only(ON_POLICY, POLICY),
     other("log_sigma", "a number, -4 to 1").default("0.0").only(ON_CONTINUOUS, CONTINUOUS),
     other("log_sigma_rate", "a number, 0 to 1").default("0.003").only(ON_CONTINUOUS, CONTINUOUS),
+    whole("noise_steps", 1, 1024).unit("steps").default("1").only(ON_CONTINUOUS, CONTINUOUS),
 ];
 
 const EVOLUTION: &[KeyEntry] = &[
-    whole("pairs", 1, 4096).default("32").only(ON_EVOLUTION, BY_EVOLUTION),
-    whole("step", 1, 4095).unit("levels").default("4").only(ON_EVOLUTION, BY_EVOLUTION),
+    whole("pairs", 1, 4096).default("16").only(ON_EVOLUTION, BY_EVOLUTION),
+    whole("step", 1, 4095).unit("levels").default("16").only(ON_EVOLUTION, BY_EVOLUTION),
     whole("shift", 0, 16).unit("bits").default("4").only(ON_EVOLUTION, BY_EVOLUTION),
 ];
 

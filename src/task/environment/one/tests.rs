@@ -17,7 +17,7 @@ struct Adder {
 impl Environment for Adder {
     fn spec() -> EnvSpec {
         EnvSpec {
-            id: "Adder",
+            id: "Adder".into(),
             shown: Shown::Dense(2),
             taken: Taken::Discrete(4),
             steps_max: 3,

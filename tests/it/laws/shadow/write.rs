@@ -38,7 +38,9 @@ impl Shadow {
                     err = if unbounded { rsh(err, taps.shift) } else { bounded };
                 }
                 for &target in wiring.targets() {
-                    let negate = target == Stream::N && !self.is(Fault::StreamNotNegated);
+                    let alike =
+                        self.layers[layer].delivery.alike != self.is(Fault::StreamNotNegated);
+                    let negate = target == Stream::N && !alike;
                     let own = if negate { -err } else { err };
                     let from =
                         if self.is(Fault::DerivativeOfOtherStream) { 0 } else { target.index() };

@@ -54,7 +54,7 @@ pub(super) fn config(
         lut_bits: hardware.digital.lut_bits.get(),
         lut_shift: layer.lut.shift,
         error_bits: hardware.digital.error_bits.get(),
-        negate: target == Stream::N,
+        negate: target == Stream::N && !layer.delivery.alike,
         mantissa: 1,
         dither_bits: hardware.write.dither_bits.get(),
         increment_max: hardware.write.increment_max.get().into(),
