@@ -33,11 +33,11 @@ fn given<'a>(
     FloatOutcomes { next, reached: Some(reached), rewards, terminated, truncated }
 }
 
+/// Makes a step bad.
+type Bad = fn(usize, &mut [f64], &mut [f64]);
+
 /// Trains to the end through the door; `bad` is told every step and makes steps that are to be refused.
-fn train(
-    id: &str,
-    bad: Option<fn(usize, &mut Vec<f64>, &mut Vec<f64>)>,
-) -> (Vec<PolicyEpoch>, String) {
+fn train(id: &str, bad: Option<Bad>) -> (Vec<PolicyEpoch>, String) {
     let (mut learner, mut environments) = learner(id);
     let door = FloatDoor::new(environments.spec(), 3);
     let (mut shown, mut outcomes) = (Observations::default(), Outcomes::default());
@@ -70,7 +70,7 @@ fn train(
                 step += 1;
             }
             PolicyTurn::Learn => told.extend(learner.learn(&mut |_| true).unwrap()),
-            PolicyTurn::Done => return (told, hash::state(&mut learner)),
+            _ => return (told, hash::state(&mut learner)),
         }
     }
 }

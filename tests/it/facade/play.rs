@@ -480,16 +480,7 @@ fn own(c: &mut Choices<'_>) -> Option<Data> {
         height: c.size(1, 3),
         width: c.size(1, 3),
         channels: c.size(1, 1),
-        flip: c.one_in(2),
     });
-    let image = [c.size(1, 4), c.size(1, 4), c.size(1, 3)];
-    let coding = c.of(&[
-        Coding::Values,
-        Coding::Values,
-        Coding::Pixels { image },
-        Coding::OnOff { image },
-        Coding::White { image },
-    ]);
     Data::new("own", Split { train, validation, test }, image).map_err(|e| shown(&e)).ok()
 }
 

@@ -53,9 +53,9 @@ pub(in crate::lab::config) const LOG_SIGMA_RATE: f64 = 0.003;
 /// `ppo.noise_steps`.
 pub(in crate::lab::config) const NOISE_STEPS: i64 = 1;
 /// `es.pairs`.
-pub(in crate::lab::config) const PAIRS: i64 = 32;
+pub(in crate::lab::config) const PAIRS: i64 = 16;
 /// `es.step`.
-pub(in crate::lab::config) const STEP: i64 = 4;
+pub(in crate::lab::config) const STEP: i64 = 16;
 /// `es.shift`.
 pub(in crate::lab::config) const SHIFT: i64 = 4;
 /// Epochs that a run has by default.

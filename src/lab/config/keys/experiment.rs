@@ -202,9 +202,8 @@ const NETWORK: &[KeyEntry] = &[
         .unit("pixels")
         .default("1")
         .only(ON_WINDOWS, WINDOWS),
-    other("padding", "`same`, or a whole number less than the kernel")
+    other("padding", "`same`, or a number of pixels, less than the kernel")
         .windows()
-        .unit("pixels")
         .default("\"same\"")
         .law("`same`: half of an odd kernel, rounded down, so that a map is as large as what is below it at a stride of 1")
         .only(ON_WINDOWS, WINDOWS),
@@ -533,8 +532,8 @@ const PPO: &[KeyEntry] = &[
 ];
 
 const EVOLUTION: &[KeyEntry] = &[
-    whole("pairs", 1, 4096).default("32").only(ON_EVOLUTION, BY_EVOLUTION),
-    whole("step", 1, 4095).unit("levels").default("4").only(ON_EVOLUTION, BY_EVOLUTION),
+    whole("pairs", 1, 4096).default("16").only(ON_EVOLUTION, BY_EVOLUTION),
+    whole("step", 1, 4095).unit("levels").default("16").only(ON_EVOLUTION, BY_EVOLUTION),
     whole("shift", 0, 16).unit("bits").default("4").only(ON_EVOLUTION, BY_EVOLUTION),
 ];
 
