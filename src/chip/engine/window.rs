@@ -114,16 +114,16 @@ impl Engine {
         }
         let plan = ConvPlan::new(shape, samples, Pixels::Packed);
         let image = Image::new(&plan, &registers.images[set]);
-        let mut parts: Vec<(usize, (usize, Vec<&mut [u8]>))> = (0..samples)
-            .step_by(TOGETHER)
-            .map(|sample| (sample, (sample, Vec::with_capacity(plan.blocks()))))
-            .collect();
+        let groups = samples.div_ceil(TOGETHER);
+        let mut by_group: Vec<Vec<&mut [u8]>> = (0..groups).map(|_| Vec::new()).collect();
         for block in registers.drives[set].chunks_exact_mut(reads * BLOCK_ROWS).take(plan.blocks())
         {
             let groups = block.chunks_mut(TOGETHER * positions * BLOCK_ROWS);
-            parts.iter_mut().zip(groups).for_each(|((_, (_, rows)), group)| rows.push(group));
+            by_group.iter_mut().zip(groups).for_each(|(rows, group)| rows.push(group));
         }
         let work = reads * plan.blocks() * BLOCK_ROWS * MOVE / 8;
+        let parts = (0..samples).step_by(TOGETHER).zip(by_group);
+        let parts = parts.map(|(sample, rows)| (sample, (sample, rows))).collect();
         each(&mut self.team, work, samples, parts, |_, (sample, mut rows)| {
             let last = (sample + TOGETHER).min(samples);
             let mut line = Vec::new();

@@ -302,13 +302,11 @@ fn dots<const KIND: u8, const N: usize, const H: usize>(
     }
     for (i, (acc, below)) in acc.iter().zip(below).enumerate() {
         for h in 0..2 {
-            let mut sum = _mm256_setzero_si256();
-            if h < H {
-                sum = acc[h];
-                if KIND == READ {
-                    sum = _mm256_add_epi32(sum, narrow::raised(below));
-                }
-            }
+            let sum = match acc.get(h) {
+                Some(&sum) if KIND == READ => _mm256_add_epi32(sum, narrow::raised(below)),
+                Some(&sum) => sum,
+                None => _mm256_setzero_si256(),
+            };
             // SAFETY: i < N and h < 2, so the third assertion above bounds these 8 sums, and `out` is borrowed for
             // writing.
             unsafe {

@@ -42,7 +42,7 @@ const WORDS: usize = 3;
 impl Net {
     fn codes(&self, batch: usize) -> Vec<u8> {
         let top = usize::from(self.hardware.drive.bits.code_max()) + 1;
-        let of = |at| number(self.seed ^ batch as u64 * 77, at, top) as u8;
+        let of = |at| number(self.seed ^ (batch as u64 * 77), at, top) as u8;
         (0..self.samples * self.sides[0]).map(of).collect()
     }
 

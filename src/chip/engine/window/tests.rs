@@ -234,11 +234,14 @@ impl Net {
         let mut map = Vec::new();
         for sample in 0..self.samples {
             for (y, x) in (0..down / side).flat_map(|y| (0..across / side).map(move |x| (y, x))) {
-                for channel in 0..self.units[layer] {
-                    let square = (0..side * side).map(|at| {
+                let square: Vec<&Vec<u8>> = (0..side * side)
+                    .map(|at| {
                         let (y, x) = (y * side + at / side, x * side + at % side);
-                        usize::from(reads[(sample * down + y) * across + x][channel])
-                    });
+                        &reads[(sample * down + y) * across + x]
+                    })
+                    .collect();
+                for channel in 0..self.units[layer] {
+                    let square = square.iter().map(|codes| usize::from(codes[channel]));
                     let pooled = match self.pools[layer] {
                         Pool::Max { .. } => square.max().unwrap(),
                         _ => (2 * square.sum::<usize>() + side * side) / (2 * side * side),

@@ -128,6 +128,9 @@ fn sums(net: &Net, at: usize, drives: &[Vec<Vec<i64>>; 2]) -> [Vec<Vec<i64>>; 2]
     sums
 }
 
+/// Slopes of a layer by stream, read and unit, ends that were hit, and sums by stream, read and unit.
+pub(super) type Seen = (Vec<Vec<Vec<u8>>>, u64, [Vec<Vec<i64>>; 2]);
+
 /// Reads a batch; every hidden layer is moved or calibrated by `then` before its units are looked up.
 pub(super) fn plain_read(
     net: &Net,
@@ -135,7 +138,7 @@ pub(super) fn plain_read(
     codes: &[u8],
     states: &mut [Plain],
     calibrates: bool,
-) -> Vec<(Vec<Vec<Vec<u8>>>, u64, [Vec<Vec<i64>>; 2])> {
+) -> Vec<Seen> {
     let bits = net.hardware.drive.bits;
     let drive: Vec<Vec<i64>> = codes
         .chunks(net.sides[0])
