@@ -327,7 +327,7 @@ pub(crate) fn settings() -> Vec<Setting> {
         make(
             "thresholds, steps below a unit of a sum",
             8,
-            "0000000000000000",
+            "edddc48e4911c60d",
             [6, 14],
             TileConfig {
                 columns: 7,
@@ -341,7 +341,7 @@ pub(crate) fn settings() -> Vec<Setting> {
         make(
             "large, thresholds of every size, long steps",
             16,
-            "0000000000000000",
+            "68f937600cba8267",
             [6, 14],
             TileConfig {
                 lanes: 5,
@@ -352,7 +352,7 @@ pub(crate) fn settings() -> Vec<Setting> {
         make(
             "a threshold a column, ideal converters, a step of one",
             8,
-            "0000000000000000",
+            "cccc9aa4d7271b07",
             [6, 14],
             TileConfig {
                 ceiling: 3,
