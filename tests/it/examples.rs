@@ -50,7 +50,7 @@ fn every_experiment_learns_two_batches() {
     let sweeps = examples().join("sweeps");
     let experiments: Vec<_> =
         files(&examples(), "toml").into_iter().filter(|path| !path.starts_with(&sweeps)).collect();
-    assert_eq!(experiments.len(), 30, "{experiments:?}");
+    assert_eq!(experiments.len(), 32, "{experiments:?}");
     for path in experiments {
         let name = path.display().to_string();
         let text = std::fs::read_to_string(&path).unwrap();
@@ -74,7 +74,7 @@ fn every_experiment_learns_two_batches() {
 #[test]
 fn every_sweep_is_read_and_has_points() {
     let sweeps = files(&examples().join("sweeps"), "toml");
-    assert_eq!(sweeps.len(), 9, "{sweeps:?}");
+    assert_eq!(sweeps.len(), 15, "{sweeps:?}");
     for path in sweeps {
         let sweep = Sweep::read(&path).unwrap_or_else(|error| panic!("{error}"));
         let (points, _) =

@@ -269,7 +269,7 @@ fn what_a_run_cost_stands_on_page_and_terminal() {
     expect_test::expect![[r#"
         on the chip 1.23 M cycles, 1.23 ms, at least 2.00 nJ (1.00 nJ to 8.00 nJ), 2 of 3 parts priced
                     converter at least 75 %, static 25 %, 25 % assumed
-                    30 % is memory of digital sums, 64 bits a product; mode online or replay does without in dense layers
+                    30 % is memory of sums, 64 bits a product; online or replay spares it in dense layers
                     to learn from an image at least 2.00 pJ, 1.20 us
                     without a price: holds
         beside this 1 effect of real chips is not simulated, 1 with figures of this one: see the report

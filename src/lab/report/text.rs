@@ -174,7 +174,7 @@ fn chip(out: &mut String, cost: &Cost) {
     }
     if let Some(share) = cost.sums_share.filter(|&share| share >= SHOWN) {
         lines.push(format!(
-            "{:.0} % is memory of digital sums, 64 bits a product; mode online or replay does without in dense layers",
+            "{:.0} % is memory of sums, 64 bits a product; online or replay spares it in dense layers",
             100.0 * share
         ));
     }
