@@ -264,9 +264,11 @@ fn a_table_of_a_stated_shape_holds_pictures() {
     assert_eq!(grey.split.train.values(1), flat.split.train.values(1));
     let error = loaded(set(shape(2, 2, 2))).unwrap_err();
     assert!(error.contains("2 x 2 x 2") && error.contains("`data.shape`"), "{error}");
-    let values: Vec<u8> = (0..24).collect();
-    let own = files.idx("a", &[12, 1, 2], &values, &[0, 1, 0, 1, 0, 1, 0, 1, 0, 1, 0, 1]);
+    let values: Vec<u8> = (0..72).collect();
+    let labels: Vec<u8> = (0..36).map(|at| at % 2).collect();
+    let own = files.idx("a", &[36, 1, 2], &values, &labels);
     let error = loaded(FileSet { image: shape(2, 1, 1), ..only(own.clone()) }).unwrap_err();
     assert!(error.contains("holds pictures of 1 x 2 x 1"), "{error}");
-    assert!(loaded(FileSet { image: shape(1, 2, 1), ..only(own) }).is_ok());
+    let stated = loaded(FileSet { image: shape(1, 2, 1), ..only(own) }).unwrap();
+    assert_eq!(stated.image, shape(1, 2, 1));
 }

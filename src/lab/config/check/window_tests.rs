@@ -42,7 +42,7 @@ fn channels_alone_give_a_network_that_keeps_to_middles() {
     );
     let cells: usize =
         network.layers.iter().map(|one| one.inputs * one.units * one.wiring.pathways().len()).sum();
-    assert_eq!(cells, 1_740_960);
+    assert_eq!(cells, 1_674_720);
     let log2: Vec<i32> = network.layers.iter().map(|one| one.weight_max_log2).collect();
     assert_eq!(log2, [1, 0, -2, 0]);
     let (output, hidden) = network.layers.split_last().unwrap();
