@@ -115,6 +115,27 @@ keys! {
         heat: [String; 2],
         /// What is set against `y`: `joules`, `cycles`, `pulses_attempted`, ...
         cost: String,
+        /// The value of the abscissa that the others are compared with, by Welch's test.
+        baseline: ScalarFile,
+        /// What others reported of the same settings, set beside what was found.
+        published: Vec<PublishedFile>,
+    }
+    /// `[[report.published]]`: a figure of others, and where it belongs.
+    PublishedFile {
+        /// The value of the abscissa.
+        x: ScalarFile,
+        /// The value of the axis of the curves; default: all of them.
+        series: ScalarFile,
+        /// The value of the axis of the panels; default: all of them.
+        panel: ScalarFile,
+        /// The mean of `y`, in the unit of the table: a share of 0.967, not 96.7.
+        mean: f64,
+        /// The standard deviation over runs.
+        deviation: f64,
+        /// How many runs.
+        runs: u32,
+        /// Who says so.
+        source: String,
     }
 }
 

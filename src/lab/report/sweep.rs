@@ -10,6 +10,7 @@
 //! and go to the page as data. Its script selects among them as a reader chooses, and draws. tests/it/browser.rs compares
 //! what is drawn with the table.
 
+mod against;
 mod curves;
 mod heat;
 mod importance;
@@ -30,6 +31,13 @@ pub use page::html;
 pub use paper::{StaticFigure, figures};
 pub use raster::png;
 pub use text::text;
+
+/// Every setting against one of them and against what others reported, for the terminal; nothing where the sweep file asks
+/// for none.
+#[must_use]
+pub fn compared(view: &SweepView<'_>) -> Option<String> {
+    against::text(view)
+}
 
 use super::words;
 use crate::lab::table::{Column, Role, Table};
@@ -91,6 +99,25 @@ pub struct Figures {
     pub heat: Option<[String; 2]>,
     /// What a Pareto front sets against `y`, less is better: a result.
     pub cost: Option<String>,
+    /// The value of the abscissa that the others are compared with.
+    pub baseline: Option<String>,
+    /// What others reported.
+    pub published: Vec<Published>,
+}
+
+/// What others reported of a setting.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Published {
+    /// Values of the abscissa, of the axis of the curves and of that of the panels; none is all of them.
+    pub at: [Option<String>; 3],
+    /// The mean of the ordinate, in the unit of the table.
+    pub mean: f64,
+    /// The standard deviation over runs.
+    pub deviation: Option<f64>,
+    /// How many runs.
+    pub runs: Option<u32>,
+    /// Who says so; may be empty.
+    pub source: String,
 }
 
 /// A point that cannot be run.

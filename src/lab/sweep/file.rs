@@ -5,10 +5,11 @@ use std::path::Path;
 
 use super::filter::Filter;
 use super::row::RESULTS;
+use super::axis::Value;
 use super::{Axis, SweepError};
-use crate::lab::config::sweep::{ReportFile, SampleFile, SeedsFile, SweepFile};
+use crate::lab::config::sweep::{PublishedFile, ReportFile, SampleFile, SeedsFile, SweepFile};
 use crate::lab::config::{ConfigError, anchor};
-use crate::lab::report::sweep::Figures;
+use crate::lab::report::sweep::{Figures, Published};
 use crate::lab::store::address;
 
 /// Draws points in place of the full grid.
@@ -266,7 +267,54 @@ fn figures(file: ReportFile, axes: &[Axis], result: &str) -> Result<Figures, Swe
     let other = axes.iter().map(|axis| axis.name.clone()).find(|name| *name != x);
     let heat = file.heat.or_else(|| Some([x.clone(), series.clone().or(other)?]));
     let y = file.y.unwrap_or_else(|| result.into());
-    Ok(Figures { x, y, series, panel, heat, cost: file.cost })
+    let baseline = file.baseline.map(|value| Value::from(value).to_string());
+    let mut figures =
+        Figures { x, y, series, panel, heat, cost: file.cost, baseline, published: vec![] };
+    if let Some(value) = &figures.baseline {
+        has_value("baseline", axes, Some(&figures.x), value)?;
+    }
+    let published = file.published.unwrap_or_default().into_iter().map(|one| told(one, axes, &figures));
+    figures.published = published.collect::<Result<_, _>>()?;
+    Ok(figures)
+}
+
+/// Whether an axis has a value; what a key of the report names has to be there.
+fn has_value(key: &str, axes: &[Axis], name: Option<&String>, value: &str) -> Result<(), SweepError> {
+    let axis = name.and_then(|name| axes.iter().find(|axis| axis.name == *name));
+    let wrong = |allowed: &str| SweepError::key(&format!("report.{key}"), &format!("is {value:?}"), allowed);
+    let Some(axis) = axis else { return Err(wrong("the report has no such axis: name it first")) };
+    let all: Vec<String> = axis.list().iter().map(|choice| choice.value.to_string()).collect();
+    if all.iter().any(|one| one == value) {
+        return Ok(());
+    }
+    Err(wrong(&format!("values of axis `{}` are {}", axis.name, all.join(", "))))
+}
+
+/// A figure of others, checked.
+fn told(file: PublishedFile, axes: &[Axis], figures: &Figures) -> Result<Published, SweepError> {
+    let missing = |key: &str, allowed: &str| SweepError::key(&format!("report.published.{key}"), "is missing", allowed);
+    let x = file.x.ok_or_else(|| missing("x", "name the value of the abscissa"))?;
+    let mean = file.mean.ok_or_else(|| missing("mean", "give the mean of the ordinate"))?;
+    let names = [Some(&figures.x), figures.series.as_ref(), figures.panel.as_ref()];
+    let mut at = [None, None, None];
+    let keys = ["published.x", "published.series", "published.panel"];
+    for (place, value) in [Some(x), file.series, file.panel].into_iter().enumerate() {
+        let Some(value) = value else { continue };
+        let value = Value::from(value).to_string();
+        has_value(keys[place], axes, names[place], &value)?;
+        at[place] = Some(value);
+    }
+    let finite = |key: &str, value: f64, least: f64| {
+        if value.is_finite() && value >= least {
+            return Ok(());
+        }
+        let allowed = "it must be a number, a deviation none below 0";
+        Err(SweepError::key(&format!("report.published.{key}"), &format!("is {value}"), allowed))
+    };
+    finite("mean", mean, f64::MIN)?;
+    file.deviation.iter().try_for_each(|&value| finite("deviation", value, 0.0))?;
+    let source = file.source.unwrap_or_default();
+    Ok(Published { at, mean, deviation: file.deviation, runs: file.runs, source })
 }
 
 #[cfg(test)]
@@ -285,7 +333,7 @@ mod tests {
         let sweep = sweep(GRID).unwrap();
         assert_eq!((sweep.name.as_str(), sweep.title.as_str()), ("a-b", "a-b"));
         assert!(sweep.seeds.is_empty());
-        let Figures { x, y, series, panel, heat, cost } = sweep.figures;
+        let Figures { x, y, series, panel, heat, cost, .. } = sweep.figures;
         assert_eq!((x.as_str(), y.as_str()), ("level_bits", "test_accuracy"));
         assert_eq!((series.as_deref(), panel, cost), (Some("rule"), None, None));
         assert_eq!(heat, Some(["level_bits".into(), "rule".into()]));
@@ -303,6 +351,17 @@ mod tests {
             (&format!("{GRID}[sample]\nmethod = 'random'"), "sample.points"),
             (&format!("{GRID}[report]\nx = 'bits'"), "axes are level_bits, rule"),
             (&format!("{GRID}[report]\ny = 'accuracy'"), "results are test_accuracy"),
+            (&format!("{GRID}[report]\nbaseline = 3"), "values of axis `level_bits` are 1, 2"),
+            (&format!("{GRID}[[report.published]]\nx = 2"), "report.published.mean"),
+            (&format!("{GRID}[[report.published]]\nmean = 2"), "report.published.x"),
+            (
+                &format!("{GRID}[[report.published]]\nx = 2\nmean = 0.5\nseries = 'dfa'"),
+                "values of axis `rule` are ed, bp",
+            ),
+            (
+                &format!("{GRID}[[report.published]]\nx = 2\nmean = 0.5\ndeviation = -1"),
+                "none below 0",
+            ),
             (
                 &format!("{GRID}[[axis]]\nname = 'cycles'\nkey = 'a'\nvalues = [1]"),
                 "another column",

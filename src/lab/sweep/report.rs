@@ -4,7 +4,9 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use super::{Results, SweepError, results};
-use crate::lab::report::sweep::{Learning, SweepView, figures, html, png, text, wanted};
+use crate::lab::report::sweep::{
+    Learning, SweepView, compared, figures, html, png, text, wanted,
+};
 use crate::lab::store::folder::{names, read_text};
 use crate::lab::store::index::{Store, StoreError, SweepRecord};
 use crate::lab::store::place::{clear_parts, make_folder, write_whole};
@@ -63,7 +65,10 @@ pub fn report(
     }
     Ok(SweepPage {
         page,
-        text: text(&view),
+        text: match (text(&view), compared(&view)) {
+            (Some(curves), Some(compared)) => Some(format!("{curves}\n\n{compared}")),
+            (curves, compared) => curves.or(compared),
+        },
         figures: made,
         points: found.table.len(),
         finished: found.finished,

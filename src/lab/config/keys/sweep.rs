@@ -1,8 +1,10 @@
 //! Keys of sweep files.
 
 use super::KeyFileKind::Sweep;
-use super::{KeyEntry, KeyTable, other, whole, words};
-use crate::lab::config::sweep::{AxisFile, CaseFile, ReportFile, SampleFile, SweepFile};
+use super::{KeyEntry, KeyTable, other, real, whole, words};
+use crate::lab::config::sweep::{
+    AxisFile, CaseFile, PublishedFile, ReportFile, SampleFile, SweepFile,
+};
 
 const fn table(
     path: &'static str,
@@ -34,6 +36,12 @@ pub(super) const TABLES: &[KeyTable] = &[
         SAMPLE,
     ),
     table("report", "What the figures show at first.", ReportFile::MEANINGS, REPORT),
+    table(
+        "report.published",
+        "`[[report.published]]`: figures of others, set beside what was found.",
+        PublishedFile::MEANINGS,
+        PUBLISHED,
+    ),
 ];
 
 const ROOT: &[KeyEntry] = &[
@@ -87,4 +95,16 @@ const REPORT: &[KeyEntry] = &[
     other("panel", "an axis").otherwise("the next one"),
     other("heat", "two axes").otherwise("abscissa and series"),
     other("cost", "a result").otherwise("none"),
+    other("baseline", "a value of the abscissa").otherwise("none: nothing is tested"),
+    other("published", "tables"),
+];
+
+const PUBLISHED: &[KeyEntry] = &[
+    other("x", "a value of the abscissa").otherwise("the table needs it"),
+    other("series", "a value of the axis of the curves").otherwise("all of them"),
+    other("panel", "a value of the axis of the panels").otherwise("all of them"),
+    real("mean", -1e18, 1e18).otherwise("the table needs it"),
+    real("deviation", 0.0, 1e18).otherwise("unknown: nothing is tested"),
+    whole("runs", 1, 1_000_000).otherwise("unknown: nothing is tested"),
+    other("source", "text"),
 ];

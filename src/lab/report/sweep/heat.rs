@@ -165,7 +165,7 @@ mod tests {
     use super::*;
 
     fn cell(mean: f64, half: Option<f64>) -> Summary {
-        Summary { n: 3, mean, half, low: mean, high: mean }
+        Summary { n: 3, mean, deviation: None, half, low: mean, high: mean }
     }
 
     #[test]

@@ -3,7 +3,7 @@
 use super::measure::Measure;
 use super::settings::Settings;
 use super::statistics::Summary;
-use super::{SweepView, json, library, meaning, paper};
+use super::{SweepView, against, json, library, meaning, paper};
 use crate::lab::price::prefixed;
 use crate::lab::report::number::{count, escape, percent, significant};
 use crate::lab::table::ColumnUnit;
@@ -59,13 +59,17 @@ pub fn html(view: &SweepView<'_>) -> String {
         contents += &format!("<a href=\"#{}\" data-jump>{}</a>", frame.id, frame.title);
         body += &card(number, frame);
     }
-    let last = FRAMES.len() + 1;
+    let compared = against::card(&settings, FRAMES.len() + 1);
+    if !compared.is_empty() {
+        contents += "<a href=\"#against\" data-jump>Compared</a>";
+    }
+    let last = FRAMES.len() + if compared.is_empty() { 1 } else { 2 };
     contents += "<a href=\"#rows\" data-jump>Table</a><a href=\"#reading\" data-jump>How to read, check and cite</a>";
     format!(
         "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<meta name=\"viewport\" \
          content=\"width=device-width, initial-scale=1\">\n<title>{title}</title>\n\
          <style>\n{STYLE}{SWEEP_STYLE}</style>\n</head>\n<body>\n<div class=\"stripe\"><i></i><i></i><i></i><i></i>\
-         </div>\n<main>\n{header}{notices}<nav>{contents}</nav>\n{choices}<div class=\"figures\">\n{body}{rows}\
+         </div>\n<main>\n{header}{notices}<nav>{contents}</nav>\n{choices}<div class=\"figures\">\n{body}{compared}{rows}\
          {reading}</div>\n{fixed}<footer>dalean {version}. All numbers come from the table of runs on this page; \
          nothing is loaded from elsewhere.</footer>\n</main>\n\
          <script type=\"application/json\" id=\"sweep\">{data}</script>\n<script>{library}</script>\n\

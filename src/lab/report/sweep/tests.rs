@@ -65,6 +65,8 @@ impl Sample {
                 panel: None,
                 heat: Some(["bits".into(), "word".into()]),
                 cost: Some("joules".into()),
+                baseline: None,
+                published: vec![],
             },
             refused: vec![Refused { point: 13, what: NASTY.into(), why: NASTY.into() }],
             notes: vec![NASTY.into()],
