@@ -24,7 +24,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from . import _dalean
-from ._text import Overrides, settings, text
+from ._text import Overrides, settings, taps, text
 from .arrays import read_safetensors
 from .errors import ArrayError, ChipError
 
@@ -90,7 +90,7 @@ class Network(_dalean.Network):
             raise _wrong("sizes", f"is {sizes}", "give inputs, units of hidden layers and outputs, each at least 1")
         if words not in ("routed", "own"):
             raise _wrong("words", f"is {words!r}", 'it is "routed" or "own"')
-        keys = {"network.hidden": sizes[1:-1], "learning.rule": rule}
+        keys = {"network.hidden": sizes[1:-1], "learning.rule": rule, **taps(rule, sizes[-1], overrides)}
         if sizes[-1] == 1:
             keys["network.outputs"] = 1
         made = super().__new__(

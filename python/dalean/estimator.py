@@ -11,7 +11,7 @@ from sklearn.utils.validation import check_is_fitted, validate_data
 
 from . import _dalean
 from ._progress import Progress
-from ._text import Overrides, settings, text
+from ._text import Overrides, settings, taps, text
 
 __all__ = ["EDClassifier"]
 
@@ -74,6 +74,7 @@ class EDClassifier(ClassifierMixin, BaseEstimator):
             "learning.rule": self.rule,
         }
         classes = max(len(self.classes_), 2)
+        keys |= taps(self.rule, classes, self.overrides)
         return _dalean.Classifier(
             "EDClassifier",
             text(keys),

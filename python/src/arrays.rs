@@ -27,7 +27,9 @@ fn numbers<T: Element + Copy>(x: &Bound<'_, PyAny>) -> Option<PyResult<(Vec<T>, 
         Ok(read) => read,
         Err(error) => return Some(Err(wrong("an array", &error.to_string(), "give a copy"))),
     };
-    if let Ok(numbers) = read.as_slice() {
+    if array.is_c_contiguous()
+        && let Ok(numbers) = read.as_slice()
+    {
         return Some(Ok((numbers.to_vec(), shape)));
     }
     // with strides or out of line: NumPy puts it in order
@@ -35,6 +37,16 @@ fn numbers<T: Element + Copy>(x: &Bound<'_, PyAny>) -> Option<PyResult<(Vec<T>, 
         let copy = copy.cast_into::<PyArrayDyn<T>>()?;
         Ok((copy.try_readonly()?.as_slice()?.to_vec(), shape))
     }))
+}
+
+/// Flags of an array of them, whatever bytes it holds.
+fn truths(x: &Bound<'_, PyAny>) -> Option<PyResult<(Vec<bool>, Vec<usize>)>> {
+    let _ = x.cast::<PyArrayDyn<bool>>().ok()?;
+    let bytes = match x.call_method1("view", ("uint8",)) {
+        Ok(bytes) => numbers::<u8>(&bytes)?,
+        Err(error) => Err(error),
+    };
+    Some(bytes.map(|(bytes, shape)| (bytes.into_iter().map(|byte| byte != 0).collect(), shape)))
 }
 
 /// A copy in C order.
@@ -97,11 +109,7 @@ fn fractions<F: Copy + Into<f64>>(what: &str, numbers: &[F], most: u8) -> PyResu
 }
 
 /// Drive codes of at most `most`, and their shape.
-pub(crate) fn codes(
-    what: &str,
-    x: &Bound<'_, PyAny>,
-    most: u8,
-) -> PyResult<(Vec<u8>, Vec<usize>)> {
+pub(crate) fn codes(what: &str, x: &Bound<'_, PyAny>, most: u8) -> PyResult<(Vec<u8>, Vec<usize>)> {
     // what is given most often comes first
     if let Some(codes) = numbers::<u8>(x) {
         return codes;
@@ -118,7 +126,7 @@ pub(crate) fn codes(
         let (numbers, shape) = numbers?;
         return Ok((fractions(what, &numbers, most)?, shape));
     }
-    if let Some(flags) = numbers::<bool>(&x) {
+    if let Some(flags) = truths(&x) {
         let (flags, shape) = flags?;
         return Ok((flags.into_iter().map(|flag| u8::from(flag) * most).collect(), shape));
     }
@@ -163,11 +171,11 @@ fn cast_same<'py>(x: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
 
 /// Flags, one an environment.
 pub(crate) fn flags(what: &str, x: &Bound<'_, PyAny>) -> PyResult<Vec<bool>> {
-    if let Some(flags) = numbers::<bool>(x) {
+    if let Some(flags) = truths(x) {
         return Ok(flags?.0);
     }
     let x = array(x)?;
-    match numbers::<bool>(&x) {
+    match truths(&x) {
         Some(flags) => Ok(flags?.0),
         None => Err(wrong(what, &format!("are {}", kind(&x)), "give True or False of each")),
     }

@@ -34,7 +34,7 @@ pub(crate) struct Classifier {
 }
 
 impl Classifier {
-/// The thing itself; in a child of a fork, with threads of its own.
+    /// The thing itself; in a child of a fork, with threads of its own.
     fn held(&mut self) -> Result<&mut dalean::Classifier, Raised> {
         let Self { made, classifier, features, classes, .. } = self;
         classifier.mended(|lost, threads| {
@@ -58,8 +58,8 @@ fn examples(
     features: usize,
     classes: usize,
 ) -> PyResult<Examples> {
-    let (values, shape) = codes("X", x, 255)?;
-    let samples = rows("X", &shape, features)?;
+    let (values, shape) = codes("numbers of X", x, 255)?;
+    let samples = rows("numbers of X", &shape, features)?;
     let labels = match labels {
         None => vec![0; samples],
         Some(labels) => {

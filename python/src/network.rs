@@ -60,7 +60,7 @@ pub(crate) struct Network {
 
 impl Network {
     /// The network; in a child of a fork, with threads of its own.
-/// The thing itself; in a child of a fork, with threads of its own.
+    /// The thing itself; in a child of a fork, with threads of its own.
     fn held(&mut self) -> Result<&mut DrivenNetwork, Raised> {
         let Self { made, network, .. } = self;
         network.mended(|lost, threads| {
@@ -213,9 +213,9 @@ impl Network {
         x: &Bound<'py, PyAny>,
         learn: bool,
     ) -> PyResult<Bound<'py, PyAny>> {
-        let (codes, shape) = codes("x", x, self.network.code_max())?;
+        let (codes, shape) = codes("numbers of x", x, self.network.code_max())?;
         let inputs = self.network.size(0).map_err(Raised::from)?[0];
-        let samples = rows("x", &shape, inputs)?;
+        let samples = rows("numbers of x", &shape, inputs)?;
         self.told.add(if learn { "read" } else { "look" }, &codes);
         let network = self.held()?;
         py.detach(|| network.read(&codes, learn)).map_err(Raised::from)?;
@@ -228,8 +228,8 @@ impl Network {
     }
 
     fn calibrate(&mut self, py: Python<'_>, x: &Bound<'_, PyAny>) -> PyResult<()> {
-        let (codes, shape) = codes("x", x, self.network.code_max())?;
-        rows("x", &shape, self.network.size(0).map_err(Raised::from)?[0])?;
+        let (codes, shape) = codes("numbers of x", x, self.network.code_max())?;
+        rows("numbers of x", &shape, self.network.size(0).map_err(Raised::from)?[0])?;
         self.told.add("calibrate", &codes);
         let network = self.held()?;
         Ok(py.detach(|| network.calibrate(&codes)).map_err(Raised::from)?)
@@ -283,9 +283,8 @@ impl Network {
         let outputs = self.outputs()?;
         let samples = rows("errors", &shape, outputs)?;
         let error = |&error: &i64| {
-            i32::try_from(error).map_err(|_| {
-                wrong("errors", &format!("hold {error}"), "an error fits 32 bits")
-            })
+            i32::try_from(error)
+                .map_err(|_| wrong("errors", &format!("hold {error}"), "an error fits 32 bits"))
         };
         let errors: Vec<i32> = errors.iter().map(error).collect::<PyResult<_>>()?;
         let bytes: Vec<u8> = errors.iter().flat_map(|error| error.to_le_bytes()).collect();
@@ -306,7 +305,8 @@ impl Network {
             None => self.outputs()?,
         };
         let words = self.words(words, width)?;
-        self.told.words(&layer.map_or("deliver".into(), |layer| format!("deliver {layer}")), &words);
+        self.told
+            .words(&layer.map_or("deliver".into(), |layer| format!("deliver {layer}")), &words);
         let network = self.held()?;
         let done = py.detach(|| match layer {
             Some(layer) => network.deliver_to(layer, &words),

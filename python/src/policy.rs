@@ -39,7 +39,7 @@ pub(crate) struct PolicyLearner {
 }
 
 impl PolicyLearner {
-/// The thing itself; in a child of a fork, with threads of its own.
+    /// The thing itself; in a child of a fork, with threads of its own.
     fn held(&mut self) -> Result<&mut dalean::policy::PolicyLearner, Raised> {
         let Self { made, learner, .. } = self;
         learner.mended(|lost, threads| {
@@ -94,7 +94,11 @@ impl PolicyLearner {
             return Err(wrong("threads", &format!("is {threads}"), "use 1 to 1024"));
         }
         if shown == 0 || taken == 0 {
-            return Err(wrong("an environment", "shows or takes nothing", "give at least 1 of each"));
+            return Err(wrong(
+                "an environment",
+                "shows or takes nothing",
+                "give at least 1 of each",
+            ));
         }
         let spec = EnvSpec {
             id: id.into(),

@@ -204,9 +204,8 @@ pub(crate) fn evaluate(
     kernel: Option<String>,
 ) -> PyResult<(Option<(u64, u64)>, String)> {
     let machine = machine(kernel.as_deref(), threads)?;
-    let (test, hash) = py
-        .detach(|| dalean::evaluate(&path, &root(data, moved), machine))
-        .map_err(Raised::from)?;
+    let (test, hash) =
+        py.detach(|| dalean::evaluate(&path, &root(data, moved), machine)).map_err(Raised::from)?;
     let score = match test {
         TestOutcome::Classify(test) => Some((test.score.correct, test.score.total)),
         _ => None,

@@ -149,7 +149,7 @@ def test_errors_move_nothing():
     for call, wanted in [
         (lambda: net.read(x[:, :4]), "shape"),
         (lambda: net.read(x.astype(float)), "0 to 1"),
-        (lambda: net.read(np.full((1, 5), np.nan)), "nan"),
+        (lambda: net.read(np.full((1, 5), np.nan)), "NaN"),
         (lambda: net.read(np.full((1, 5), 256)), "0..=255"),
         (lambda: net.read("hello"), "uint8"),
         (lambda: net.read(x.astype(complex)), "uint8"),

@@ -227,7 +227,8 @@ impl DrivenNetwork {
         if learning && self.driver.mode() == UpdateMode::Online {
             let samples = codes.len() / self.engine().layers()[0].spec.inputs;
             if samples > 1 {
-                let allowed = "learning.mode = \"online\" writes after every sample: read one at a time";
+                let allowed =
+                    "learning.mode = \"online\" writes after every sample: read one at a time";
                 return wrong("a read", format!("has {samples} samples"), allowed);
             }
         }
@@ -288,7 +289,11 @@ impl DrivenNetwork {
         let target = self.stream(layer, stream)?;
         let codes = self.engine().unit_codes(layer, target);
         if codes.is_empty() {
-            return wrong("the last layer", "keeps accumulators and has no activities", "ask for those");
+            return wrong(
+                "the last layer",
+                "keeps accumulators and has no activities",
+                "ask for those",
+            );
         }
         Ok(codes)
     }
@@ -313,7 +318,11 @@ impl DrivenNetwork {
         }
         let gates = self.engine().unit_gates(layer, target);
         if gates.is_empty() {
-            return wrong(format!("layer {layer}"), "has no gates", "it is frozen and hears nothing");
+            return wrong(
+                format!("layer {layer}"),
+                "has no gates",
+                "it is frozen and hears nothing",
+            );
         }
         Ok(gates)
     }
@@ -370,8 +379,7 @@ impl DrivenNetwork {
         let (samples, most) = (self.samples(), self.word_max());
         if words.len() != samples * width {
             let found = format!("has {} words", words.len());
-            let allowed =
-                format!("{samples} samples of {width} words have {}", samples * width);
+            let allowed = format!("{samples} samples of {width} words have {}", samples * width);
             return wrong(call, found, allowed);
         }
         match words.iter().find(|word| word.unsigned_abs() > most.unsigned_abs()) {
@@ -390,7 +398,8 @@ impl DrivenNetwork {
     /// When these are no words of the loaded samples, or hidden layers hear words of their own.
     pub fn deliver(&mut self, words: &[i16]) -> Result<(), DriveError> {
         if self.words == HiddenWords::Own && self.layers() > 1 {
-            let allowed = "say to which layer: hidden layers of this network hear words of their own";
+            let allowed =
+                "say to which layer: hidden layers of this network hear words of their own";
             return wrong("deliver", "is to all layers", allowed);
         }
         self.words_fit("deliver", self.engine().layers()[self.layers() - 1].spec.units, words)?;
@@ -427,7 +436,8 @@ impl DrivenNetwork {
         let hardware = self.engine().hardware();
         let place = format!("layer {layer}");
         if spec.wiring != Wiring::Single {
-            let allowed = "arrays of differential pairs are: build it with rule = \"bp\" or \"dfa\"";
+            let allowed =
+                "arrays of differential pairs are: build it with rule = \"bp\" or \"dfa\"";
             return wrong(place, "is not read from its columns", allowed);
         }
         if !hardware.tile.transposed_read || hardware.adc != Adc::Ideal {
@@ -456,7 +466,11 @@ impl DrivenNetwork {
             return wrong("write", found, format!("there are {} layers", self.layers()));
         }
         if let Some(shift) = shifts.iter().flatten().find(|&&shift| shift > SHIFT_MAX) {
-            return wrong("write", format!("has the shift {shift}"), format!("use 0..={SHIFT_MAX}"));
+            return wrong(
+                "write",
+                format!("has the shift {shift}"),
+                format!("use 0..={SHIFT_MAX}"),
+            );
         }
         let none = vec![false; self.layers()];
         let heard = std::mem::replace(&mut self.heard, none);
@@ -525,7 +539,11 @@ impl DrivenNetwork {
         }
         if let Some(at) = levels.iter().position(|level| !(floor..=ceiling).contains(level)) {
             let found = format!("is given the level {} in row {}", levels[at], at / columns);
-            return wrong(place(), found, format!("levels lie in {floor}..={ceiling} on this chip"));
+            return wrong(
+                place(),
+                found,
+                format!("levels lie in {floor}..={ceiling} on this chip"),
+            );
         }
         self.forget();
         for (row, levels) in levels.chunks_exact(columns).enumerate() {

@@ -4,7 +4,9 @@ use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use std::sync::atomic::AtomicBool;
 
-use super::{Carried, Options, Sweep, SweepError, SweepEvent, carry_out, find, plan, report, results};
+use super::{
+    Carried, Options, Sweep, SweepError, SweepEvent, carry_out, find, plan, report, results,
+};
 use crate::lab::data::DataRoot;
 use crate::lab::store::index::Store;
 use crate::lab::table::Table;
