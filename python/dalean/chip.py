@@ -16,6 +16,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import operator
 import os
 from collections.abc import Sequence
 from pathlib import Path
@@ -85,7 +86,10 @@ class Network(_dalean.Network):
         kernel: str | None = None,
     ) -> Network:
         chip = chip if isinstance(chip, Chip) else Chip(chip or "ideal")
-        sizes = [int(size) for size in sizes]
+        try:
+            sizes = [operator.index(size) for size in sizes]
+        except TypeError:
+            raise _wrong("sizes", f"is {sizes!r}", "give whole numbers, such as [64, 32, 10]") from None
         if len(sizes) < 2 or min(sizes) < 1:
             raise _wrong("sizes", f"is {sizes}", "give inputs, units of hidden layers and outputs, each at least 1")
         if words not in ("routed", "own"):

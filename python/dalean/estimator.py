@@ -24,7 +24,8 @@ class EDClassifier(ClassifierMixin, BaseEstimator):
     :param batch: samples of an update.
     :param rule: ``"ed"``, ``"ed_seed"``, ``"dfa"``, ``"bp"``.
     :param hw: hardware model, a built-in name or a file.
-    :param overrides: any other keys, such as ``{"hw.cell.level_bits": 4, "learning.rate": 20}``.
+    :param rate: rate of learning; small sets of few examples take a larger one than large sets.
+    :param overrides: any other keys, such as ``{"hw.cell.level_bits": 4, "network.alpha": 4}``.
     :param random_state: seed of all draws, a whole number or a NumPy generator that one is drawn from.
     :param threads: threads; no bit depends on it.
 
@@ -38,8 +39,9 @@ class EDClassifier(ClassifierMixin, BaseEstimator):
         self,
         hidden: tuple[int, ...] = (128,),
         *,
-        epochs: int = 20,
-        batch: int = 16,
+        epochs: int = 60,
+        batch: int = 8,
+        rate: float = 40.0,
         rule: str = "ed",
         hw: str = "ideal",
         overrides: Overrides | None = None,
@@ -51,6 +53,7 @@ class EDClassifier(ClassifierMixin, BaseEstimator):
         self.hidden = hidden
         self.epochs = epochs
         self.batch = batch
+        self.rate = rate
         self.rule = rule
         self.hw = hw
         self.overrides = overrides
@@ -71,6 +74,7 @@ class EDClassifier(ClassifierMixin, BaseEstimator):
             "network.hidden": list(self.hidden),
             "learning.epochs": self.epochs,
             "learning.batch": self.batch,
+            "learning.rate": float(self.rate),
             "learning.rule": self.rule,
         }
         classes = max(len(self.classes_), 2)
@@ -101,7 +105,7 @@ class EDClassifier(ClassifierMixin, BaseEstimator):
         :raises dalean.ConfigError: when a parameter or a key cannot be.
         :raises KeyboardInterrupt: within a batch.
         """
-        X, y = validate_data(self, X, y, dtype=[np.uint8, np.float64], accept_sparse=False)
+        X, y = validate_data(self, X, y, dtype=[np.float64, np.uint8], accept_sparse=False)
         check_classification_targets(y)
         self.classes_, labels = np.unique(y, return_inverse=True)
         if len(self.classes_) > 256:
