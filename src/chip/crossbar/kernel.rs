@@ -46,6 +46,7 @@ mod optimise;
 #[cfg(target_arch = "x86_64")]
 mod peak;
 mod pulses;
+mod reads;
 mod requests;
 mod scalar;
 mod sums;
@@ -69,8 +70,9 @@ pub use self::{
         OneSample, Peaks, Pulsed, Rails, Scratch, TOGETHER, WriteCounts, WriteLaw, is_driven,
     },
     normalise::{HandOn, SQUARED_MAX},
-    offsets::OFFSET_MAX,
+    offsets::{MiddleOf, OFFSET_MAX},
     optimise::{MEAN_BITS, SignLaw, Squares, joined},
+    reads::ReadsScratch,
     sums::Sums,
     team::Team,
 };
@@ -133,6 +135,16 @@ impl Kernel {
         if !out.is_empty() {
             call!(self, read(cells, drives, samples, out));
         }
+    }
+
+    /// What the drives of each sample add up to, where reads of this back end take that: given to them by
+    /// [`Drives::with_sums`], it is not added up for every panel again. Otherwise nothing.
+    #[must_use]
+    pub fn drive_sums(&self, drives: Drives<'_>) -> Option<Vec<i32>> {
+        let sums = self.ops.drive_sums?;
+        let mut out = vec![0; drives.samples()];
+        call!(sums, (drives, &mut out));
+        Some(out)
     }
 
     /// Reads one panel of two banks tile by tile, converts each and adds `code_E - code_I` to `codes` (32 a
@@ -259,6 +271,40 @@ impl Kernel {
         call!(self, index_squares(sums, shift, half, live))
     }
 
+    /// [`Kernel::offset`], [`Kernel::index_squares`] and [`Kernel::look_up`] of a panel, one after the other or at once: what units
+    /// put out that take a middle off their accumulators. Returns the sum of the squares of the places at which the first
+    /// `live` units are looked up, and the places that saturated. Accumulators are left as they are, or not.
+    ///
+    /// # Panics
+    /// As these do.
+    pub fn put_out(
+        &self,
+        sums: &mut [i32],
+        (middle, table): (MiddleOf<'_>, &LookUp),
+        live: usize,
+        totals: &mut [i64; PANEL_COLUMNS],
+        (values, derivatives): (&mut [u8], &mut [u8]),
+    ) -> [u64; 2] {
+        let samples = sums.len() / PANEL_COLUMNS;
+        assert_eq!(samples * PANEL_COLUMNS, sums.len(), "32 accumulators a sample");
+        assert!(live <= PANEL_COLUMNS && table.shift <= 30, "a panel has 32 columns");
+        assert!(middle.raise < 31, "what is left is raised by fewer bits than it has");
+        let entries = table.entries.len();
+        assert!(entries.is_power_of_two() && (2..=1 << 16).contains(&entries), "2^bits entries");
+        let least = samples.saturating_sub(1) * BLOCK_ROWS + PANEL_COLUMNS;
+        assert!(values.len() >= least && derivatives.len() >= least, "every unit has its place");
+        if let Some(put_out) = self.ops.put_out
+            && let Some(seen) =
+                call!(put_out, (sums, (middle, table), live, totals, (values, derivatives)))
+        {
+            return seen;
+        }
+        self.offset(sums, middle.offsets, middle.raise, totals);
+        let half = i32::try_from(entries / 2).expect("at most 2^15");
+        let squares = self.index_squares(sums, table.shift, half, live);
+        [squares, self.look_up(sums, table, live, values, derivatives)]
+    }
+
     /// `sums = E - I`, sum by sum. The plan proves that it fits.
     ///
     /// # Panics
@@ -334,6 +380,37 @@ impl Kernel {
         assert!(stride.is_multiple_of(4) && stride * BLOCK_ROWS >= errors.len(), "padded samples");
         assert_eq!(gates.len(), stride * BLOCK_ROWS, "every gate has its place");
         call!(self, gate(errors, derivatives, negate, bits, stride, gates))
+    }
+
+    /// [`Kernel::gate`] of samples, so many of which in a row share a word: `errors` lies `[sample / shared][64]`.
+    ///
+    /// # Panics
+    /// When the sizes do not match.
+    pub fn gate_shared(
+        &self,
+        (errors, shared): (&[i16], usize),
+        derivatives: &[u8],
+        negate: bool,
+        bits: ErrorBits,
+        stride: usize,
+        gates: &mut [i8],
+    ) -> u64 {
+        assert_eq!(errors.len() * shared, derivatives.len(), "every unit has an error");
+        match self.ops.gate_shared {
+            Some(gate) if shared > 1 => {
+                assert!(errors.len().is_multiple_of(BLOCK_ROWS), "64 columns a sample");
+                let padded = stride.is_multiple_of(4) && stride * BLOCK_ROWS >= derivatives.len();
+                assert!(padded && gates.len() == stride * BLOCK_ROWS, "every gate has its place");
+                call!(gate, ((errors, shared), derivatives, negate, bits, stride, gates))
+            }
+            None if shared > 1 => {
+                let all = errors.as_chunks::<BLOCK_ROWS>().0.iter();
+                let all = all.flat_map(|errors| std::iter::repeat_n(errors, shared));
+                let all: Vec<i16> = all.flatten().copied().collect();
+                self.gate(&all, derivatives, negate, bits, stride, gates)
+            }
+            _ => self.gate(errors, derivatives, negate, bits, stride, gates),
+        }
     }
 
     /// Turns one block of drives (`[sample][64]`) into rows of samples, `[64][stride]`, padded with 0.

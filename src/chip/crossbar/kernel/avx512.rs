@@ -29,6 +29,7 @@ mod fused;
 mod normalise;
 mod one_sample;
 mod peaks;
+mod reads;
 mod turn;
 mod units;
 
@@ -56,15 +57,19 @@ impl Avx512 {
 /// Handed out by the token: functions compiled for its features.
 pub(super) const OPS: Ops = Ops {
     read,
+    drive_sums: Some(drive_sums),
     read_conv: conv::read,
     convert: units::convert,
     look_up: units::look_up,
     difference: units::difference,
     latch: units::latch,
     gate: units::gate,
+    gate_shared: Some(units::gate_shared),
+    put_out: Some(units::put_out),
     turn: turn::turn,
     read_columns: columns::read_columns,
     accumulate,
+    accumulate_reads: Some(reads::accumulate),
     dither: dither::dither,
     dither_words: dither::dither_words,
     may_move: fused::may_move,
@@ -74,7 +79,7 @@ pub(super) const OPS: Ops = Ops {
     index_squares,
     stream_squares: normalise::stream_squares,
     scale: normalise::scale,
-    centre,
+    centre: normalise::centre,
     gate_totals,
     drive_totals,
     squares: normalise::squares,
@@ -95,6 +100,9 @@ const READ: u8 = 0;
 const GATES: u8 = 1;
 /// Turned levels against gates.
 const TURNED: u8 = 2;
+
+/// Streams that lie as far from one another as a walk says. Where that is known beforehand, their places need no arithmetic.
+const ANY: usize = 0;
 
 /// Where the bytes of [`dots`] lie: streams of words, and vectors in runs.
 #[derive(Clone, Copy)]
@@ -149,13 +157,14 @@ fn store_sums(sums: &mut [i32; 16], v: __m512i) {
 /// must divide by it.
 #[inline]
 #[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi,popcnt")]
-fn dots<const KIND: u8, const N: usize, const H: usize, const CHAINS: usize>(
+fn dots<const KIND: u8, const N: usize, const H: usize, const CHAINS: usize, const STRIDE: usize>(
     walk: Walk,
     streams: &[u8],
     vectors: &[u8],
     out: &mut [i32],
 ) {
     let Walk { runs, quads, run, half, words, stride, out: out_stride } = walk;
+    let stride = if STRIDE == ANY { stride } else { STRIDE };
     if runs * quads == 0 {
         if KIND != READ {
             out.fill(0);
@@ -188,11 +197,12 @@ fn dots<const KIND: u8, const N: usize, const H: usize, const CHAINS: usize>(
                         *w = _mm512_xor_si512(*w, flip);
                     }
                 }
+                // SAFETY: r < runs and quad < quads, so the first assertion above says that bytes lie there.
+                let first = unsafe { streams.as_ptr().add(r * words + quad * 4) };
                 for (i, acc) in acc.iter_mut().enumerate() {
-                    let at = r * words + i * stride + quad * 4;
-                    // SAFETY: r < runs, i < N and quad < quads, so the first assertion above bounds the last of
-                    // these 4 bytes; the read asks for no alignment.
-                    let word = unsafe { streams.as_ptr().add(at).cast::<i32>().read_unaligned() };
+                    // SAFETY: i < N, so the first assertion above bounds the last of these 4 bytes; the read asks for
+                    // no alignment.
+                    let word = unsafe { first.add(i * stride).cast::<i32>().read_unaligned() };
                     let x = _mm512_set1_epi32(word);
                     for (acc, w) in acc.iter_mut().zip(w) {
                         *acc = if KIND == TURNED {
@@ -225,7 +235,7 @@ fn dots<const KIND: u8, const N: usize, const H: usize, const CHAINS: usize>(
 
 /// [`dots`] with two vectors side by side for any number of samples, in even groups of at most 12.
 #[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi,popcnt")]
-fn dots_batch<const KIND: u8>(
+fn dots_batch<const KIND: u8, const STRIDE: usize>(
     walk: Walk,
     samples: usize,
     streams: &[u8],
@@ -238,18 +248,18 @@ fn dots_batch<const KIND: u8>(
         let x = &streams[from * walk.stride..];
         let out = &mut out[from * walk.out..];
         match to - from {
-            1 => dots::<KIND, 1, 2, 4>(walk, x, vectors, out),
-            2 => dots::<KIND, 2, 2, 4>(walk, x, vectors, out),
-            3 => dots::<KIND, 3, 2, 2>(walk, x, vectors, out),
-            4 => dots::<KIND, 4, 2, 2>(walk, x, vectors, out),
-            5 => dots::<KIND, 5, 2, 1>(walk, x, vectors, out),
-            6 => dots::<KIND, 6, 2, 1>(walk, x, vectors, out),
-            7 => dots::<KIND, 7, 2, 1>(walk, x, vectors, out),
-            8 => dots::<KIND, 8, 2, 1>(walk, x, vectors, out),
-            9 => dots::<KIND, 9, 2, 1>(walk, x, vectors, out),
-            10 => dots::<KIND, 10, 2, 1>(walk, x, vectors, out),
-            11 => dots::<KIND, 11, 2, 1>(walk, x, vectors, out),
-            12 => dots::<KIND, 12, 2, 1>(walk, x, vectors, out),
+            1 => dots::<KIND, 1, 2, 4, STRIDE>(walk, x, vectors, out),
+            2 => dots::<KIND, 2, 2, 4, STRIDE>(walk, x, vectors, out),
+            3 => dots::<KIND, 3, 2, 2, STRIDE>(walk, x, vectors, out),
+            4 => dots::<KIND, 4, 2, 2, STRIDE>(walk, x, vectors, out),
+            5 => dots::<KIND, 5, 2, 1, STRIDE>(walk, x, vectors, out),
+            6 => dots::<KIND, 6, 2, 1, STRIDE>(walk, x, vectors, out),
+            7 => dots::<KIND, 7, 2, 1, STRIDE>(walk, x, vectors, out),
+            8 => dots::<KIND, 8, 2, 1, STRIDE>(walk, x, vectors, out),
+            9 => dots::<KIND, 9, 2, 1, STRIDE>(walk, x, vectors, out),
+            10 => dots::<KIND, 10, 2, 1, STRIDE>(walk, x, vectors, out),
+            11 => dots::<KIND, 11, 2, 1, STRIDE>(walk, x, vectors, out),
+            12 => dots::<KIND, 12, 2, 1, STRIDE>(walk, x, vectors, out),
             _ => unreachable!("a group has 1 to 12 samples"),
         }
     }
@@ -268,15 +278,22 @@ fn drive_sum(drives: Drives<'_>, sample: usize) -> i32 {
 }
 
 #[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi,popcnt")]
+fn drive_sums(drives: Drives<'_>, sums: &mut [i32]) {
+    sums.iter_mut().enumerate().for_each(|(sample, sum)| *sum = drive_sum(drives, sample));
+}
+
+#[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi,popcnt")]
 pub(super) fn read(cells: &[u8], drives: Drives<'_>, samples: Range<usize>, out: &mut [i32]) {
     if samples.len() <= 4 {
         return few_samples::read(cells, drives, samples, out);
     }
     for (sample, out) in samples.clone().zip(out.as_chunks_mut::<32>().0) {
-        out.fill(128 * drive_sum(drives, sample));
+        let sum = drives.sums().map_or_else(|| drive_sum(drives, sample), |sums| sums[sample]);
+        out.fill(128 * sum);
     }
+    let blocks = drives.blocks();
     let walk = Walk {
-        runs: drives.blocks(),
+        runs: blocks,
         quads: 16,
         run: BLOCK_CELLS,
         half: HALF_CELLS,
@@ -285,7 +302,15 @@ pub(super) fn read(cells: &[u8], drives: Drives<'_>, samples: Range<usize>, out:
         out: 32,
     };
     let streams = &drives.codes()[samples.start * BLOCK_ROWS..];
-    dots_batch::<READ>(walk, samples.len(), streams, cells, out);
+    if drives.last_quads() == 16 || blocks == 0 {
+        return dots_batch::<READ, BLOCK_ROWS>(walk, samples.len(), streams, cells, out);
+    }
+    // what no row of the last block drives is passed over
+    let (whole, last) = cells.split_at((blocks - 1) * BLOCK_CELLS);
+    dots_batch::<READ, BLOCK_ROWS>(Walk { runs: blocks - 1, ..walk }, samples.len(), streams, whole, out);
+    let walk = Walk { runs: 1, quads: drives.last_quads(), ..walk };
+    let streams = &streams[(blocks - 1) * walk.words..];
+    dots_batch::<READ, BLOCK_ROWS>(walk, samples.len(), streams, last, out);
 }
 
 #[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi,popcnt")]
@@ -302,7 +327,7 @@ pub(super) fn accumulate(turned: &[u8], stride: usize, gates: &[i8], sums: &mut 
     let gates = as_bytes(gates);
     for row in (0..BLOCK_ROWS).step_by(16) {
         let sums = &mut sums[row * HALF_COLUMNS..][..16 * HALF_COLUMNS];
-        dots::<GATES, 16, 1, 1>(walk, &turned[row * stride..], gates, sums);
+        dots::<GATES, 16, 1, 1, ANY>(walk, &turned[row * stride..], gates, sums);
     }
 }
 

@@ -12,6 +12,15 @@
 use crate::chip::crossbar::layout::PANEL_COLUMNS;
 use crate::num::fixed::rsh;
 
+/// What a panel of units takes off its accumulators.
+#[derive(Debug, Clone, Copy)]
+pub struct MiddleOf<'a> {
+    /// By unit; of a size below [`OFFSET_MAX`].
+    pub offsets: &'a [i32; PANEL_COLUMNS],
+    /// Bits by which what is left is raised.
+    pub raise: u32,
+}
+
 /// Accumulators and offsets of a size below this give differences that 32 bits hold.
 pub const OFFSET_MAX: u32 = 1 << 30;
 

@@ -9,7 +9,7 @@
 use std::arch::x86_64::*;
 use std::ops::Range;
 
-use super::{READ, Walk, dots_batch, load};
+use super::{ANY, READ, Walk, dots_batch, load};
 use crate::chip::crossbar::kernel::conv::Image;
 use crate::chip::crossbar::layout::{BLOCK_CELLS, BLOCK_ROWS, HALF_CELLS, PANEL_COLUMNS};
 
@@ -49,7 +49,7 @@ pub(super) fn read(
             for block in 0..channels {
                 let block = ky * shape.side * channels + block;
                 let streams = &image.codes()[first + offsets[block]..];
-                dots_batch::<READ>(walk, count, streams, &cells[block * BLOCK_CELLS..], these);
+                dots_batch::<READ, ANY>(walk, count, streams, &cells[block * BLOCK_CELLS..], these);
             }
         }
         (at, out) = (at + count, rest);

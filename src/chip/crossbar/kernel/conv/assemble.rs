@@ -54,11 +54,11 @@ pub fn assemble(
     rows: &mut [&mut [u8]],
 ) {
     let plan = image.plan();
-    if let Some(offsets) = plan.offsets() {
+    if let Some((offsets, bytes)) = plan.runs() {
         for (offset, codes) in offsets[blocks].iter().zip(rows) {
             let (codes, _) = codes.as_chunks_mut::<BLOCK_ROWS>();
             for (pixel, codes) in plan.shape().steps(positions.start).zip(codes) {
-                let at = offset + pixel * BLOCK_ROWS;
+                let at = offset + pixel * bytes;
                 codes.copy_from_slice(&image.codes()[at..at + BLOCK_ROWS]);
             }
         }
