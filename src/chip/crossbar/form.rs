@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! short     few reads, turned once for all strips            [block][64 rows][stride]
-//! long      many reads, as they lie, some at a time          [block][read][64 rows]
+//! long      the windows of a convolution, some at a time     [block][read][64 rows]
 //! ```
 //!
 //! Both give the same sums. See docs/MODEL.md, 3 and 3.10.
@@ -13,17 +13,24 @@ use std::ops::Range;
 use aligned_vec::{AVec, avec};
 
 use super::StripMut;
-use super::kernel::{Half, Kernel, MEAN_BITS, ReadsScratch, is_driven, joined};
+use super::kernel::{Half, Kernel, MEAN_BITS, ReadsScratch, Windows, is_driven, joined};
 use super::layout::{BLOCK_ROWS, HALF_CELLS, HALF_COLUMNS};
 use super::write::WriteRequest;
 
-/// Drives of the written samples by block of 64 rows; `None` where all are 0.
+/// Drives of the written samples.
 #[derive(Debug, Clone, Copy)]
 pub enum Met<'a> {
-    /// `[64 rows][stride]`: of few reads.
+    /// By block of 64 rows, `[64 rows][stride]`; `None` where all are 0.
     Turned(&'a [Option<&'a [u8]>]),
-    /// `[read][64 rows]`, as they were read: of many reads.
-    AsRead(&'a [Option<&'a [u8]>]),
+    /// Those of windows, put together here again: they are more than what they are put together from.
+    Windows {
+        /// All windows.
+        windows: Windows<'a>,
+        /// The first read that is written.
+        first: usize,
+        /// Reads.
+        count: usize,
+    },
 }
 
 /// What is formed of the products of a write.
@@ -62,8 +69,15 @@ pub(super) struct Former<'a> {
     pub(super) sums: AVec<Half<i32>>,
     /// Those that 32 bits do not hold, by half block.
     pub(super) long: LongSums,
+    /// Drives of some reads, and what else is put together on the way.
+    codes: AVec<u8>,
+    line: Vec<u8>,
+    part: AVec<Half<i32>>,
     scratch: ReadsScratch,
 }
+
+/// Reads of windows that are put together at once: so many that little is added up of what they come to.
+const PART: usize = 2048;
 
 impl<'a> Former<'a> {
     /// `gates` are those of a [`StripMut::write`].
@@ -88,14 +102,15 @@ impl<'a> Former<'a> {
         let (met, rows) = (request.met, strip.layout.rows);
         let sums = avec![[0; HALF_CELLS]; count];
         let (long, scratch) = (LongSums::new(), ReadsScratch::default());
-        Self { met, gates, stride, form, rows, halves, sums, long, scratch }
+        let (codes, line, part) = (avec![], vec![], avec![]);
+        Self { met, gates, stride, form, rows, halves, sums, long, codes, line, part, scratch }
     }
 
     /// Half blocks side by side that are formed together: what is met in passing is met by all at once.
     pub(super) const fn together(&self) -> usize {
         match self.met {
             Met::Turned(_) => 1,
-            Met::AsRead(_) => self.halves.len(),
+            Met::Windows { .. } => self.halves.len(),
         }
     }
 
@@ -129,33 +144,55 @@ impl<'a> Former<'a> {
 
     /// Sums of products, as they are.
     fn products(&mut self, kernel: &Kernel, block: usize, halves: Range<usize>) {
+        match self.met {
+            Met::Turned(turned) => {
+                let turned = turned.get(block).copied().flatten();
+                let size = HALF_COLUMNS * self.stride;
+                for half in halves {
+                    match turned {
+                        Some(turned) if self.halves[half].0 => {
+                            let gates = &self.gates[half * size..][..size];
+                            kernel.accumulate(turned, self.stride, gates, &mut self.sums[half]);
+                        }
+                        _ => self.sums[half].fill(0),
+                    }
+                }
+            }
+            Met::Windows { windows, first, count } => {
+                self.sums[halves.clone()].fill([0; _]);
+                for start in (0..count).step_by(PART) {
+                    let reads = start..(start + PART).min(count);
+                    self.codes.resize(reads.len() * BLOCK_ROWS, 0);
+                    let all = first + reads.start..first + reads.end;
+                    windows.assemble(block..block + 1, all, &mut self.line, &mut self.codes);
+                    self.add(kernel, block, halves.clone(), start);
+                }
+            }
+        }
+    }
+
+    /// Adds the products of the reads from `start` on that were put together.
+    fn add(&mut self, kernel: &Kernel, block: usize, halves: Range<usize>, start: usize) {
         let size = HALF_COLUMNS * self.stride;
-        let (Met::Turned(drives) | Met::AsRead(drives)) = self.met;
-        let Some(Some(drives)) = drives.get(block) else {
-            return self.sums[halves].fill([0; _]);
-        };
         let rows = (self.rows - block * BLOCK_ROWS).min(BLOCK_ROWS);
         let mut first = halves.start;
         // half blocks in a row that have gates, or have none
         for run in self.halves[halves].chunk_by(|a, b| a.0 == b.0) {
             let these = first..first + run.len();
             first = these.end;
-            let sums = &mut self.sums[these.clone()];
             if !run[0].0 {
-                sums.fill([0; _]);
                 continue;
             }
-            let gates = &self.gates[these.start * size..these.end * size];
-            match self.met {
-                Met::Turned(_) => {
-                    for (sums, gates) in sums.iter_mut().zip(gates.chunks_exact(size)) {
-                        kernel.accumulate(drives, self.stride, gates, sums);
-                    }
-                }
-                Met::AsRead(_) => {
-                    let (codes, gates) = ((*drives, rows), (gates, self.stride));
-                    kernel.accumulate_reads(codes, gates, &mut self.scratch, sums);
-                }
+            let gates = (&self.gates[these.start * size..these.end * size], self.stride, start);
+            let (codes, sums) = ((&self.codes[..], rows), &mut self.sums[these]);
+            if start == 0 {
+                kernel.accumulate_reads(codes, gates, &mut self.scratch, sums);
+                continue;
+            }
+            self.part.resize(sums.len(), [0; HALF_CELLS]);
+            kernel.accumulate_reads(codes, gates, &mut self.scratch, &mut self.part);
+            for (sums, part) in sums.iter_mut().zip(&*self.part) {
+                sums.iter_mut().zip(part).for_each(|(sum, part)| *sum += part);
             }
         }
     }

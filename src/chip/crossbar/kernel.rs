@@ -64,7 +64,7 @@ pub use self::{amx::Amx, avx2::Avx2, avx512::Avx512};
 pub use self::{
     backend::{Backend, UnknownBackend},
     chacha::Draws,
-    conv::{ConvPlan, ConvScratch, ConvShape, ConvTurned, Image, Pixels, assemble},
+    conv::{ConvPlan, ConvScratch, ConvShape, ConvTurned, Image, Pixels, Windows},
     data::{
         Banks, Cells, Conversion, Dither, Drives, Ends, Extremes, Greatest, Half, LookUp,
         OneSample, Peaks, Pulsed, Rails, Scratch, TOGETHER, WriteCounts, WriteLaw, is_driven,

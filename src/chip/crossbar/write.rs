@@ -71,7 +71,7 @@ impl StripMut<'_> {
     pub fn write(&mut self, kernel: &Kernel, request: &WriteRequest<'_>, gates: &[i8]) -> Written {
         let turned = match request.met {
             Met::Turned(turned) => turned,
-            Met::AsRead(_) => {
+            Met::Windows { .. } => {
                 return self.write_formed(kernel, request, (gates, Form::PLAIN), Asks::Narrow);
             }
         };

@@ -13,13 +13,16 @@
 
 use std::ops::Range;
 
-use aligned_vec::AVec;
+use aligned_vec::{AVec, avec};
 
 use super::Engine;
 use super::each::each;
 use super::homeostasis::Middle;
+use super::window::windows_of;
 use super::read::{Histogram, Mode, PanelPart, Reader, Seen};
-use crate::chip::crossbar::kernel::{HandOn, Kernel, LookUp, Scratch, TOGETHER};
+use crate::chip::crossbar::kernel::{
+    HandOn, Image, Kernel, LookUp, Scratch, TOGETHER, Windows,
+};
 use crate::chip::crossbar::layout::{BLOCK_ROWS, PANEL_COLUMNS};
 use crate::chip::hardware::{Adc, Hardware, Subtract};
 use crate::chip::layer::Layer;
@@ -32,8 +35,6 @@ use crate::num::tables::Activation;
 /// Reads of a convolution whose drives are gathered: three groups that are read together, and blocks of them lie so that half
 /// the blocks meet in one half of the first cache, and half in the other.
 const NEAR: usize = 3 * TOGETHER;
-/// Bytes between which drives of a read begin.
-const DRIVES_ALIGN: usize = 64;
 
 /// What the units of a layer do with their accumulators.
 #[derive(Debug, Clone)]
@@ -200,7 +201,7 @@ impl Engine {
         Seen::by_target(wiring, seen)
     }
 
-    /// The same of a convolution, which is read so often that its drives leave the second cache: all its units read some
+    /// The same of a convolution, which is read so often that its drives would leave the second cache: all its units read some
     /// positions, and then the next. The arrays of a convolution are small.
     fn put_out_near(&mut self, layer: usize, mode: Mode) -> Vec<Seen> {
         let reads = self.reads(layer);
@@ -236,11 +237,17 @@ impl Engine {
             }
         }
         let units = &self.units[layer];
+        let plan = own.plan.as_ref().expect("windows lie where samples are loaded");
+        let met = |&set: &Stream| Image::new(plan, &own.images[set.index()]);
+        let met = this.spec.drive_sets().iter().map(met);
+        let windows: Vec<_> = met.map(|image| windows_of(&this.spec, hardware, image)).collect();
+        let blocks = this.layout.blocks();
         let work = reads * this.layout.cells() * wiring.pathways().len();
-        let (places, drives) = (parts.len(), &own.drives);
+        let places = parts.len();
         let seen = each(&mut self.team, work, places, parts.into_iter().enumerate().collect(), {
             |kernel, (some, outs): (Range<usize>, _)| {
-                let near = drives.each_ref().map(|drives| gathered(drives, reads, &some));
+                let near = windows.iter().map(|windows| gathered(windows, blocks, &some));
+                let near: Vec<_> = near.collect();
                 let drives = |source: Stream| &near[this.spec.drives_of(source).index()][..];
                 let samples = some.len();
                 let reader = |&target| {
@@ -367,12 +374,10 @@ fn put_out_all(
     }
 }
 
-/// Drives of some reads, `[block][read][64]`, side by side: from block to block they would meet in the same sets of a cache.
-fn gathered(drives: &[u8], reads: usize, some: &Range<usize>) -> AVec<u8> {
-    let mut near = AVec::with_capacity(DRIVES_ALIGN, drives.len() / reads * some.len());
-    for block in drives.chunks_exact(reads * BLOCK_ROWS) {
-        near.extend_from_slice(&block[some.start * BLOCK_ROWS..some.end * BLOCK_ROWS]);
-    }
+/// Drives of some reads, `[block][read][64]`.
+fn gathered(windows: &Windows<'_>, blocks: usize, some: &Range<usize>) -> AVec<u8> {
+    let mut near = avec![0; blocks * some.len() * BLOCK_ROWS];
+    windows.assemble(0..blocks, some.clone(), &mut Vec::new(), &mut near);
     near
 }
 

@@ -15,11 +15,12 @@ use std::borrow::Cow;
 
 use super::Engine;
 use super::each::each;
+use super::window::channel_sums;
 use super::update::{Array, Ready, SUM_BITS, strips};
 use crate::chip::crossbar::kernel::{MEAN_BITS, SignLaw};
 use crate::chip::crossbar::layout::{BLOCK_ROWS, PANEL_COLUMNS};
 use crate::chip::crossbar::{
-    Adam, Asks, Crossbar, Form, LongSums, Momentum, SHORT_READS, Written,
+    Adam, Asks, Crossbar, Form, LongSums, Met, Momentum, SHORT_READS, Written,
 };
 use crate::chip::layer::requests::{dead_zone, first_mean, next_mean};
 use crate::chip::layer::{Optimiser, Requests};
@@ -210,13 +211,19 @@ impl Engine {
             assert!(samples == self.samples, "means are taken of all that is loaded");
             let pixels = (samples * shape.height * shape.width) as i64;
             let constant = pixels * i64::from(self.hardware.drive.bits.code_max());
-            for set in sets {
-                codes[set.index()] = self.channel_sums(layer, set.index());
+            for (set, met) in sets.iter().zip(&ready.met) {
+                if let Met::Windows { windows, .. } = met {
+                    codes[set.index()] = channel_sums(windows.image().codes(), shape.channels);
+                }
                 codes[set.index()].extend(spec.constant_row.then_some(constant));
             }
             return codes;
         }
-        let blocks: Vec<_> = ready.met.iter().flatten().copied().collect();
+        let turned = ready.met.iter().flat_map(|met| match met {
+            Met::Turned(turned) => *turned,
+            Met::Windows { .. } => unreachable!("a dense layer has no windows"),
+        });
+        let blocks: Vec<_> = turned.copied().collect();
         let sums = self.team.alone(blocks, |kernel, block| {
             block.map_or([0; BLOCK_ROWS], |turned| kernel.drive_totals(turned, ready.stride))
         });

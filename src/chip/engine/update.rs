@@ -17,8 +17,9 @@ use super::each::{MOVE, each};
 use super::error::{gates_of, stride_of};
 use super::passes::Passes;
 use super::pulses::Pulses;
+use super::window::windows_of;
 use super::{Engine, Lines, Write};
-use crate::chip::crossbar::kernel::{self, WriteCounts};
+use crate::chip::crossbar::kernel::{self, Image, WriteCounts};
 use crate::chip::crossbar::layout::{BLOCK_ROWS, PANEL_COLUMNS};
 use crate::chip::crossbar::{Collect, Crossbar, Met, StripMut, WriteRequest, Written};
 use crate::chip::hardware::{DitherBits, DitherPattern, PulseCode, Timing, WriteScheme};
@@ -135,31 +136,36 @@ impl Engine {
         let samples = &self.reads_of(layer, samples);
         let stride = stride_of(samples.len());
         let sets = self.layers[layer].spec.drive_sets();
-        // what meets many reads is not turned for all of them at once
-        let as_read = self.layers[layer].spec.convolution.is_some();
+        let convolution = self.layers[layer].spec.convolution.is_some();
         // taken, so that cells can be written while they are read
         let mut kept = std::mem::take(&mut self.registers[layer].turned);
-        let live: Vec<Vec<bool>> = if as_read {
-            vec![]
-        } else {
+        let mut live: Vec<Vec<bool>> = vec![];
+        if !convolution {
             let sets = sets.iter().zip(&mut kept);
-            sets.map(|(&set, turned)| self.turn(layer, set, samples, turned)).collect()
-        };
-        let drives = std::mem::take(&mut self.registers[layer].drives);
+            live.extend(sets.map(|(&set, turned)| self.turn(layer, set, samples, turned)));
+        }
+        let images = std::mem::take(&mut self.registers[layer].images);
         let registers = std::mem::take(&mut self.registers[layer].gates);
-        let reads = self.reads(layer);
-        let met = if as_read {
-            let of = |&set: &Stream| blocks_met(&drives[set.index()], reads, samples);
-            sets.iter().map(of).collect()
-        } else {
-            let turned = kept.iter().zip(&live).map(|(turned, live)| {
+        let turned: Vec<Vec<_>> = kept
+            .iter()
+            .zip(&live)
+            .map(|(turned, live)| {
                 // of no samples, nothing
                 let blocks = turned.chunks_exact((BLOCK_ROWS * stride).max(1));
                 blocks.zip(live).map(|(block, live)| live.then_some(block)).collect()
-            });
-            turned.collect()
-        };
-        let ready = self.ready(layer, samples, (met, as_read), &registers, shift);
+            })
+            .collect();
+        let plan = self.registers[layer].plan.clone();
+        let met = sets.iter().map(|&set| match (&plan, convolution && !samples.is_empty()) {
+            (Some(plan), true) => {
+                let image = Image::new(plan, &images[set.index()]);
+                let windows = windows_of(&self.layers[layer].spec, &self.hardware, image);
+                Met::Windows { windows, first: samples.start, count: samples.len() }
+            }
+            _ => Met::Turned(turned.get(set.index()).map_or(&[], |turned| &turned[..])),
+        });
+        let met = met.collect();
+        let ready = self.ready(layer, samples, met, &registers, shift);
         let written = if self.layers[layer].requests.are_plain() {
             self.write_at_once(layer, &ready)
         } else {
@@ -172,7 +178,7 @@ impl Engine {
             }
         }
         self.registers[layer].turned = kept;
-        self.registers[layer].drives = drives;
+        self.registers[layer].images = images;
         self.registers[layer].gates = registers;
         written.into_iter().map(|(array, _, written)| (array, written.counts)).collect()
     }
@@ -182,7 +188,7 @@ impl Engine {
         &self,
         layer: usize,
         samples: &Range<usize>,
-        (met, as_read): (Vec<Vec<Option<&'a [u8]>>>, bool),
+        met: Vec<Met<'a>>,
         registers: &'a [Lines<i8>; 2],
         shift: u32,
     ) -> Ready<'a> {
@@ -222,7 +228,6 @@ impl Engine {
             samples: samples.len(),
             stride: stride_of(samples.len()),
             met,
-            as_read,
             gates,
             law,
             dither: (write.dither_bits, write.dither_pattern),
@@ -273,9 +278,8 @@ impl Engine {
 pub(super) struct Ready<'a> {
     pub(super) samples: usize,
     pub(super) stride: usize,
-    /// Drives by set and block, turned or as they were read; `None` where all are 0.
-    pub(super) met: Vec<Vec<Option<&'a [u8]>>>,
-    as_read: bool,
+    /// By set of drives.
+    pub(super) met: Vec<Met<'a>>,
     /// By array.
     gates: Vec<Cow<'a, [i8]>>,
     law: kernel::WriteLaw,
@@ -298,7 +302,7 @@ impl Ready<'_> {
     pub(super) fn request(&self, array: usize) -> WriteRequest<'_> {
         let Array { set, negate, place } = self.arrays[array];
         WriteRequest {
-            met: if self.as_read { Met::AsRead(&self.met[set]) } else { Met::Turned(&self.met[set]) },
+            met: self.met[set],
             stride: self.stride,
             write: kernel::WriteLaw { negate, ..self.law },
             dither_bits: self.dither.0,
@@ -313,13 +317,6 @@ impl Ready<'_> {
         let (panels, size) = (strip.panels(), PANEL_COLUMNS * self.stride);
         &self.gates[array][panels.start * size..panels.end * size]
     }
-}
-
-/// Drives of some of the loaded reads as they lie, by block of rows; `None` where all are 0.
-fn blocks_met<'a>(drives: &'a [u8], reads: usize, some: &Range<usize>) -> Vec<Option<&'a [u8]>> {
-    let blocks = drives.chunks_exact((reads * BLOCK_ROWS).max(1));
-    let blocks = blocks.map(|block| &block[some.start * BLOCK_ROWS..some.end * BLOCK_ROWS]);
-    blocks.map(|codes| kernel::is_driven(codes).then_some(codes)).collect()
 }
 
 /// All arrays of a layer in strips, each with its array and beside the first of its panels.

@@ -76,7 +76,7 @@ pub(super) struct Ops {
     /// Where a back end takes many reads at once, of codes as reads lie and rows that exist, and of gates and their stride;
     /// otherwise they are turned some at a time.
     pub(super) accumulate_reads:
-        Option<unsafe fn((&[u8], usize), (&[i8], usize), &mut [Half<i32>])>,
+        Option<unsafe fn((&[u8], usize), (&[i8], usize, usize), &mut [Half<i32>])>,
     pub(super) dither: unsafe fn(&Draws, usize, usize, &mut Half<u8>),
     pub(super) dither_words: unsafe fn(&Draws, usize, usize, &mut Half<u16>),
     pub(super) may_move: unsafe fn(Sums<'_>, &WriteLaw, u32) -> u16,
@@ -142,11 +142,6 @@ macro_rules! twins {
         #[target_feature(enable = $features)]
         fn index_squares(sums: &[i32], shift: u32, half: i32, live: usize) -> u64 {
             crate::chip::crossbar::kernel::offsets::index_squares(sums, shift, half, live)
-        }
-
-        #[target_feature(enable = $features)]
-        fn centre(sums: &mut Half<i32>, means: &[i32; BLOCK_ROWS], totals: &[i32; HALF_COLUMNS]) {
-            crate::chip::crossbar::kernel::optimise::centre(sums, means, totals)
         }
 
         #[target_feature(enable = $features)]

@@ -39,38 +39,39 @@ impl Default for ReadsScratch {
 }
 
 impl Kernel {
-    /// Sums of half blocks side by side, of one block of rows: `sums[h][r][c] = sum over b of codes[b][r] * gates[h][b][c]`.
-    /// `codes` lies `[read][64 rows]`, of which the first `rows` exist; `gates` `[half][stride / 4][16 columns][4 reads]`. What
-    /// lies in rows that do not exist is 0 or not, and means nothing.
+    /// Sums of half blocks side by side, of one block of rows: `sums[h][r][c] = sum over b of codes[b][r] * gates[h][first + b][c]`.
+    /// `codes` lies `[read][64 rows]`, of which the first `rows` exist; `gates` `[half][stride / 4][16 columns][4 reads]`, and
+    /// `first` is a whole word of them. What lies in rows that do not exist means nothing.
     ///
     /// # Panics
     /// When the sizes do not match, or sums may not fit 32 bits.
     pub fn accumulate_reads(
         &self,
         (codes, rows): (&[u8], usize),
-        (gates, stride): (&[i8], usize),
+        (gates, stride, first): (&[i8], usize, usize),
         scratch: &mut ReadsScratch,
         sums: &mut [Half<i32>],
     ) {
         let reads = codes.len() / BLOCK_ROWS;
         assert!(codes.len().is_multiple_of(BLOCK_ROWS), "64 rows a read");
         assert!((1..=BLOCK_ROWS).contains(&rows), "a block has rows");
-        assert!(reads <= stride && stride.is_multiple_of(4), "reads are padded to words of four");
-        assert!(reads <= READS_MAX, "sums fit 32 bits");
+        assert!(stride.is_multiple_of(4) && first.is_multiple_of(4), "reads come in words of four");
+        assert!(first + reads <= stride && reads <= READS_MAX, "reads have gates, and sums fit");
         assert_eq!(gates.len(), sums.len() * HALF_COLUMNS * stride, "16 columns a half block");
         if let Some(all) = self.ops.accumulate_reads {
-            return call!(all, ((codes, rows), (gates, stride), sums));
+            return call!(all, ((codes, rows), (gates, stride, first), sums));
         }
         sums.iter_mut().for_each(|sums| sums.fill(0));
         let ReadsScratch { turned, part } = scratch;
-        for first in (0..reads).step_by(TURNED) {
-            // gates are padded as the last part is
-            let count = TURNED.min(stride - first);
+        for start in (0..reads).step_by(TURNED) {
+            // padded as gates are
+            let padded = (reads - start).next_multiple_of(BLOCK_ROWS).min(stride - first - start);
+            let count = TURNED.min(padded);
             turned.resize(BLOCK_ROWS * count, 0);
-            let codes = &codes[first * BLOCK_ROWS..(first + count).min(reads) * BLOCK_ROWS];
+            let codes = &codes[start * BLOCK_ROWS..(start + count).min(reads) * BLOCK_ROWS];
             self.turn(codes, count, turned);
             for (sums, gates) in sums.iter_mut().zip(gates.chunks_exact(HALF_COLUMNS * stride)) {
-                let gates = &gates[first * HALF_COLUMNS..][..count * HALF_COLUMNS];
+                let gates = &gates[(first + start) * HALF_COLUMNS..][..count * HALF_COLUMNS];
                 self.accumulate(turned, count, gates, &mut part.0);
                 sums.iter_mut().zip(&part.0).for_each(|(sum, &part)| *sum += part);
             }
@@ -92,9 +93,10 @@ mod tests {
             reads in prop_oneof![1usize..20, 250usize..262, 1000usize..1100],
             rows in 1usize..=64,
             halves in 1usize..=3,
+            first in prop_oneof![Just(0usize), Just(4), Just(2048)],
             whole in any::<bool>(),
         ) {
-            let stride = reads.next_multiple_of(if whole { 64 } else { 4 });
+            let stride = (first + reads).next_multiple_of(if whole { 64 } else { 4 });
             let mut codes = vec![0; reads * 64];
             Place::global(seed, Site::InitialLevels, 0).fill(0, &mut codes);
             codes.chunks_exact_mut(64).for_each(|row| row[rows..].fill(0));
@@ -106,7 +108,8 @@ mod tests {
             for (half, want) in want.iter_mut().enumerate() {
                 for (at, sum) in want.iter_mut().enumerate() {
                     let (row, column) = (at / 16, at % 16);
-                    let gate = |b: usize| gates[half * 16 * stride + b / 4 * 64 + column * 4 + b % 4];
+                    let at = |b: usize| b / 4 * 64 + column * 4 + b % 4;
+                    let gate = |b: usize| gates[half * 16 * stride + at(first + b)];
                     *sum = (0..reads).map(|b| i32::from(codes[b * 64 + row]) * i32::from(gate(b))).sum();
                 }
             }
@@ -114,7 +117,8 @@ mod tests {
                 let mut sums = vec![[7; HALF_CELLS]; halves];
                 let mut scratch = ReadsScratch::default();
                 let kernel = Kernel::start(backend);
-                kernel.accumulate_reads((&codes, rows), (&gates, stride), &mut scratch, &mut sums);
+                let gates = (&gates[..], stride, first);
+                kernel.accumulate_reads((&codes, rows), gates, &mut scratch, &mut sums);
                 prop_assert_eq!(&sums, &want, "{}", backend.name());
             }
         }

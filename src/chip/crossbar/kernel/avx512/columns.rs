@@ -57,6 +57,7 @@ pub(in crate::chip::crossbar::kernel) fn pair(
     let walk = Walk {
         runs: gates.blocks(),
         quads: 16,
+        last: 16,
         run: 16 * 64,
         half: turned.group_bytes(),
         words: gates.samples() * BLOCK_ROWS,
@@ -64,7 +65,7 @@ pub(in crate::chip::crossbar::kernel) fn pair(
         out: rows,
     };
     let streams = &gates.codes()[samples.start * BLOCK_ROWS..];
-    dots_batch::<TURNED, ANY>(walk, samples.len(), streams, turned.groups(2 * pair), out);
+    dots_batch::<TURNED, ANY>(walk, samples.len(), streams, turned.groups(2 * pair), &[], out);
 }
 
 /// Turns one block of rows. Columns of a panel that does not exist become 0.

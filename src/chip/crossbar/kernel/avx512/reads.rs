@@ -28,7 +28,7 @@ struct Quads([Quad; QUADS]);
 #[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi,popcnt")]
 pub(super) fn accumulate(
     (codes, rows): (&[u8], usize),
-    (gates, stride): (&[i8], usize),
+    (gates, stride, first): (&[i8], usize, usize),
     sums: &mut [Half<i32>],
 ) {
     sums.iter_mut().for_each(|sums| sums.fill(0));
@@ -39,7 +39,7 @@ pub(super) fn accumulate(
         let quads = &mut quads.0[..count];
         put_together(codes, quads);
         for (sums, gates) in sums.iter_mut().zip(gates.chunks_exact(HALF_COLUMNS * stride)) {
-            let gates = &gates.as_chunks::<64>().0[at * QUADS..][..count];
+            let gates = &gates.as_chunks::<64>().0[first / 4 + at * QUADS..][..count];
             match rows.div_ceil(16) {
                 1 => tile::<1, 16>(quads, gates, 0, sums),
                 2 => (0..2).for_each(|part| tile::<2, 8>(quads, gates, part * 8, sums)),
