@@ -16,12 +16,11 @@ pub use momentum::Momentum;
 
 use super::StripMut;
 use super::form::{Form, Former, LongSums, place};
-use super::kernel::{Half, Kernel, SignLaw, WriteCounts, WriteLaw};
+use super::kernel::{Draws, Half, Kernel, SignLaw, WriteCounts, WriteLaw};
 use super::layout::HALF_COLUMNS;
 use super::pulses::Collector;
 use super::words::Words;
 use super::write::{WriteRequest, Written};
-use crate::chip::crossbar::kernel::Draws;
 use crate::chip::hardware::DitherBits;
 
 /// What is asked for by sums that were formed.
@@ -182,11 +181,8 @@ impl<'a> Pass<'a> {
             let groups = kernel.loud(sums, law.least);
             if groups != 0 {
                 let law = SignLaw { groups, ..law };
-                let words = if law.is_certain() {
-                    None
-                } else {
-                    words.draw_halves(kernel, column, block)
-                };
+                let words =
+                    if law.is_certain() { None } else { words.draw_halves(kernel, column, block) };
                 *counts += kernel.program_signs(cells, sums, &law, words, write.ends());
             }
             groups

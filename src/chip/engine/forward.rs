@@ -18,11 +18,9 @@ use aligned_vec::{AVec, avec};
 use super::Engine;
 use super::each::each;
 use super::homeostasis::Middle;
-use super::window::windows_of;
 use super::read::{Histogram, Mode, PanelPart, Reader, Seen};
-use crate::chip::crossbar::kernel::{
-    HandOn, Image, Kernel, LookUp, Scratch, TOGETHER, Windows,
-};
+use super::window::windows_of;
+use crate::chip::crossbar::kernel::{HandOn, Image, Kernel, LookUp, Scratch, TOGETHER, Windows};
 use crate::chip::crossbar::layout::{BLOCK_ROWS, PANEL_COLUMNS};
 use crate::chip::hardware::{Adc, Hardware, Subtract};
 use crate::chip::layer::Layer;
@@ -206,11 +204,13 @@ impl Engine {
     fn put_out_near(&mut self, layer: usize, mode: Mode) -> Vec<Seen> {
         let reads = self.reads(layer);
         let notes = self.notes(layer, mode);
+        let direct = self.hands_on_directly(layer);
         let (head, tail) = self.registers.split_at_mut(layer + 1);
         let own = &mut head[layer];
         let (this, hardware) = (&self.layers[layer], &self.hardware);
         let wiring = this.spec.wiring;
         let mut values: [&mut [u8]; 2] = match tail.first_mut() {
+            Some(next) if direct => next.drives.each_mut().map(|drives| &mut drives[..]),
             Some(_) => own.maps.each_mut().map(|map| &mut map[..]),
             None => own.activities.each_mut().map(|activities| &mut activities[..]),
         };
@@ -222,8 +222,7 @@ impl Engine {
             // empty where a layer only hands on, or is only read out
             let mut values =
                 std::mem::take(&mut values[target.index()]).chunks_mut(reads * BLOCK_ROWS);
-            let mut kept =
-                std::mem::take(&mut kept[target.index()]).chunks_mut(reads * BLOCK_ROWS);
+            let mut kept = std::mem::take(&mut kept[target.index()]).chunks_mut(reads * BLOCK_ROWS);
             let blocks = derivatives.chunks_mut(reads * BLOCK_ROWS).enumerate();
             for (block, derivatives) in blocks {
                 let mut values = values.next().unwrap_or_default().chunks_mut(NEAR * BLOCK_ROWS);

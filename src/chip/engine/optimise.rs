@@ -15,8 +15,8 @@ use std::borrow::Cow;
 
 use super::Engine;
 use super::each::each;
-use super::window::channel_sums;
 use super::update::{Array, Ready, SUM_BITS, strips};
+use super::window::channel_sums;
 use crate::chip::crossbar::kernel::{MEAN_BITS, SignLaw};
 use crate::chip::crossbar::layout::{BLOCK_ROWS, PANEL_COLUMNS};
 use crate::chip::crossbar::{
@@ -80,7 +80,7 @@ impl Engine {
         if let (Some(codes), true) = (&codes, first) {
             move_means(&mut this.requests.means, codes, |_, codes| first_mean(codes, samples));
         }
-                let keep = this.spec.convolution.is_some() || ready.samples > FORMED_AGAIN;
+        let keep = this.spec.convolution.is_some() || ready.samples > FORMED_AGAIN;
         let mut kept = std::mem::take(&mut self.registers[layer].sums);
         let work = this.layout.cells() * this.arrays.len() * ready.samples;
         let panels = this.layout.panels();

@@ -164,7 +164,13 @@ fn store_sums(sums: &mut [i32; 16], v: __m512i) {
 /// must divide by it.
 #[inline]
 #[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi,popcnt")]
-fn dots<const KIND: u8, const N: usize, const H: usize, const CHAINS: usize, const STRIDE: usize>(
+fn dots<
+    const KIND: u8,
+    const N: usize,
+    const H: usize,
+    const CHAINS: usize,
+    const STRIDE: usize,
+>(
     walk: Walk,
     streams: &[u8],
     vectors: &[u8],

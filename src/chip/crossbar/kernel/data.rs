@@ -111,8 +111,7 @@ impl<'a> Drives<'a> {
     #[must_use]
     pub fn of_blocks(self, blocks: std::ops::Range<usize>) -> Self {
         let (size, all) = (self.samples * BLOCK_ROWS, blocks.len() == self.blocks());
-        let last_quads =
-            if blocks.end == self.blocks() { self.last_quads } else { BLOCK_ROWS / 4 };
+        let last_quads = if blocks.end == self.blocks() { self.last_quads } else { BLOCK_ROWS / 4 };
         let codes = &self.codes[blocks.start * size..blocks.end * size];
         Self { codes, last_quads, sums: self.sums.filter(|_| all), ..self }
     }

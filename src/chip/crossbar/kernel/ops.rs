@@ -13,8 +13,8 @@
 use std::ops::Range;
 
 use super::{
-    Banks, Cells, Conversion, Dither, Draws, Drives, Ends, Extremes, Half, HandOn, Image, LookUp, MiddleOf,
-    OneSample, Peaks, Rails, Scratch, SignLaw, Squares, Sums, WriteCounts, WriteLaw,
+    Banks, Cells, Conversion, Dither, Draws, Drives, Ends, Extremes, Half, HandOn, Image, LookUp,
+    MiddleOf, OneSample, Peaks, Rails, Scratch, SignLaw, Squares, Sums, WriteCounts, WriteLaw,
 };
 use crate::chip::crossbar::layout::{BLOCK_ROWS, HALF_COLUMNS, Layout, PANEL_COLUMNS};
 use crate::num::fixed::ErrorBits;
@@ -55,9 +55,8 @@ pub(super) struct Ops {
     pub(super) latch: unsafe fn(&[i16], usize, &[u16], &mut [i16]),
     pub(super) gate: unsafe fn(&[i16], &[u8], bool, ErrorBits, usize, &mut [i8]) -> u64,
     /// Of words that so many samples in a row share, where a back end does that.
-    pub(super) gate_shared: Option<
-        unsafe fn((&[i16], usize), &[u8], bool, ErrorBits, usize, &mut [i8]) -> u64,
-    >,
+    pub(super) gate_shared:
+        Option<unsafe fn((&[i16], usize), &[u8], bool, ErrorBits, usize, &mut [i8]) -> u64>,
     pub(super) turn: unsafe fn(&[u8], usize, &mut [u8]),
     pub(super) read_columns: unsafe fn(&[u8], Layout, Drives<'_>, &mut [i32]),
     /// Of as many samples as gates say, of rows that lie a stride apart.

@@ -3,8 +3,8 @@
 
 use std::arch::x86_64::*;
 
-use super::{load_sums, store_sums};
 use super::units::store_bytes;
+use super::{load_sums, store_sums};
 use crate::chip::crossbar::kernel::{Half, HandOn, MEAN_BITS, Squares};
 use crate::chip::crossbar::layout::{BLOCK_ROWS, HALF_COLUMNS, PANEL_COLUMNS};
 

@@ -12,11 +12,9 @@
 
 use std::arch::x86_64::*;
 
-use super::{load_sums, store_sums};
 use super::turn::interleave;
-use crate::chip::crossbar::kernel::{
-    Conversion, LookUp, MiddleOf, Packed, Rails, Scratch, scalar,
-};
+use super::{load_sums, store_sums};
+use crate::chip::crossbar::kernel::{Conversion, LookUp, MiddleOf, Packed, Rails, Scratch, scalar};
 use crate::chip::crossbar::layout::{BLOCK_ROWS, PANEL_COLUMNS};
 use crate::num::fixed::ErrorBits;
 
@@ -367,7 +365,8 @@ pub(super) fn put_out(
         let (mut low, mut high) = ([0; 16], [0; 16]);
         store_sums(&mut low, lower);
         store_sums(&mut high, upper);
-        for (total, (low, high)) in totals[16 * column..].iter_mut().zip(low.into_iter().zip(high)) {
+        for (total, (low, high)) in totals[16 * column..].iter_mut().zip(low.into_iter().zip(high))
+        {
             *total += i64::from(low) + (i64::from(high) << 16);
         }
         let mut by_lane = [0; 16];

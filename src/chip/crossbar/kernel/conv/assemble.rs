@@ -109,11 +109,17 @@ fn assemble(
     rows: &mut [&mut [u8]],
 ) {
     let plan = image.plan();
-    if let Some((offsets, bytes)) = plan.runs() {
+    if plan.form() == Pixels::Packed {
+        for (block, codes) in blocks.zip(rows) {
+            packed(image, block, positions.start, codes);
+        }
+        return;
+    }
+    if let Some(offsets) = plan.offsets() {
         for (offset, codes) in offsets[blocks].iter().zip(rows) {
             let (codes, _) = codes.as_chunks_mut::<BLOCK_ROWS>();
             for (pixel, codes) in plan.shape().steps(positions.start).zip(codes) {
-                let at = offset + pixel * bytes;
+                let at = offset + pixel * BLOCK_ROWS;
                 codes.copy_from_slice(&image.codes()[at..at + BLOCK_ROWS]);
             }
         }
@@ -126,6 +132,39 @@ fn assemble(
             codes[i * BLOCK_ROWS..][..BLOCK_ROWS]
                 .copy_from_slice(&line[block * BLOCK_ROWS..][..BLOCK_ROWS]);
         }
+    }
+}
+
+/// The drives of a block of rows at some positions, of packed pixels: those of a row of taps lie together.
+fn packed(image: Image<'_>, block: usize, first: usize, codes: &mut [u8]) {
+    let shape = image.plan().shape();
+    let ([_, width], line) = (shape.padded(), shape.side * shape.channels);
+    let (start, end) = (block * BLOCK_ROWS, ((block + 1) * BLOCK_ROWS).min(shape.rows()));
+    // where a run begins, from the first tap on and in the block, and how long it is
+    let mut runs = Vec::new();
+    let mut row = start;
+    while row < end {
+        let (ky, along) = (row / line, row % line);
+        let run = (line - along).min(end - row);
+        runs.push((ky * width * shape.channels + along, row - start, run));
+        row += run;
+    }
+    let live = end - start;
+    for (i, pixel) in shape.steps(first).take(codes.len() / BLOCK_ROWS).enumerate() {
+        let (from, to) = (&image.codes()[pixel * shape.channels..], &mut codes[i * BLOCK_ROWS..]);
+        for &(at, row, run) in &runs {
+            copy_block(&from[at..], &mut to[row..], run);
+        }
+        to[live..BLOCK_ROWS].fill(0);
+    }
+}
+
+/// Copies at least `run` bytes of a block, and at most 64 where there are so many: what lies behind is written afterwards.
+#[inline]
+fn copy_block(from: &[u8], to: &mut [u8], run: usize) {
+    match (from.first_chunk::<BLOCK_ROWS>(), to.first_chunk_mut::<BLOCK_ROWS>()) {
+        (Some(from), Some(to)) => *to = *from,
+        _ => to[..run].copy_from_slice(&from[..run]),
     }
 }
 

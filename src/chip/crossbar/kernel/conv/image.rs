@@ -161,8 +161,6 @@ pub struct ConvPlan {
     pixels: Pixels,
     /// Bytes from the first tap of a position to its 64 drives of a block of rows, where these lie together.
     offsets: Vec<usize>,
-    /// The same in packed pixels of more than 64 channels.
-    packed: Vec<usize>,
 }
 
 impl ConvPlan {
@@ -183,14 +181,7 @@ impl ConvPlan {
         let offsets = taps.flat_map(|tap| {
             (0..blocks).map(move |block| (block * samples * shape.pixels() + tap) * BLOCK_ROWS)
         });
-        let offsets = offsets.collect();
-        let whole = pixels == Pixels::Packed && shape.channels.is_multiple_of(BLOCK_ROWS);
-        let packed = if whole { shape.channels / BLOCK_ROWS } else { 0 };
-        let taps = (0..shape.side).flat_map(|ky| (0..shape.side).map(move |kx| ky * width + kx));
-        let packed = taps
-            .flat_map(|tap| (0..packed).map(move |at| tap * shape.channels + at * BLOCK_ROWS))
-            .collect();
-        Self { shape, samples, pixels, offsets, packed }
+        Self { shape, samples, pixels, offsets: offsets.collect() }
     }
 
     /// Sizes.
@@ -259,14 +250,6 @@ impl ConvPlan {
     /// Where 64 rows of a block lie together in the image, their bytes from the first tap on; by block.
     pub(in super::super) fn offsets(&self) -> Option<&[usize]> {
         (!self.offsets.is_empty()).then_some(&self.offsets)
-    }
-
-    /// The same of all images in which they lie together, with the bytes from a pixel to the next.
-    pub(super) fn runs(&self) -> Option<(&[usize], usize)> {
-        match self.offsets() {
-            Some(offsets) => Some((offsets, BLOCK_ROWS)),
-            None => (!self.packed.is_empty()).then_some((&self.packed, self.shape.channels)),
-        }
     }
 
     /// Whether an update takes the image as it lies: the tap of a block is then a step along turned pixels.
