@@ -270,6 +270,16 @@ impl Layer {
         LookUp { entries: entries.collect(), shift: self.lut.shift }
     }
 
+    /// Words that a unit latches of a sample, one after the other: one, or one a pixel behind the pool where they come from
+    /// the rows of the layer above.
+    #[must_use]
+    pub fn heard(&self) -> usize {
+        match self.delivery.source {
+            WordSource::Above { .. } => self.spec.pooled().into_iter().product(),
+            _ => 1,
+        }
+    }
+
     /// Rows of each tile of a column, top to bottom.
     pub fn row_tiles(&self, hardware: &Hardware) -> impl Iterator<Item = Range<usize>> + use<> {
         let (rows, step) = (self.layout.rows, hardware.tile.rows);

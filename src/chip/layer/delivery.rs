@@ -4,7 +4,7 @@
 //! output   S[c]                                                   the words of the output layer, as they are
 //! sum      sat_eb( rsh( sum_c S[c], shift ) )                     one word
 //! signed   sat_eb( rsh( sum_c +-S[c], shift ) )                   a word a unit, by fixed signs
-//! above    sat_eb( rsh( d, level_bits - log2(weight_max) + 8 - error_bits ) )       d: row sums of the layer above
+//! above    sat_eb( rsh( d, level_bits - log2(weight_max) + 8 - error_bits - gain ) )       d: row sums of the layer above
 //! taps     err_j = S[w_j],  or  sat_eb( rsh( sum_t S[w_jt], shift ) );  stream n takes -err_j, or err_j where streams are alike
 //! ```
 //!
@@ -52,8 +52,12 @@ pub enum WordSource {
         /// Shift of the sum.
         shift: u32,
     },
-    /// A word a unit, from the rows of the layer above: its last transposed read.
-    Above,
+    /// A word a unit, of a convolution one a unit and pixel behind its pool, from the rows of the layer above: its last
+    /// transposed read.
+    Above {
+        /// Powers of two that they are multiplied by beyond what levels and gates are worth.
+        gain_log2: u32,
+    },
 }
 
 /// How error words reach a layer.
@@ -84,7 +88,13 @@ impl Delivery {
     /// A layer whose units get what the layer above read from its columns.
     #[must_use]
     pub fn above(units: usize) -> Self {
-        Self { source: WordSource::Above, taps: Taps::identity(units), alike: false }
+        Self::above_times(units, 0)
+    }
+
+    /// The same, times a power of two.
+    #[must_use]
+    pub fn above_times(units: usize, gain_log2: u32) -> Self {
+        Self { source: WordSource::Above { gain_log2 }, taps: Taps::identity(units), alike: false }
     }
 
     /// Output words that an `ERR` of the layer carries for a sample: `CE`, or none where the layer above has them.
@@ -94,7 +104,7 @@ impl Delivery {
             WordSource::Output => self.taps.width,
             WordSource::Sum { outputs, .. } => *outputs,
             WordSource::Signed { signs, .. } => signs.len() / self.taps.width,
-            WordSource::Above => 0,
+            WordSource::Above { .. } => 0,
         }
     }
 
@@ -111,7 +121,7 @@ impl Delivery {
             WordSource::Sum { .. } | WordSource::Signed { .. } => {
                 self.output_words() * self.taps.width
             }
-            WordSource::Output | WordSource::Above => 0,
+            WordSource::Output | WordSource::Above { .. } => 0,
         }
     }
 }

@@ -166,16 +166,23 @@ impl Network {
                 }
                 (0..width).map(|word| rsh(sum_of(word), shift)).collect()
             }
-            WordSource::Above => {
-                let above = &self.layers[layer + 1];
-                let sums = &above.backward[sample * above.inputs..][..above.inputs];
-                let worth = i64::from(self.unit.level_bits) - i64::from(above.weight_max_log2);
+            WordSource::Above { gain_log2 } => {
+                let (own, above) = (&self.layers[layer], &self.layers[layer + 1]);
+                let inputs = above.sample_inputs();
+                let sums = &above.backward[sample * inputs..][..inputs];
+                let asked = own.place_bits() * inputs as u64;
+                let code = own.unit_code(Stream::P);
+                let worth = i64::from(self.unit.level_bits)
+                    - i64::from(above.weight_max_log2)
+                    - i64::from(gain_log2);
                 let shift = worth + 8 - i64::from(self.unit.error_bits);
                 let scaled = |&d: &i64| match u32::try_from(shift) {
                     Ok(right) => rsh(d, right),
                     Err(_) => d << shift.unsigned_abs(),
                 };
-                sums.iter().map(scaled).collect()
+                let exact = sums.iter().map(scaled).collect();
+                self.charge(layer, code, During::Error, Event::SramBits, asked);
+                exact
             }
         };
         exact.into_iter().map(|exact| self.bounded(layer, exact)).collect()
