@@ -44,8 +44,7 @@ impl Engine {
         let this = &self.layers[layer];
         let (taps, units, wiring) = (&this.delivery.taps, this.layout.columns, this.spec.wiring);
         let alike = this.delivery.alike;
-        let (heard, above) =
-            (this.heard(), matches!(this.delivery.source, WordSource::Above { .. }));
+        let (heard, above) = (this.heard(), this.delivery.source == WordSource::Above);
         assert_eq!(words.len(), samples.len() * heard * taps.width, "a word a bus slot and sample");
         // sums are formed when they are programmed: what they are formed of must still be there
         let pending = self.registers[layer].pending;

@@ -43,7 +43,7 @@ impl Engine {
                 assert!(bounded(), "output words lie inside their rail");
                 signed(output, outputs, signs, *shift, bits)
             }
-            WordSource::Above { gain_log2 } => self.words_above(layer, samples, *gain_log2),
+            WordSource::Above => self.words_above(layer, samples),
         };
         let dense = matches!(delivery.source, WordSource::Signed { .. });
         let products = if dense { samples.len() * delivery.terms() } else { 0 };
@@ -54,15 +54,13 @@ impl Engine {
     }
 
     /// What the layer above read from its columns, as words.
-    fn words_above(&self, layer: usize, samples: &Range<usize>, gain_log2: u32) -> (Vec<i16>, u64) {
-        let above = &self.layers[layer + 1].spec;
-        let (sums, inputs) = (&self.registers[layer + 1].backward, above.sample_inputs());
+    fn words_above(&self, layer: usize, samples: &Range<usize>) -> (Vec<i16>, u64) {
+        let above = &self.layers[layer + 1];
+        let (sums, inputs) = (&self.registers[layer + 1].backward, above.spec.sample_inputs());
         assert_eq!(sums.len(), self.samples * inputs, "the layer above was read backwards");
         backward_words(
             &sums[samples.start * inputs..samples.end * inputs],
-            i64::from(self.hardware.cell.level_bits.get())
-                - i64::from(above.weight_max_log2)
-                - i64::from(gain_log2),
+            above.back_shift(&self.hardware),
             self.hardware.digital.error_bits,
         )
     }
@@ -130,14 +128,12 @@ fn bounded_all(sums: &[i32], shift: u32, bits: ErrorBits, words: &mut [i16]) -> 
 /// Row sums of a transposed read as error words.
 ///
 /// ```text
-/// S_below = sat_eb( rsh( d, level_bits - log2(weight_max) - gain + 8 - error_bits ) )
+/// S_below = sat_eb( rsh( d, shift ) )
 /// ```
 ///
-/// `worth` is `level_bits - log2(weight_max) - gain`: a level is worth `weight_max / 2^level_bits` and a gate
-/// `2^(8 - error_bits)` of a word; a negative shift is a multiplication. The derivative's peak, `1 / (2 alpha)`, is left to
-/// the layer's rate.
-fn backward_words(sums: &[i64], worth: i64, bits: ErrorBits) -> (Vec<i16>, u64) {
-    let shift = worth + 8 - i64::from(bits.get());
+/// The shift is that of [`Layer::back_shift`](crate::chip::layer::Layer::back_shift); a negative one is a multiplication.
+/// The derivative's peak, `1 / (2 alpha)`, is left to the layer's rate.
+fn backward_words(sums: &[i64], shift: i64, bits: ErrorBits) -> (Vec<i16>, u64) {
     let rail = rail(bits.get());
     let mut saturated = 0;
     // no branch: which sums saturate is hard to guess

@@ -4,7 +4,7 @@
 //! output   S[c]                                                   the words of the output layer, as they are
 //! sum      sat_eb( rsh( sum_c S[c], shift ) )                     one word
 //! signed   sat_eb( rsh( sum_c +-S[c], shift ) )                   a word a unit, by fixed signs
-//! above    sat_eb( rsh( d, level_bits - log2(weight_max) + 8 - error_bits - gain ) )       d: row sums of the layer above
+//! above    sat_eb( rsh( d, back shift of the layer above ) )                         d: its row sums
 //! taps     err_j = S[w_j],  or  sat_eb( rsh( sum_t S[w_jt], shift ) );  stream n takes -err_j, or err_j where streams are alike
 //! ```
 //!
@@ -54,10 +54,7 @@ pub enum WordSource {
     },
     /// A word a unit, of a convolution one a unit and pixel behind its pool, from the rows of the layer above: its last
     /// transposed read.
-    Above {
-        /// Powers of two that they are multiplied by beyond what levels and gates are worth.
-        gain_log2: u32,
-    },
+    Above,
 }
 
 /// How error words reach a layer.
@@ -88,13 +85,7 @@ impl Delivery {
     /// A layer whose units get what the layer above read from its columns.
     #[must_use]
     pub fn above(units: usize) -> Self {
-        Self::above_times(units, 0)
-    }
-
-    /// The same, times a power of two.
-    #[must_use]
-    pub fn above_times(units: usize, gain_log2: u32) -> Self {
-        Self { source: WordSource::Above { gain_log2 }, taps: Taps::identity(units), alike: false }
+        Self { source: WordSource::Above, taps: Taps::identity(units), alike: false }
     }
 
     /// Output words that an `ERR` of the layer carries for a sample: `CE`, or none where the layer above has them.
@@ -104,7 +95,7 @@ impl Delivery {
             WordSource::Output => self.taps.width,
             WordSource::Sum { outputs, .. } => *outputs,
             WordSource::Signed { signs, .. } => signs.len() / self.taps.width,
-            WordSource::Above { .. } => 0,
+            WordSource::Above => 0,
         }
     }
 
@@ -121,7 +112,7 @@ impl Delivery {
             WordSource::Sum { .. } | WordSource::Signed { .. } => {
                 self.output_words() * self.taps.width
             }
-            WordSource::Output | WordSource::Above { .. } => 0,
+            WordSource::Output | WordSource::Above => 0,
         }
     }
 }

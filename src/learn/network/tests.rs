@@ -520,7 +520,7 @@ fn every_rule_and_control_learns_through_convolutions() {
                 let outputs = engine.layers()[3].spec.units;
                 let samples = first..first + engine.samples();
                 list.extend(samples.flat_map(|s| {
-                    (0..outputs).map(move |o| if (s + o) % 3 == 0 { 200 } else { -100 })
+                    (0..outputs).map(move |o| (s * 7 + o * 11) as i32 % 23 * 12 - 130)
                 }));
             });
         }

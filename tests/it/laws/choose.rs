@@ -178,7 +178,7 @@ pub(crate) fn wiring() -> impl Strategy<Value = (Wiring, Wiring)> {
 fn delivery(numbers: &mut Numbers, units: usize, above: bool) -> Delivery {
     let shift = numbers.within(0, 3) as u32;
     match numbers.within(0, 9) {
-        0..=4 if above => Delivery::above_times(units, shift),
+        0..=4 if above => Delivery::above(units),
         5 => {
             let taps = Taps { width: 1, per_unit: 1, words: vec![0; units], shift: 0 };
             let outputs = numbers.within(1, 17) as usize;

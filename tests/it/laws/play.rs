@@ -180,7 +180,7 @@ impl Script<'_> {
             self.forward(self.read);
         }
         let delivery = &{ self.net }.deliveries[layer];
-        if matches!(delivery.source, WordSource::Above { .. }) && !self.columns[layer + 1] {
+        if delivery.source == WordSource::Above && !self.columns[layer + 1] {
             self.columns(layer + 1);
         }
         let from = if all { 0 } else { self.pick(self.samples) };

@@ -99,12 +99,11 @@ impl Shadow {
                         products += outputs as u64;
                     }
                 }
-                WordSource::Above { gain_log2 } => {
+                WordSource::Above => {
                     let above = &self.layers[layer + 1];
                     let hw = &self.net.hardware;
                     let by = hw.cell.level_bits.get() as i32 - above.spec.weight_max_log2 + 8
                         - bits as i32
-                        - *gain_log2 as i32
                         + i32::from(self.is(Fault::WordsAboveOffByOne));
                     for d in &above.backward[sample * units..][..units] {
                         let scaled = |by: i32| match by {

@@ -46,6 +46,8 @@ pub(super) struct TickLayer {
     pub(super) columns: usize,
     pub(super) delivery: Delivery,
     pub(super) weight_max_log2: i32,
+    /// What words that come back through its rows are multiplied by where it has a gain, as a power of two.
+    pub(super) evened: i64,
     pub(super) memory: Memory,
     /// Accumulator and activity by target stream and sample, of what was read last.
     pub(super) outputs: [Vec<(i64, u8)>; 2],
@@ -101,6 +103,7 @@ impl TickLayer {
             columns,
             delivery: layer.delivery.clone(),
             weight_max_log2: layer.spec.weight_max_log2,
+            evened: window::evened(&layer.spec),
             memory: Memory {
                 dac_bits: hardware.drive.dac_bits.into(),
                 residual_bits: hardware.write.residual_bits.get().into(),

@@ -224,7 +224,7 @@ impl Net {
             let delivery = if at == self.convolutions.len() {
                 Delivery::output(WORDS)
             } else if self.back {
-                Delivery::above_times(spec.units, 2)
+                Delivery::above(spec.units)
             } else {
                 let tap = |at: usize| number(self.seed, at, WORDS) as u16;
                 let words = (0..spec.units * self.taps).map(tap).collect();

@@ -27,7 +27,6 @@ struct Net {
     seed: u64,
     convolutions: Vec<LayerSpec>,
     samples: usize,
-    gain_log2: u32,
     chip: Hardware,
 }
 
@@ -85,8 +84,8 @@ fn chip() -> impl Strategy<Value = Hardware> {
 
 fn net() -> impl Strategy<Value = Net> {
     let first = (count(), [2usize..=5, 2usize..=5]);
-    (any::<u64>(), first, [wish(), wish()], 1usize..=3, any::<bool>(), 0u32..=3, chip()).prop_map(
-        |(seed, (channels, image), wishes, samples, rows, gain_log2, chip)| {
+    (any::<u64>(), first, [wish(), wish()], 1usize..=3, any::<bool>(), chip()).prop_map(
+        |(seed, (channels, image), wishes, samples, rows, chip)| {
             let mut convolutions: Vec<LayerSpec> = vec![];
             for wish in wishes {
                 let (channels, image) =
@@ -95,7 +94,7 @@ fn net() -> impl Strategy<Value = Net> {
                 convolutions.push(LayerSpec { constant_row: rows, ..spec });
             }
             convolutions[0].driven_by = DrivenBy::Shared;
-            Net { seed, convolutions, samples, gain_log2, chip }
+            Net { seed, convolutions, samples, chip }
         },
     )
 }
@@ -138,7 +137,7 @@ impl Net {
         let layers = specs.enumerate().map(|(at, spec)| {
             let delivery = match at {
                 2 => Delivery::output(OUTPUTS),
-                _ => Delivery::above_times(spec.units, self.gain_log2),
+                _ => Delivery::above(spec.units),
             };
             Layer::new(at as u16, spec, delivery, &self.chip)
         });
@@ -174,7 +173,7 @@ impl Net {
     /// Row sums of a transposed read as words.
     fn scaled(&self, sums: &[i64]) -> Vec<i16> {
         let (levels, bits) = (self.chip.cell.level_bits.get(), self.chip.digital.error_bits.get());
-        let shift = i64::from(levels + 8) - 1 - i64::from(self.gain_log2 + bits);
+        let shift = i64::from(levels + 8) - 1 - i64::from(bits);
         let word = |&d: &i64| match u32::try_from(shift) {
             Ok(shift) => sat(rsh(d, shift), bits).0 as i16,
             Err(_) => sat(d << -shift, bits).0 as i16,

@@ -103,7 +103,7 @@ pub(super) fn config(
                 WriteScheme::Trains { slots_log2 } => Some(1 << slots_log2),
             },
             positions: layer.spec.positions(),
-            squares: matches!(layer.delivery.source, WordSource::Above { .. }).then(|| Squares {
+            squares: (layer.delivery.source == WordSource::Above).then(|| Squares {
                 side: layer.spec.pool.side(),
                 pixels: layer.spec.pooled(),
                 greatest: matches!(layer.spec.pool, Pool::Max { .. })

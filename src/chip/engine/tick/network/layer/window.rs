@@ -29,6 +29,21 @@ impl Window {
     }
 }
 
+/// Half the logarithm of the rows that share a column, rounded up: rows of a dense layer or, in a window, channels times
+/// the square of the stride.
+pub(super) fn evened(spec: &LayerSpec) -> i64 {
+    let rows = match spec.convolution {
+        Some(shape) => shape.channels * shape.stride * shape.stride,
+        None => spec.inputs,
+    };
+    let (mut columns, mut power) = (spec.units, 0);
+    while columns < rows {
+        columns *= 4;
+        power += 1;
+    }
+    power
+}
+
 impl TickLayer {
     /// Reads of a sample.
     pub(in super::super) fn positions(&self) -> usize {
