@@ -24,6 +24,10 @@ use crate::chip::layer::{LayerSpec, Pool};
 use crate::chip::ledger::Event;
 use crate::chip::population::Stream;
 
+mod back;
+
+pub(super) use back::{fold, folded, spread};
+
 impl Engine {
     /// Reads of a layer of the loaded samples: positions of all of them.
     pub(super) fn reads(&self, layer: usize) -> usize {
