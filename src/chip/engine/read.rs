@@ -50,6 +50,8 @@ struct TileRead<'a> {
     /// Blocks of a physical tile among them.
     tile_blocks: usize,
     codes: Cow<'a, [u8]>,
+    /// What the drives of each sample add up to, where that is known.
+    sums: Vec<i32>,
 }
 
 /// What reads counted.
@@ -127,6 +129,7 @@ pub(super) struct Reader<'a> {
     /// Sums lie below this.
     bound: u128,
     pub(super) columns: usize,
+    rows: usize,
 }
 
 impl<'a> Reader<'a> {
@@ -190,12 +193,28 @@ impl<'a> Reader<'a> {
             narrow,
             bound: bound.unwrap_or(u128::MAX),
             columns: layer.layout.columns,
+            rows: layer.layout.rows,
+        }
+    }
+
+    /// Adds up once what reads of every panel take, where the kernel's do.
+    pub(super) fn prepare(&mut self, kernel: &Kernel) {
+        for at in 0..2 * self.pairs.len() {
+            let reads = std::mem::take(&mut self.pairs[at / 2].reads[at % 2]);
+            let with_sums = reads.into_iter().map(|read| {
+                let sums = kernel.drive_sums(self.drives(&read)).unwrap_or_default();
+                TileRead { sums, ..read }
+            });
+            self.pairs[at / 2].reads[at % 2] = with_sums.collect();
         }
     }
 
     /// What a read is driven with.
     fn drives<'b>(&self, read: &'b TileRead<'_>) -> Drives<'b> {
-        Drives::new(&read.codes, self.samples).within(self.greatest)
+        let rows = (self.rows - (read.blocks.end - 1) * BLOCK_ROWS).min(BLOCK_ROWS);
+        let drives = Drives::new(&read.codes, self.samples);
+        let drives = drives.within(self.greatest).with_last_rows(rows);
+        if read.sums.is_empty() { drives } else { drives.with_sums(&read.sums) }
     }
 
     /// Whether every sum fits 31 bits.
@@ -478,6 +497,7 @@ fn tile_reads<'a>(
                 tile_blocks: blocks.len(),
                 codes: Cow::Borrowed(&drives[blocks.start * size..blocks.end * size]),
                 blocks,
+                sums: vec![],
             })
             .collect();
     }
@@ -496,7 +516,8 @@ fn tile_reads<'a>(
         if tiles == Tiles::Together && aligned {
             let tile_blocks = hardware.tile.rows.div_ceil(BLOCK_ROWS);
             let codes = sliced(drives);
-            reads.push(TileRead { slice: slice as usize, blocks: 0..blocks, tile_blocks, codes });
+            let (slice, sums) = (slice as usize, vec![]);
+            reads.push(TileRead { slice, blocks: 0..blocks, tile_blocks, codes, sums });
             continue;
         }
         for rows in layer.row_tiles(hardware) {
@@ -507,7 +528,8 @@ fn tile_reads<'a>(
             }
             debug_assert!(blocks.len() <= CHUNK_BLOCKS, "a converted tile is one chunk");
             let tile_blocks = blocks.len();
-            reads.push(TileRead { slice: slice as usize, blocks, tile_blocks, codes });
+            let (slice, sums) = (slice as usize, vec![]);
+            reads.push(TileRead { slice, blocks, tile_blocks, codes, sums });
         }
     }
     reads

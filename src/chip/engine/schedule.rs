@@ -6,7 +6,8 @@
 //! ```text
 //! reads      FWD(rows) of successive layers, in a pipeline of layers and samples
 //!                sum_l (1 + T_fwd(l)) + (B - 1) max_l (1 + again(l))
-//!            a convolution is read P times a sample, back to back:  1 + T_fwd + (P - 1) (1 + again), and P (1 + again)
+//!            a convolution is read P times a sample, back to back:  1 + T_fwd + (P - 1) (1 + again), and P (1 + again);
+//!            from its columns, in rounds, likewise
 //!            a normalised layer is followed by a digital stage of its own, of 2 NG + 32 beats in both sums; one with a
 //!            pool by one of NG beats a position that the pool puts out
 //! rounds     ERR, FWD(columns), UPD(add), UPD(now), sample by sample in the order of the list; in a round a run of
@@ -43,7 +44,7 @@ struct Shape {
     levels: [u64; 2],
     /// Tiles.
     tiles: u64,
-    /// Words on the bus.
+    /// Words on the bus, of a sample.
     words: u64,
     /// Cycles in which the error unit forms the words of a sample.
     form: u64,
@@ -179,7 +180,7 @@ impl Schedule {
                 columns,
                 levels: [tree_levels(down * pairs), tree_levels(across)],
                 tiles: planes * down * across,
-                words: layer.delivery.taps.width as u64,
+                words: (layer.delivery.taps.width * layer.heard()) as u64,
                 form: timing.form(layer.delivery.terms() as u64),
                 positions: layer.spec.positions() as u64,
                 stage: match layer.spec.pool {
@@ -317,7 +318,9 @@ impl Schedule {
             self.settle(cycles);
         }
         let (t, shape) = (self.timing, self.shapes[layer]);
+        let front = t.accept() + self.reads.again(2, shape.rows);
         let one = t.accept() + self.reads.read(2, shape.rows, shape.levels[1]);
+        let one = one + (shape.positions - 1) * front;
         for round in self.rounds(cycles, &(0..samples)) {
             round.close();
             round.passed[Interval::Columns as usize] += one;
@@ -325,8 +328,7 @@ impl Schedule {
         if let Segment::Rounds { columns, .. } = &mut self.segment {
             *columns = true;
         }
-        let count = samples as u64;
-        let front = t.accept() + self.reads.again(2, shape.rows);
+        let count = samples as u64 * shape.positions;
         cycles.occupy(layer, During::ForwardColumns, count * front);
         self.engage_read(cycles, layer, [count, 2], shape.rows, shape.levels[1]);
     }
