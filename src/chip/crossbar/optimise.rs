@@ -34,6 +34,8 @@ pub struct Form<'a> {
     pub squares: bool,
     /// Whether centred sums may be beyond 32 bits: those of more than [`SHORT_READS`] reads.
     pub long: bool,
+    /// Products of a read: 2 where drives have a sign, the second with its gate turned round.
+    pub phases: usize,
 }
 
 /// So many reads have centred sums of 32 bits, whatever they hold: 4096 x 4080 x 127 < 2^31.
@@ -110,7 +112,11 @@ impl StripMut<'_> {
         for (half, gates) in gates.chunks_exact(HALF_COLUMNS * request.stride).enumerate() {
             let live = is_driven(gates);
             let centred = live && form.means.is_some();
-            let totals = if centred { kernel.gate_totals(gates) } else { [0; _] };
+            let totals = match form.phases {
+                _ if !centred => [0; _],
+                1 => kernel.gate_totals(gates),
+                _ => totals_above(gates),
+            };
             for (block, turned) in request.turned.iter().enumerate() {
                 let at = place(half, block, blocks);
                 let sums = half_of(sums, at);
@@ -216,6 +222,17 @@ impl StripMut<'_> {
         }
         Written { counts, collected: collector.finish(kernel) }
     }
+}
+
+/// Sums of the gates of 16 columns, packed as an update takes them, of which every second is turned round: of the others.
+fn totals_above(gates: &[i8]) -> [i32; HALF_COLUMNS] {
+    let mut totals = [0; HALF_COLUMNS];
+    for four in gates.as_chunks::<{ 4 * HALF_COLUMNS }>().0 {
+        for (total, gates) in totals.iter_mut().zip(four.as_chunks::<4>().0) {
+            *total += i32::from(gates[0]) + i32::from(gates[2]);
+        }
+    }
+    totals
 }
 
 /// Whether centred sums are below 2^31 for certain: sums below 2^26 and gates that add up to little.

@@ -16,7 +16,7 @@ impl Engine {
         if self.phase != Phase::Evaluation {
             return;
         }
-        let reads = self.reads(layer);
+        let reads = self.drivings(layer);
         let this = &self.layers[layer];
         let levels = self.row_sums[layer]
             .get_or_insert_with(|| this.arrays.iter().map(|array| array.row_sums()).collect());

@@ -15,7 +15,9 @@ use std::ops::Range;
 
 use super::homeostasis::{Noted, Notes};
 use crate::chip::crossbar::Crossbar;
-use crate::chip::crossbar::kernel::{Banks, Conversion, Drives, Greatest, Kernel, Scratch};
+use crate::chip::crossbar::kernel::{
+    Banks, Conversion, Drives, Greatest, Kernel, Scratch, TOGETHER,
+};
 use crate::chip::crossbar::layout::{BLOCK_ROWS, PANEL_COLUMNS};
 use crate::chip::hardware::{Adc, Hardware, Subtract};
 use crate::chip::layer::{CHUNK_BLOCKS, Layer};
@@ -116,7 +118,9 @@ struct Pair<'a> {
 /// The banks of one target stream, and how they are read.
 pub(super) struct Reader<'a> {
     pairs: Vec<Pair<'a>>,
+    /// Drivings of rows: reads, twice as many where drives have a sign.
     samples: usize,
+    phases: usize,
     /// Converters by slice; none where they are ideal.
     converters: Option<(Vec<Converter>, Subtract)>,
     probe: Option<Converter>,
@@ -163,9 +167,10 @@ impl<'a> Reader<'a> {
             (Some(_), false) => Tiles::Apart,
         };
         let code_max = hardware.drive.bits.code_max();
+        let phases = layer.spec.driven_by.phases();
         let reads = |at: usize| {
             let drives = drives(wiring.pathways()[at].source);
-            tile_reads(layer, hardware, drives, samples, tiles)
+            tile_reads(layer, hardware, drives, samples * phases, tiles)
         };
         let pair = |places: &[usize; 2]| Pair {
             arrays: places.map(|at| &layer.arrays[at]),
@@ -173,7 +178,8 @@ impl<'a> Reader<'a> {
         };
         Self {
             pairs: pairs.iter().map(pair).collect(),
-            samples,
+            samples: samples * phases,
+            phases,
             converters,
             probe,
             dac_bits: hardware.drive.dac_bits,
@@ -210,6 +216,26 @@ impl<'a> Reader<'a> {
 
     /// Accumulators of a panel, `[sample][32]`, where they fit 31 bits.
     pub(super) fn read_narrow(
+        &self,
+        kernel: &Kernel,
+        part: &PanelPart,
+        scratch: &mut Scratch,
+        sums: &mut [i32],
+        seen: &mut Seen,
+    ) {
+        if self.phases == 1 {
+            return self.drive_narrow(kernel, part, scratch, sums, seen);
+        }
+        let mut both = [0; Scratch::SUMS];
+        for (part, sums) in both_phases(part, sums) {
+            let both = &mut both[..2 * sums.len()];
+            self.drive_narrow(kernel, &part, scratch, both, seen);
+            below_from_above(both, sums);
+        }
+    }
+
+    /// What each driving of the rows reads.
+    fn drive_narrow(
         &self,
         kernel: &Kernel,
         part: &PanelPart,
@@ -309,6 +335,19 @@ impl<'a> Reader<'a> {
         sums: &mut [i64],
         seen: &mut Seen,
     ) {
+        if self.phases == 1 {
+            return self.drive_wide(kernel, part, sums, seen);
+        }
+        let mut both = [0; Scratch::SUMS];
+        for (part, sums) in both_phases(part, sums) {
+            let both = &mut both[..2 * sums.len()];
+            self.drive_wide(kernel, &part, both, seen);
+            below_from_above(both, sums);
+        }
+    }
+
+    /// What each driving of the rows reads.
+    fn drive_wide(&self, kernel: &Kernel, part: &PanelPart, sums: &mut [i64], seen: &mut Seen) {
         sums.fill(0);
         let mut currents = [[0; Scratch::SUMS]; 2];
         for (at, pair) in self.pairs.iter().enumerate() {
@@ -402,6 +441,31 @@ impl<'a> Reader<'a> {
     }
 }
 
+/// The drivings of a part's samples, some samples at a time, each with its place among `sums`: where drives have a sign, two
+/// a sample.
+fn both_phases<'a, T>(
+    part: &'a PanelPart,
+    sums: &'a mut [T],
+) -> impl Iterator<Item = (PanelPart, &'a mut [T])> {
+    const SAMPLES: usize = TOGETHER / 2;
+    let starts = part.samples.clone().step_by(SAMPLES);
+    starts.zip(sums.chunks_mut(SAMPLES * PANEL_COLUMNS)).map(|(start, sums)| {
+        let end = start + sums.len() / PANEL_COLUMNS;
+        (PanelPart { samples: 2 * start..2 * end, ..part.clone() }, sums)
+    })
+}
+
+/// What was read above 0 less what was read below: `[sample][2][32]` becomes `[sample][32]`.
+fn below_from_above<T: Copy + std::ops::Sub<Output = T>>(both: &[T], sums: &mut [T]) {
+    let samples = sums.as_chunks_mut::<PANEL_COLUMNS>().0.iter_mut();
+    for (sums, both) in samples.zip(both.as_chunks::<{ 2 * PANEL_COLUMNS }>().0) {
+        let (above, below) = both.split_at(PANEL_COLUMNS);
+        for (sum, (&above, &below)) in sums.iter_mut().zip(above.iter().zip(below)) {
+            *sum = above - below;
+        }
+    }
+}
+
 /// Greatest slice of a drive.
 fn slice_max(hardware: &Hardware) -> u8 {
     u8::MAX >> 8u32.saturating_sub(hardware.drive.dac_bits)
@@ -419,7 +483,8 @@ fn bound(
     converters: Option<&(Vec<Converter>, Subtract)>,
 ) -> Option<u128> {
     let ceiling = u128::from(hardware.cell.window.ceiling());
-    let (rows, pairs) = (layer.layout.rows, pairs as u128);
+    // of codes of both phases one is taken off the other
+    let (rows, pairs) = (layer.layout.rows, (pairs * layer.spec.driven_by.phases()) as u128);
     let current = |rows: usize, code: u32| rows as u128 * ceiling * u128::from(code);
     match converters {
         None => {

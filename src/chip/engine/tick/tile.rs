@@ -115,7 +115,7 @@ struct Upd {
     kind: UpdKind,
     row: usize,
     group: usize,
-    /// Read of the sample.
+    /// Product of the sample: a read, or a driving of the rows.
     position: usize,
     phase: UpdPhase,
     pulse: i64,
@@ -343,7 +343,7 @@ impl Tile {
                 self.upd = update(UpdKind::Now, slot, shift);
                 if self.config.more.train_slots.is_some() {
                     self.upd.phase = UpdPhase::Set;
-                } else if self.config.more.positions > 1 {
+                } else if self.products() > 1 {
                     self.upd.phase = UpdPhase::Gather;
                 }
             }

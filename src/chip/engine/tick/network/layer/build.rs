@@ -103,6 +103,7 @@ pub(super) fn config(
                 WriteScheme::Trains { slots_log2 } => Some(1 << slots_log2),
             },
             positions: layer.spec.positions(),
+            phases: layer.spec.driven_by.phases(),
         },
     }
 }
