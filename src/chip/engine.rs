@@ -58,7 +58,7 @@ use schedule::Schedule;
 
 pub use calibrate::{CALIBRATION_SAMPLES, Calibration};
 pub use pulses::{Pulses, TilePeaks, active};
-pub use tape::Recorded;
+pub use tape::{Recorded, UpdateStart};
 pub use track::WritesDone;
 pub use unit::{Centre, ErrorUnit};
 
@@ -263,6 +263,8 @@ pub struct Engine {
     schedule: Option<Schedule>,
     /// What was executed since drives were last loaded, while recording.
     tape: Option<Vec<Recorded>>,
+    /// What there was before that.
+    began: Option<Box<UpdateStart>>,
 }
 
 impl Engine {
@@ -311,6 +313,7 @@ impl Engine {
             ledgers: [ledger.clone(), ledger.clone(), ledger],
             schedule,
             tape: None,
+            began: None,
             hardware,
         }
     }
@@ -380,7 +383,16 @@ impl Engine {
     pub fn begin_update(&mut self) {
         if let Some(tape) = &mut self.tape {
             tape.clear();
+            let layers = self.layers.clone();
+            let (unit, unlooked) = (self.unit.clone(), self.unlooked);
+            self.began = Some(Box::new(UpdateStart { layers, unit, unlooked }));
         }
+    }
+
+    /// What there was when the update began that is recorded; nothing before the first one.
+    #[must_use]
+    pub fn update_start(&self) -> Option<&UpdateStart> {
+        self.began.as_deref()
     }
 
     /// The chip.

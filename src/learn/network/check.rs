@@ -278,7 +278,8 @@ fn signed(network: &NetworkSpec, hardware: &Hardware) -> Checked {
     }
     let found = |what: &str| format!("is \"signed\" {what}");
     if first.convolution.is_some() {
-        let allowed = "a window moves over codes of one sign: use \"split\", or a dense first layer";
+        let allowed =
+            "a window moves over codes of one sign: use \"split\", or a dense first layer";
         return misfit("network.input", found("beside convolutions"), allowed);
     }
     if first.homeostasis.is_on() {

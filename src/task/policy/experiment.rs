@@ -161,8 +161,7 @@ impl PolicyExperiment {
                 return Err(NetworkError::misfit("network.hidden", found, allowed));
             }
             // lines that are on have no sign
-            let signed =
-                self.input == InputCoding::Signed && matches!(spec.shown, Shown::Dense(_));
+            let signed = self.input == InputCoding::Signed && matches!(spec.shown, Shown::Dense(_));
             if (first.driven_by == DrivenBy::Signed) != signed {
                 let (has, wanted) = if signed { ("no", "one") } else { ("a", "none") };
                 let found = format!("gives {} {has} sign in the first layer", spec.id);

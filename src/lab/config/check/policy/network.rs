@@ -80,7 +80,11 @@ fn input(file: &mut NetworkFile, spec: &EnvSpec, bias: Bias) -> Result<InputCodi
         Some(coding) => coding,
         None => {
             let found = format!("is \"{}\"", file.input.as_deref().unwrap_or_default());
-            return Err(wrong("network.input", found, "it is of images: use split, offset or signed"));
+            return Err(wrong(
+                "network.input",
+                found,
+                "it is of images: use split, offset or signed",
+            ));
         }
     };
     if coding == InputCoding::Offset && bias == Bias::None {
