@@ -199,7 +199,8 @@ fn a_tile_or_an_update_that_is_not_there_is_said() {
 #[test]
 fn an_update_of_a_policy_begins_behind_its_rollout() {
     let experiment = Some(("it", super::policies::TINY));
-    let settings = ["hw.adc.bits=4", "hw.adc.range=tracking"].map(str::to_owned);
+    let settings =
+        ["hw.adc={bits=4, range=\"tracking\"}", "environment.rollouts=2"].map(str::to_owned);
     let config = Config::load(&Sources { experiment, settings: &settings, ..Sources::default() });
     let (config, root) = (config.unwrap(), DataRoot::new("none"));
     for (update, layer) in [(1, 0), (1, 2), (2, 0), (5, 1), (5, 3)] {
