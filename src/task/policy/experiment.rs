@@ -113,9 +113,14 @@ impl PolicyExperiment {
     pub fn facing(mut self, spec: &EnvSpec) -> Self {
         self.environment = spec.id.to_string();
         let (rows, outputs) = (self.rows(spec), Self::outputs(spec));
+        // lines that are on have no sign
+        let driven_by = match (self.input, spec.shown) {
+            (InputCoding::Signed, Shown::Dense(_)) => DrivenBy::Signed,
+            _ => DrivenBy::Shared,
+        };
         for (network, units) in [(&mut self.actor, outputs), (&mut self.critic, 1)] {
             if let Some(first) = network.layers.first_mut() {
-                first.inputs = rows;
+                (first.inputs, first.driven_by) = (rows, driven_by);
             }
             if let Some(last) = network.layers.last_mut() {
                 last.units = units;

@@ -272,9 +272,11 @@ fn a_sign_stands_where_numbers_have_one_and_nowhere_else() {
         network.batch = Batch::new(2049).unwrap();
     }
     refused(&large, "use a batch of 2048 or fewer");
-    let mut above = good;
+    let mut above = good.clone();
     above.actor.layers[1].driven_by = DrivenBy::Signed;
     refused(&above, "gives layer");
+    let gridworld = environment::make("Foray-v0", 1, 1).unwrap().spec().clone();
+    let _ = trainer(&good.facing(&gridworld));
 }
 
 #[test]
