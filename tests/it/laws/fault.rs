@@ -101,7 +101,7 @@ pub(crate) enum Fault {
 
 impl Fault {
     /// All of them.
-    pub(crate) const ALL: [Self; 45] = [
+    pub(crate) const ALL: [Self; 47] = [
         Self::WrapAtCeiling,
         Self::FloorOffByOne,
         Self::CeilingOffByOne,
