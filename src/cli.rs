@@ -6,6 +6,7 @@
 //! 4  verify found a difference
 //! ```
 
+use std::ffi::OsString;
 use std::io::IsTerminal;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -256,12 +257,18 @@ fn hear_file_limits() {
 /// Runs the program and gives its exit code.
 #[must_use]
 pub fn main() -> ExitCode {
+    ExitCode::from(run_with(std::env::args_os().collect()))
+}
+
+/// Runs the program with these arguments, its own name first, and gives its exit code.
+#[must_use]
+pub fn run_with(arguments: Vec<OsString>) -> u8 {
     hear_file_limits();
-    let cli = match Cli::try_parse() {
+    let json = arguments.iter().any(|argument| argument == "--json");
+    let cli = match Cli::try_parse_from(arguments) {
         Ok(cli) => cli,
         Err(error) => return unparsed(&error),
     };
-    let json = std::env::args_os().any(|argument| argument == "--json");
     let done = match cli.command {
         Command::Train(args) => run::train(&args),
         Command::Eval(args) => run::eval(&args),
@@ -297,7 +304,7 @@ pub fn main() -> ExitCode {
     };
     let whole = || out::fault().map_or(Ok(()), |message| Err(Failure { code: 1, message }));
     match done.and_then(|()| whole()) {
-        Ok(()) => ExitCode::SUCCESS,
+        Ok(()) => 0,
         Err(Failure { code, message }) => {
             if json {
                 say(&serde_json::json!({"event": "error", "code": code, "message": message})
@@ -306,26 +313,26 @@ pub fn main() -> ExitCode {
             let red = std::io::stderr().is_terminal();
             let word = if red { "\u{1b}[31merror\u{1b}[0m" } else { "error" };
             note(&format!("{word}: {message}"));
-            ExitCode::from(code)
+            code
         }
     }
 }
 
 /// Arguments that name no command: help and version go to standard output, mistakes to the other one.
-fn unparsed(error: &clap::Error) -> ExitCode {
+fn unparsed(error: &clap::Error) -> u8 {
     if error.use_stderr() {
         let _ = error.print();
-        return ExitCode::from(2);
+        return 2;
     }
     let text = error.render();
     let live = std::io::stdout().is_terminal();
     let text = if live { text.ansi().to_string() } else { text.to_string() };
     say(text.trim_end());
     match out::fault() {
-        None => ExitCode::SUCCESS,
+        None => 0,
         Some(message) => {
             note(&format!("error: {message}"));
-            ExitCode::from(1)
+            1
         }
     }
 }

@@ -4,7 +4,7 @@
 //! This page is the library's whole public face. A configuration is read and checked ([`Config`]), data is loaded
 //! ([`Data`]), and a run is carried out in memory ([`Session`]) or in a folder ([`train()`], [`resume`], [`evaluate`],
 //! [`verify`]). Below that stand the parts themselves: a chip ([`Hardware`]), a network ([`NetworkSpec`]), examples, and
-//! a [`Classifier`] that joins them. Whatever can be wrong is an error that says where, what was found and what is
+//! a [`Classifier`] that joins them; a [`DrivenNetwork`] is a network whose every operation a caller decides. Whatever can be wrong is an error that says where, what was found and what is
 //! allowed; no argument makes a call panic.
 //!
 //! | feature | brings | needs |
@@ -56,6 +56,7 @@ mod task;
 pub use crate::chip::crossbar::kernel::{Backend, UnknownBackend};
 pub use crate::chip::hardware::{Hardware, HardwareError, HardwareSpec};
 pub use crate::learn::network::{NetworkError, NetworkSpec};
+pub use crate::learn::outside::{DriveError, DrivenNetwork};
 pub use crate::task::classify::{
     Classifier, Evaluation, Examples, ExamplesError, Experiment, Split, Stop,
 };
@@ -90,6 +91,7 @@ pub mod network {
     };
     pub use crate::chip::population::Wiring;
     pub use crate::learn::error::{Centre, OutputError};
+    pub use crate::learn::network::{HiddenWords, NetworkPlace};
     pub use crate::learn::route::Route;
     pub use crate::learn::rule::{Control, Rule, UpdateMode};
     pub use crate::num::fixed::{Batch, RateMantissa};
@@ -112,16 +114,27 @@ pub mod policy {
     pub use crate::lab::data::{FloatDoor, FloatOutcomes};
 }
 
+/// Grids of runs: a sweep file carried out in a store, and its results as a table.
+#[cfg(feature = "lab")]
+pub mod sweep {
+    pub use crate::lab::sweep::{
+        Carried, Options as SweepOptions, Shard, SweepError, SweepProgress, Swept, sweep,
+    };
+    pub use crate::lab::table::{Column, ColumnUnit, Format, Role, Table, Values, WriteError};
+}
+
 #[cfg(feature = "lab")]
 pub use crate::lab::{
     config::{Config, ConfigError, Sources},
     data::{Data, DataError, DataRoot, ImageShape},
     run::{
-        Keeping, Machine, Progress, RunError, RunEvent, Session, Trained, Verdict, evaluate,
-        resume, train, verify,
+        Keeping, Machine, Progress, ReportMade, RunError, RunEvent, Session, Trained, Verdict,
+        evaluate, priced, report, resume, train, train_keeping, verify,
     },
     store::{
         ARITHMETIC,
+        checkpoint::CheckpointError,
+        kept::{Checkpointed, ledger_of},
         record::{EpochRecord, Receipt, Score, TestOutcome},
     },
 };

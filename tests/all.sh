@@ -99,6 +99,13 @@ tests() {
     done
     cp -r tests/golden/run "$runs/kept"
     "$program" verify "$runs/kept"
+
+    step "the Python package, from its wheel"
+    if [[ $install == yes ]]; then
+        bash tests/python.sh
+    else
+        echo "SKIPPED the Python package: its tests need packages (--no-install)"
+    fi
     printf '   (%s: %d s)\n' "$current" $((SECONDS - last))
 }
 

@@ -232,21 +232,24 @@ impl Crossbar {
         &plane[first + blocks.start * BLOCK_CELLS..first + blocks.end * BLOCK_CELLS]
     }
 
-    /// The transposed read: sums of every row over all columns, `[sample][rows padded]`. `gates` are signed bytes
-    /// that lie as drives do, by column.
-    #[must_use]
-    pub fn read_columns(&self, kernel: &Kernel, gates: Drives<'_>) -> Vec<i64> {
+    /// The transposed read: sums of every row over all columns, `[sample][rows padded]`, are put into `sums` and handed
+    /// to `take` with the place of their byte in a level: `sum 2^place`, once a byte plane. `gates` are signed bytes that
+    /// lie as drives do, by column.
+    pub fn read_columns(
+        &self,
+        kernel: &Kernel,
+        gates: Drives<'_>,
+        sums: &mut Vec<i32>,
+        mut take: impl FnMut(&[i32], u32),
+    ) {
         let layout = self.layout;
-        let mut sums = vec![0; gates.samples() * layout.rows_padded()];
-        kernel.read_columns(&self.low, layout, gates, &mut sums);
-        let mut currents: Vec<i64> = sums.iter().map(|&sum| i64::from(sum)).collect();
+        sums.resize(gates.samples() * layout.rows_padded(), 0);
+        kernel.read_columns(&self.low, layout, gates, sums);
+        take(sums, 0);
         if let Some(high) = &self.high {
-            kernel.read_columns(high, layout, gates, &mut sums);
-            for (current, &sum) in currents.iter_mut().zip(&sums) {
-                *current += i64::from(sum) << 8;
-            }
+            kernel.read_columns(high, layout, gates, sums);
+            take(sums, 8);
         }
-        currents
     }
 
     /// The array cut into strips of so many panels that can be written side by side.

@@ -33,6 +33,7 @@ mod each;
 mod error;
 mod forward;
 mod homeostasis;
+mod look;
 mod mute;
 mod normalise;
 mod optimise;

@@ -285,6 +285,39 @@ impl Layer {
         LookUp { entries: entries.collect(), shift: self.lut.shift }
     }
 
+    /// Words that a unit latches of a sample, one after the other: one, or one a pixel behind the pool where they come from
+    /// the rows of the layer above.
+    #[must_use]
+    pub fn heard(&self) -> usize {
+        match self.delivery.source {
+            WordSource::Above => self.spec.pooled().into_iter().product(),
+            _ => 1,
+        }
+    }
+
+    /// What row sums of its transposed read are shifted by to become words of the layer below; to the left where it is
+    /// negative.
+    ///
+    /// ```text
+    /// table     level_bits - log2(weight_max) + 8 - error_bits                     a level is worth weight_max / 2^level_bits
+    /// gain      lut_bits - 3 + lsh - (drive_bits - 2) - g + 8 - error_bits         so is the slope of a ramp, of which 85 is 2^6
+    /// g         least number >= 0 with 4^g units >= inputs                         of a window channels stride^2 inputs
+    /// ```
+    #[must_use]
+    pub fn back_shift(&self, hardware: &Hardware) -> i64 {
+        let widths = [hardware.digital.lut_bits.get(), hardware.drive.bits.get()].map(i64::from);
+        let worth = match self.spec.homeostasis.gain {
+            Gain::Table => {
+                i64::from(hardware.cell.level_bits.get()) - i64::from(self.spec.weight_max_log2)
+            }
+            Gain::Fixed { .. } | Gain::Tracking => {
+                let evened = i64::from(self.spec.back_gain_log2());
+                widths[0] - 3 + i64::from(self.balance.shift()) - (widths[1] - 2) - evened
+            }
+        };
+        worth + 8 - i64::from(hardware.digital.error_bits.get())
+    }
+
     /// Rows of each tile of a column, top to bottom.
     pub fn row_tiles(&self, hardware: &Hardware) -> impl Iterator<Item = Range<usize>> + use<> {
         let (rows, step) = (self.layout.rows, hardware.tile.rows);

@@ -60,7 +60,7 @@ pub(super) fn price(args: &PriceArgs) -> Done {
     };
     if args.json {
         for run in &runs {
-            say(&price_json(args, run).to_string());
+            say(&run.to_json(&args.run).to_string());
         }
         return Ok(());
     }
@@ -72,19 +72,6 @@ pub(super) fn price(args: &PriceArgs) -> Done {
         say(&format!("{}: see the page of the run", absent_words(&runs[0].absent)));
     }
     Ok(())
-}
-
-fn price_json(args: &PriceArgs, run: &Repriced) -> serde_json::Value {
-    let changes = run.changes.iter().map(|change| {
-        let events: Vec<_> = change.events.iter().map(|event| event.name()).collect();
-        json!({"key": change.key, "events": events, "time": change.time})
-    });
-    let mut object = json!({"event": "price", "run": args.run.display().to_string(),
-        "made_on": run.made_on, "priced_as": run.priced_as,
-        "changes": changes.collect::<Vec<_>>(), "cycles": run.ledger.elapsed(),
-        "nodes": nodes_json(run.constants()), "not_simulated": run.absent});
-    merge(&mut object, run.bill().to_json(&run.pieces));
-    object
 }
 
 fn show_price(run: &Repriced, quiet: bool) {
@@ -250,11 +237,6 @@ fn show_nodes(constants: &Constants) {
     }
 }
 
-fn nodes_json(constants: &Constants) -> serde_json::Value {
-    let nodes = constants.nodes().into_iter();
-    nodes.map(|(node, numbers)| json!({"node_nm": node, "numbers": numbers})).collect()
-}
-
 /// What the network takes of the chip.
 fn plan_json(config: &Config, profile: &Profile) -> serde_json::Value {
     let Profile { plan, hardware, constants, .. } = profile;
@@ -263,7 +245,7 @@ fn plan_json(config: &Config, profile: &Profile) -> serde_json::Value {
         areas.map(|(name, area)| json!({"name": name, "square_metres": area})).collect();
     json!({"event": "plan", "data": config.data_name(), "hardware": config.hardware_name,
         "cells": plan.cells(), "tiles": plan.tiles(hardware), "areas": areas,
-        "nodes": nodes_json(constants),
+        "nodes": run::nodes_json(constants),
         "warnings": profile.warnings})
 }
 

@@ -23,7 +23,7 @@ pub use notes::notes;
 pub use profile::{Act, ModeUse, Profile, profile};
 pub use proof::{records, untouched};
 pub use report::{ReportMade, report};
-pub use repriced::{Prices, Repriced, absent, reprice, reprice_as};
+pub use repriced::{Prices, Repriced, absent, nodes_json, priced, reprice, reprice_as};
 pub use session::Session;
 pub use task::Progress;
 pub use train::{Keeping, RunEvent, Trained, carry_on, resume, train, train_keeping};

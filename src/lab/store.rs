@@ -21,6 +21,7 @@ pub mod checkpoint;
 pub mod folder;
 pub mod hash;
 pub mod index;
+pub mod kept;
 pub mod ledger;
 pub mod place;
 pub mod record;

@@ -18,6 +18,7 @@ mod report;
 mod row;
 mod sample;
 mod table;
+mod whole;
 
 pub use axis::{Axis, Choice, Value};
 pub use carry::{Carried, Options, SweepEvent, carry_out};
@@ -29,6 +30,7 @@ pub use report::{SweepPage, report};
 pub use row::{RESULTS, ResultColumn, ResultKind, Row, row, row_as};
 pub use sample::{Finding, Sampled, sample};
 pub use table::{Results, find, results};
+pub use whole::{SweepProgress, Swept, sweep};
 
 use std::path::PathBuf;
 

@@ -106,12 +106,22 @@ impl Driver {
 
     /// Writes what the loaded samples' errors ask for.
     fn update(&mut self, errors: &[i32]) {
-        let layers = self.engine.layers().len();
         let words = self.engine.output_words(errors);
-        let loaded = self.engine.samples();
-        let mut heard = false;
+        self.deliver(&words);
+        self.write(|driver, layer| Some(driver.shift(layer)));
+        self.engine.settle();
+    }
+
+    /// Steps of an update of the loaded samples: all that deliver come before all that write.
+    fn steps(&self) -> Vec<Step> {
         let Learning { rule, mode, control, .. } = self.learning;
-        for step in rule.steps(control, mode, layers, loaded) {
+        rule.steps(control, mode, self.engine.layers().len(), self.engine.samples())
+    }
+
+    /// Does with output words what the rule does before it writes: delivers them, and reads backwards.
+    pub(crate) fn deliver(&mut self, words: &[i16]) {
+        let mut heard = false;
+        for step in self.steps() {
             match step {
                 Step::Error { layer, samples } => {
                     let delivery = &self.engine.layers()[layer].delivery;
@@ -124,13 +134,34 @@ impl Driver {
                 Step::ReadColumns { layer } => {
                     self.engine.execute(&Operation::Forward { layer, side: Side::Columns });
                 }
-                Step::Update { layer, write, samples } => {
-                    let shift = if write == Write::Add { 0 } else { self.shift(layer) };
-                    self.engine.execute(&Operation::Update { layer, write, samples, shift });
-                }
+                Step::Update { .. } => {}
             }
         }
+    }
+
+    /// Writes layers, each with the shift that is said of it; those without one are left out.
+    pub(crate) fn write(&mut self, shift: impl Fn(&Self, usize) -> Option<u32>) {
+        for step in self.steps() {
+            let Step::Update { layer, write, samples } = step else { continue };
+            let Some(shift) = shift(self, layer) else { continue };
+            let shift = if write == Write::Add { 0 } else { shift };
+            self.engine.execute(&Operation::Update { layer, write, samples, shift });
+        }
+    }
+
+    /// The writes of an update are done.
+    pub(crate) fn end_update(&mut self) {
         self.engine.settle();
+        self.engine.written(match self.learning.mode {
+            UpdateMode::Accumulate | UpdateMode::Replay => WritesDone::Batch,
+            UpdateMode::Online => WritesDone::Sample,
+        });
+        self.updates += 1;
+    }
+
+    /// When a batch is written.
+    pub(crate) const fn mode(&self) -> UpdateMode {
+        self.learning.mode
     }
 }
 

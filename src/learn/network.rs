@@ -76,6 +76,17 @@ pub struct NetworkPlace {
     pub updates: u64,
 }
 
+/// What the units of hidden layers hear.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum HiddenWords {
+    /// Words of the output, by the route of the network; back-propagation's from the layer above.
+    #[default]
+    Routed,
+    /// Words of their own, one a unit, over a bus as wide as the layer: whoever drives the network forms them.
+    Own,
+}
+
 /// A network that does not fit together, or not on the chip.
 ///
 /// ```
@@ -188,9 +199,21 @@ impl NetworkSpec {
         backend: Backend,
         place: NetworkPlace,
     ) -> Result<Driver, NetworkError> {
+        self.build_hearing(hardware, backend, place, HiddenWords::Routed)
+    }
+
+    /// The same; `words` says what hidden layers hear.
+    pub(crate) fn build_hearing(
+        &self,
+        hardware: &Hardware,
+        backend: Backend,
+        place: NetworkPlace,
+        words: HiddenWords,
+    ) -> Result<Driver, NetworkError> {
         self.check(hardware)?;
         let numbers = self.numbers(place)?;
-        let layers = self.layers.iter().zip(self.deliveries(place.seed, &numbers)).zip(&numbers);
+        let deliveries = self.deliveries(place.seed, &numbers, words);
+        let layers = self.layers.iter().zip(deliveries).zip(&numbers);
         let layers = layers.map(|((spec, delivery), &number)| {
             Layer::new(number, spec.clone(), delivery, hardware)
         });
@@ -242,12 +265,13 @@ impl NetworkSpec {
     }
 
     /// How errors reach each layer.
-    fn deliveries(&self, seed: u64, numbers: &[u16]) -> Vec<Delivery> {
+    fn deliveries(&self, seed: u64, numbers: &[u16], words: HiddenWords) -> Vec<Delivery> {
         let (outputs, last) = (self.outputs(), self.layers.len() - 1);
         let layers = self.layers.iter().zip(numbers).enumerate();
         let delivery = layers.map(|(at, (spec, &number))| {
             let delivery = match self.route {
                 _ if at == last => Delivery::output(outputs),
+                _ if words == HiddenWords::Own => Delivery::output(spec.units),
                 None => Delivery::above(spec.units),
                 Some(route) => route.delivery(spec.units, outputs, seed, number),
             };

@@ -116,6 +116,15 @@ impl Crate {
                     _ => open_item(&part),
                 }));
             }
+            "trait" => {
+                let open = at + words[at..].iter().position(|word| word == "{").expect("a body");
+                out.push(said(&words[at..open]));
+                out.extend(items(words, open).iter().map(|item| {
+                    let item = without_attributes(item);
+                    let end = item.iter().position(|w| w == "{").unwrap_or(item.len());
+                    said(&item[..end])
+                }));
+            }
             "type" => {
                 let end = words[at..].iter().position(|word| word == ";");
                 out.push(said(&words[at..at + end.expect("an item ends")]));

@@ -43,7 +43,7 @@ struct Shape {
     levels: [u64; 2],
     /// Tiles.
     tiles: u64,
-    /// Words on the bus.
+    /// Words on the bus, of a sample.
     words: u64,
     /// Cycles in which the error unit forms the words of a sample.
     form: u64,
@@ -188,7 +188,7 @@ impl Schedule {
                 columns,
                 levels: [tree_levels(down * pairs), tree_levels(across)],
                 tiles: planes * down * across,
-                words: layer.delivery.taps.width as u64,
+                words: (layer.delivery.taps.width * layer.heard()) as u64,
                 form: timing.form(layer.delivery.terms() as u64),
                 positions: layer.spec.positions() as u64,
                 phases: layer.spec.driven_by.phases() as u64,
@@ -327,7 +327,9 @@ impl Schedule {
             self.settle(cycles);
         }
         let (t, shape) = (self.timing, self.shapes[layer]);
+        let front = t.accept() + self.reads.again(2, shape.rows);
         let one = t.accept() + self.reads.read(2, shape.rows, shape.levels[1]);
+        let one = one + (shape.positions - 1) * front;
         for round in self.rounds(cycles, &(0..samples)) {
             round.close();
             round.passed[Interval::Columns as usize] += one;
@@ -335,8 +337,7 @@ impl Schedule {
         if let Segment::Rounds { columns, .. } = &mut self.segment {
             *columns = true;
         }
-        let count = samples as u64;
-        let front = t.accept() + self.reads.again(2, shape.rows);
+        let count = samples as u64 * shape.positions;
         cycles.occupy(layer, During::ForwardColumns, count * front);
         self.engage_read(cycles, layer, [count, 2], shape.rows, shape.levels[1]);
     }

@@ -21,6 +21,10 @@ use crate::chip::crossbar::layout::BLOCK_ROWS;
 use crate::chip::layer::{LayerSpec, Pool};
 use crate::chip::ledger::Event;
 
+mod back;
+
+pub(super) use back::{fold, folded, spread};
+
 /// Samples whose windows one thread puts together before it looks for other work.
 const TOGETHER: usize = 4;
 

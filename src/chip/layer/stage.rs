@@ -121,6 +121,16 @@ impl super::LayerSpec {
         height * width * self.units
     }
 
+    /// What words that come back through its rows lose by there being fewer columns than rows, as a power of two: the root of
+    /// their ratio. In a window a pixel meets `side^2 / stride^2` rows.
+    #[must_use]
+    pub(crate) fn back_gain_log2(&self) -> u32 {
+        let inputs =
+            self.convolution.map_or(self.inputs, |shape| shape.channels * shape.stride.pow(2));
+        let (inputs, units) = (inputs as u128, self.units as u128);
+        (0..).find(|&gain| units << (2 * gain) >= inputs).expect("sizes are far below 2^64")
+    }
+
     /// What is wrong with the sizes of its window and pool, if anything is: what was found, and what is allowed.
     #[must_use]
     pub fn misshapen(&self) -> Option<(String, String)> {

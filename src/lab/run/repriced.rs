@@ -2,6 +2,8 @@
 
 use std::path::Path;
 
+use serde_json::{Value, json};
+
 use super::again::read_config;
 use super::{RunError, records};
 use crate::chip::hardware::Hardware;
@@ -89,6 +91,27 @@ pub fn reprice(path: &Path, other: Option<&str>) -> Result<Repriced, RunError> {
     Ok(repriced)
 }
 
+/// Of which nodes constants are, and how many of each.
+#[must_use]
+pub fn nodes_json(constants: &Constants) -> Value {
+    let nodes = constants.nodes().into_iter();
+    nodes.map(|(node, numbers)| json!({"node_nm": node, "numbers": numbers})).collect()
+}
+
+/// What a finished run cost on its chip or with the constants of another model, as the JSON object of `dalean price --json`:
+/// joules and seconds in all and by class, component, phase, operation, layer and pathway, with bounds.
+///
+/// ```
+/// let error = dalean::priced(std::path::Path::new("no/such/run"), None).unwrap_err();
+/// assert!(error.to_string().contains("no/such/run"));
+/// ```
+///
+/// # Errors
+/// When the run is not finished or damaged, or there is no such model.
+pub fn priced(path: &Path, other: Option<&str>) -> Result<String, RunError> {
+    Ok(reprice(path, other)?.to_json(path).to_string())
+}
+
 /// Reads a finished run and prices it as if made on another chip; without one, as its own folder says.
 ///
 /// # Errors
@@ -128,6 +151,25 @@ pub fn reprice_as(path: &Path, other: Option<Prices>) -> Result<Repriced, RunErr
 }
 
 impl Repriced {
+    /// All of it, of the run in `path`, as a JSON object.
+    #[must_use]
+    pub fn to_json(&self, path: &Path) -> Value {
+        let changes = self.changes.iter().map(|change| {
+            let events: Vec<_> = change.events.iter().map(|event| event.name()).collect();
+            json!({"key": change.key, "events": events, "time": change.time})
+        });
+        let mut object = json!({"event": "price", "run": path.display().to_string(),
+            "made_on": self.made_on, "priced_as": self.priced_as,
+            "changes": changes.collect::<Vec<_>>(), "cycles": self.ledger.elapsed(),
+            "nodes": nodes_json(&self.constants), "not_simulated": self.absent});
+        if let (Some(object), Value::Object(more)) =
+            (object.as_object_mut(), self.bill().to_json(&self.pieces))
+        {
+            object.extend(more);
+        }
+        object
+    }
+
     /// What the run cost.
     #[must_use]
     pub fn bill(&self) -> Bill<'_> {

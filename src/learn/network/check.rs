@@ -330,10 +330,6 @@ fn convolutions(network: &NetworkSpec, hardware: &Hardware) -> Checked {
             );
             return misfit("learning.batch", found, allowed);
         }
-        if network.rule == Rule::Bp {
-            let allowed = "back-propagation through convolutions is not built; use another rule, or leave network.channels out";
-            return misfit("learning.rule", "is \"bp\" beside convolutions", allowed);
-        }
         if hardware.write.scheme != WriteScheme::Rounded {
             let allowed = "a train writes one read of one sample, and a sample of a convolution has many: use \"rounded\"";
             return misfit("hw.write.scheme", "is \"rank1\" beside convolutions", allowed);

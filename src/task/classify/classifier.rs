@@ -117,6 +117,23 @@ impl Classifier {
         Ok(self.trainer.evaluate(examples))
     }
 
+    /// Accumulators of the outputs for each example, `[example][output]`: the greatest is the answer. Nothing is learnt.
+    ///
+    /// # Errors
+    /// When they do not fit the network.
+    pub fn outputs(&mut self, examples: &Examples) -> Result<Vec<i64>, NetworkError> {
+        self.trainer.experiment().fits(examples)?;
+        Ok(self.trainer.outputs(examples))
+    }
+
+    /// Shares large operations among so many threads from now on; no bit depends on it.
+    ///
+    /// # Errors
+    /// When the system gives no threads.
+    pub fn set_threads(&mut self, threads: usize) -> std::io::Result<()> {
+        self.trainer.driver_mut().engine_mut().set_threads(threads)
+    }
+
     /// Epochs finished.
     #[must_use]
     pub const fn epoch(&self) -> u32 {

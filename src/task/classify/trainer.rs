@@ -185,6 +185,24 @@ impl Trainer {
         Ok(correct)
     }
 
+    /// Accumulators of the outputs for each example, `[example][output]`.
+    pub fn outputs(&mut self, examples: &Examples) -> Vec<i64> {
+        let phase = self.driver.engine().phase();
+        self.driver.engine_mut().set_phase(Phase::Evaluation);
+        let mut all = Vec::new();
+        for first in (0..examples.len()).step_by(READ_BATCH) {
+            let which = first..(first + READ_BATCH).min(examples.len());
+            let codes = self.codes(examples, which.clone());
+            self.driver.read(&codes);
+            let engine = self.driver.engine();
+            for sample in 0..which.len() {
+                all.extend((0..outputs(engine)).map(|at| engine.output_accumulator(sample, at)));
+            }
+        }
+        self.driver.engine_mut().set_phase(phase);
+        all
+    }
+
     /// Reads examples without learning.
     pub fn evaluate(&mut self, examples: &Examples) -> Evaluation {
         let phase = self.driver.engine().phase();

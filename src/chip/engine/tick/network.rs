@@ -350,6 +350,9 @@ impl Network {
 
     fn play_in_round(&mut self, orders: &[(Order<'_>, Interval, bool)], sample: usize) {
         let interval = orders[0].1;
+        if let Command::Columns { .. } = orders[0].0.command {
+            return self.columns(orders[0].0.layer, sample);
+        }
         let formed: Vec<Vec<i16>> =
             orders.iter().map(|(order, ..)| self.layer_words(order, sample)).collect();
         let plain = orders.iter().zip(&formed);
@@ -360,11 +363,6 @@ impl Network {
             match order.command {
                 Command::Error { slot } => layer.share_gates(slot),
                 Command::Now { .. } => layer.written(),
-                Command::Columns { .. } => {
-                    layer.keep_backward(sample, self.samples);
-                    let (code, bits) = (layer.unit_code(Stream::P), 16 * layer.inputs as u64);
-                    self.charge(order.layer, code, order.during, Event::SramBits, bits);
-                }
                 _ => {}
             }
         }

@@ -1,0 +1,196 @@
+"""Floor 1: whole runs, the same as the command line's."""
+
+import json
+import multiprocessing
+import os
+import pickle
+import signal
+import subprocess
+import sys
+import threading
+import time
+
+import pytest
+
+import dalean
+
+
+def command(*arguments, **options):
+    program = os.path.join(os.path.dirname(sys.executable), "dalean")
+    return subprocess.run([program, *map(str, arguments)], capture_output=True, text=True, check=False, **options)
+
+
+def settings(keys):
+    return [part for key, value in keys.items() for part in ("--set", f"{key}={json.dumps(value)}")]
+
+
+def trained(out, keys, threads=1):
+    return dalean.train(keys, out=out, threads=threads, progress=False).state_hash
+
+
+def test_a_run_has_the_bits_of_the_command_line(tmp_path, small):
+    done = command("train", *settings(small), "--json", "--threads", 1, "--out", tmp_path / "c")
+    assert done.returncode == 0, done.stderr
+    wanted = json.loads(done.stdout.splitlines()[-1])["state_hash"]
+    assert [trained(tmp_path / f"p{threads}", small, threads) for threads in (1, 2)] == [wanted] * 2
+    for method in ("fork", "spawn"):
+        for threads in (1, 2):
+            with multiprocessing.get_context(method).Pool(1) as pool:
+                assert pool.apply(trained, (tmp_path / f"{method}{threads}", small, threads)) == wanted
+
+
+def test_a_run_knows_what_its_folder_says(tmp_path, small):
+    run = dalean.train(small, out=tmp_path, progress=False)
+    assert [record["epoch"] for record in run.metrics] == [0, 1]
+    assert run.receipt["status"] == "finished" and 0.3 < run.accuracy <= 1
+    assert run.evaluate() == run.accuracy
+    verdict = run.verify(progress=False)
+    assert verdict and verdict.epochs == 2 and verdict.state_hash == run.state_hash
+    assert "level_bits = 8" in run.config
+    levels = run.levels()
+    assert levels["layer0.pp"].shape == (64, 16) and levels["layer1.np"].shape == (16, 10)
+    report = run.report()
+    assert "<html" in report.html and "<iframe" in report._repr_html_() and str(report)
+    price = run.price()
+    assert price["made_on"] == "ideal" and run.price("reram")["priced_as"] == "reram"
+    with pytest.raises(dalean.RunError, match="finished"):
+        dalean.resume(run.path)
+    # a changed number is found
+    ledger = run.path / "metrics.jsonl"
+    ledger.write_text(ledger.read_text().replace('"updates":', '"updates":1', 1))
+    with pytest.raises(dalean.RunError):
+        run.verify(progress=False)
+
+
+def test_a_file_and_overrides(tmp_path, small):
+    file = tmp_path / "mine.toml"
+    file.write_text("[network]\nhidden = [16]\n[learning]\nepochs = 1\nbatch = 32\ntaps = 2\n")
+    nested = {"learning": {"taps": None}, "seed": 5}
+    assert dalean.train(file, nested, tmp_path / "a").state_hash == trained(tmp_path / "b", small)
+    assert "seed = 5" in dalean.configuration(file, nested)
+
+
+def test_errors_say_where_what_and_what_is_allowed():
+    with pytest.raises(dalean.ConfigError) as caught:
+        dalean.configuration(overrides={"hw.cell.level_bits": 99})
+    error = caught.value
+    assert (error.where, error.found) == ("hw.cell.level_bits", "is 99")
+    assert "1..=12" in error.allowed and error.try_ and "99" in str(error)
+    again = pickle.loads(pickle.dumps(error))
+    assert type(again) is type(error) and again.where == error.where and str(again) == str(error)
+    with pytest.raises(dalean.ConfigError, match="did you mean `batch`"):
+        dalean.configuration(overrides={"learning.batchh": 9})
+    with pytest.raises(dalean.ConfigError, match="cannot be read"):
+        dalean.train("no/such.toml")
+    with pytest.raises(dalean.ConfigError, match="a set"):
+        dalean.train({"seed": {1}})
+    with pytest.raises(dalean.DataError, match="is not in"):
+        dalean.train({"data.set": "mnist"}, data="nowhere")
+    with pytest.raises(dalean.RunError, match="no folder of a run"):
+        dalean.Run("nowhere")
+    with pytest.raises(dalean.RunError, match="1 to 1024"):
+        dalean.train(threads=0)
+    assert issubclass(dalean.ConfigError, ValueError) and issubclass(dalean.NetworkError, dalean.Error)
+
+
+def test_the_command_is_the_program(tmp_path):
+    assert command("--version").stdout.split() == ["dalean", dalean.__version__]
+    assert command("--help").returncode == 0
+    refused = command("train", "--set", "seed=x")
+    assert refused.returncode == 2 and "seed" in refused.stderr
+    assert command("verify", tmp_path).returncode == 1
+    module = subprocess.run([sys.executable, "-m", "dalean", "--version"], capture_output=True, text=True, check=True)
+    assert module.stdout == command("--version").stdout
+
+
+LONG = {"network.hidden": [512], "learning.epochs": 10_000}
+
+
+def test_an_interrupt_ends_a_run_within_a_batch(tmp_path):
+    code = f"import dalean; dalean.train({LONG!r}, out={str(tmp_path)!r}, progress=False, threads=1)"
+    # an interrupt before Python hears it would end it as any program
+    child = subprocess.Popen([sys.executable, "-c", code], stderr=subprocess.PIPE, text=True)
+    wait_for(lambda: list(tmp_path.glob("*/metrics.jsonl")), child)
+    child.send_signal(signal.SIGINT)
+    started = time.monotonic()
+    _, said = child.communicate(timeout=60)
+    assert time.monotonic() - started < 5 and "KeyboardInterrupt" in said
+    (folder,) = (path.parent for path in tmp_path.glob("*/config.toml"))
+    # what is finished is kept, and the run can go on
+    assert dalean.Run(folder).receipt["status"] == "running"
+
+
+def test_an_interrupt_ends_the_command_with_its_own_code(tmp_path):
+    program = os.path.join(os.path.dirname(sys.executable), "dalean")
+    child = subprocess.Popen(
+        [program, "train", *settings(LONG), "--out", tmp_path, "--quiet"], stderr=subprocess.PIPE, text=True
+    )
+    wait_for(lambda: list(tmp_path.glob("*/metrics.jsonl")), child)
+    child.send_signal(signal.SIGINT)
+    _, said = child.communicate(timeout=60)
+    assert child.returncode == 3 and "--resume" in said
+
+
+def wait_for(there, child):
+    until = time.monotonic() + 60
+    while not there():
+        assert child.poll() is None and time.monotonic() < until
+        time.sleep(0.05)
+    time.sleep(0.3)
+
+
+def test_other_threads_go_on_meanwhile(tmp_path, small):
+    counted = 0
+    over = threading.Event()
+
+    def count():
+        nonlocal counted
+        while not over.is_set():
+            counted += 1
+            time.sleep(0.001)
+
+    thread = threading.Thread(target=count)
+    thread.start()
+    dalean.train({**small, "learning.epochs": 3}, out=tmp_path, progress=False)
+    over.set()
+    thread.join()
+    assert counted > 20
+
+
+def test_a_sweep_is_a_table(tmp_path, small):
+    sweep = {
+        "base": {**small},
+        "axis": [{"name": "bits", "key": "hw.cell.level_bits", "values": [3, 8]}],
+        "seeds": [1, 2],
+    }
+    table = dalean.sweep(sweep, store=tmp_path / "store", name="bits", jobs=2, progress=False)
+    assert len(table) == 4 and table.finished == table.runs == 4 and table.failed == 0
+    assert sorted(set(table["bits"])) == [3, 8] and set(table["status"]) == {"finished"}
+    assert "test_accuracy" in table.columns and table.units["test_accuracy"] == "%"
+    assert table.page.exists() and "<table" in table._repr_html_()
+    # the same rows, and nothing is run again
+    again = dalean.sweep(sweep, store=tmp_path / "store", name="bits", jobs=1, progress=False)
+    assert again.rows == table.rows
+    # a row is the run that `train` gives
+    row = next(row for row in table.rows if row["bits"] == 3 and row["seed"] == 2)
+    keys = {key: value for key, value in small.items() if key != "seed"}
+    run = dalean.train(keys, {"hw.cell.level_bits": 3}, tmp_path / "runs", seed=2, progress=False)
+    assert run.state_hash == row["state_hash"]
+    assert table.to_parquet(tmp_path / "t.parquet").read_bytes()[:4] == b"PAR1"
+    polars = pytest.importorskip("polars")
+    assert polars.read_parquet(tmp_path / "t.parquet").height == table.to_polars().height == 4
+    pandas = pytest.importorskip("pandas")
+    assert len(table.to_pandas()) == 4
+    pytest.importorskip("pyarrow")
+    assert isinstance(pandas.DataFrame.from_arrow(table) if hasattr(pandas.DataFrame, "from_arrow") else table.to_pandas(), pandas.DataFrame)
+    assert polars.from_arrow(__import__("pyarrow").table(table)).height == 4
+
+
+def test_keys_are_those_of_the_program():
+    keys = command("keys", "--json").stdout
+    stubs = os.path.join(os.path.dirname(__file__), "..", "stubs.py")
+    made = subprocess.run([sys.executable, stubs], input=keys, capture_output=True, text=True, check=True).stdout
+    import dalean.keys
+
+    with open(dalean.keys.__file__, encoding="utf-8") as file:
+        assert file.read() == made, "make it again: dalean keys --json | python python/stubs.py > python/dalean/keys.py"
