@@ -105,7 +105,7 @@ macro_rules! drawn {
             // 64 * row (row < 16), for the steps `before` and `$steps` more, lie inside the slices by the assertions
             // here and of the only caller; the 64 rows of 64 bytes written are all of `sums`, and 16 vectors of 64
             // bytes all of `words`; 64 bytes are read of `LANES` and of each of the two states of `draws`. Fetching reads nothing.
-            // All registers used are named; thirteen general ones are what a build with frame pointers has left.
+            // All registers used are named; a build with frame pointers has fourteen general ones.
             unsafe {
                 asm!(
                     zero_sums!(),
