@@ -15,6 +15,7 @@ use super::hardware::{FloorKind, Hardware, Window};
 use kernel::{Cells, Drives, Kernel};
 use layout::{BLOCK_CELLS, BLOCK_ROWS, HALF_CELLS, HALF_COLUMNS, Layout, PANEL_COLUMNS};
 
+mod form;
 mod initial;
 pub mod kernel;
 pub mod layout;
@@ -25,8 +26,9 @@ mod trains;
 mod words;
 mod write;
 
+pub use form::{Form, LongSums, Met, SHORT_READS};
 pub use initial::{InitialLaw, initial_levels, initial_scale};
-pub use optimise::{Adam, Asks, Form, LongSums, Momentum, SHORT_READS};
+pub use optimise::{Adam, Asks, Momentum};
 pub use pulses::{Collect, Collected, RowPeaks};
 pub use trains::ColumnTrain;
 pub use write::{WriteRequest, Written};

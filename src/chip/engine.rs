@@ -18,7 +18,7 @@ use std::ops::Range;
 use aligned_vec::{AVec, CACHELINE_ALIGN};
 
 use super::crossbar::Collect;
-use super::crossbar::kernel::{Backend, Team};
+use super::crossbar::kernel::{Backend, ConvPlan, Team};
 use super::crossbar::layout::BLOCK_ROWS;
 use super::hardware::Hardware;
 use super::layer::{DrivenBy, Layer, Readings};
@@ -182,6 +182,8 @@ struct Registers {
     maps: [Lines<u8>; 2],
     /// What windows move over, by set of drives; or what goes in another order into a dense layer.
     images: [Lines<u8>; 2],
+    /// Where the windows of a convolution lie in them.
+    plan: Option<ConvPlan>,
     /// Sums by target stream, where units are normalised: they lie here until all of a stream are known.
     unscaled: [Lines<i32>; 2],
     /// What units that keep to a middle learnt from what was read last.

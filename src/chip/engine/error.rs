@@ -80,12 +80,11 @@ impl Engine {
             }
         }
         let work = reads * units * wiring.targets().len() * MOVE;
+        // words that come back are those of a position, and all others are those of a sample
+        let shared = if above { 1 } else { positions };
         let seen = each(&mut self.team, work, blocks, parts, |kernel, (block, part)| {
             let mut errors = vec![0; samples.len() * heard * BLOCK_ROWS];
             let saturated_words = latch(kernel, taps, bits, block, words, &mut errors);
-            if positions > 1 && !above {
-                errors = repeated(&errors, positions);
-            }
             let mut saturated_gates = [0; 2];
             for (target, slopes, codes, gates) in part {
                 let mut errors = Cow::Borrowed(&errors[..]);
@@ -96,12 +95,15 @@ impl Engine {
                 let negate = target == Stream::N && !alike;
                 let count = &mut saturated_gates[target.index()];
                 if all {
-                    *count += kernel.gate(&errors, slopes, negate, bits, stride, gates);
+                    let errors = (&errors[..], shared);
+                    *count += kernel.gate_shared(errors, slopes, negate, bits, stride, gates);
                     continue;
                 }
                 let sign = if negate { -1 } else { 1 };
                 let reads = samples.start * positions..samples.end * positions;
-                for (sample, errors) in reads.zip(errors.chunks_exact(BLOCK_ROWS)) {
+                let errors = errors.chunks_exact(BLOCK_ROWS);
+                let errors = errors.flat_map(|errors| std::iter::repeat_n(errors, shared));
+                for (sample, errors) in reads.zip(errors) {
                     for (unit, &error) in errors.iter().enumerate() {
                         let slope = slopes[sample * BLOCK_ROWS + unit];
                         let (u, saturated) = periphery::gate(sign * error, slope, bits);
@@ -133,15 +135,6 @@ impl Engine {
         let code = Self::code_of(wiring, Stream::P);
         self.charge(layer, code, During::Error, Event::SaturatedErrors, saturated_words);
     }
-}
-
-/// Words of samples, `[sample][64]`, as every position of a sample hears them.
-fn repeated(errors: &[i16], positions: usize) -> Vec<i16> {
-    let mut all = Vec::with_capacity(errors.len() * positions);
-    for errors in errors.as_chunks::<BLOCK_ROWS>().0 {
-        (0..positions).for_each(|_| all.extend_from_slice(errors));
-    }
-    all
 }
 
 /// Gates of some samples of `loaded` ones, packed as an update of just these takes them.

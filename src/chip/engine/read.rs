@@ -23,6 +23,9 @@ use crate::chip::hardware::{Adc, Hardware, Subtract};
 use crate::chip::layer::{CHUNK_BLOCKS, Layer};
 use crate::chip::periphery::{self, Converter};
 use crate::chip::population::{BANKS_MAX, Stream, Wiring};
+use signed::{below_from_above, both_phases};
+
+mod signed;
 
 /// Histogram of the least shifts at which conversions stay off the rail, and the greatest current, by slice.
 pub(super) type Histogram = Vec<([u64; 64], i64)>;
@@ -52,6 +55,8 @@ struct TileRead<'a> {
     /// Blocks of a physical tile among them.
     tile_blocks: usize,
     codes: Cow<'a, [u8]>,
+    /// What the drives of each sample add up to, where that is known.
+    sums: Vec<i32>,
 }
 
 /// What reads counted.
@@ -131,6 +136,7 @@ pub(super) struct Reader<'a> {
     /// Sums lie below this.
     bound: u128,
     pub(super) columns: usize,
+    rows: usize,
 }
 
 impl<'a> Reader<'a> {
@@ -196,12 +202,28 @@ impl<'a> Reader<'a> {
             narrow,
             bound: bound.unwrap_or(u128::MAX),
             columns: layer.layout.columns,
+            rows: layer.layout.rows,
+        }
+    }
+
+    /// Adds up once what reads of every panel take, where the kernel's do.
+    pub(super) fn prepare(&mut self, kernel: &Kernel) {
+        for at in 0..2 * self.pairs.len() {
+            let reads = std::mem::take(&mut self.pairs[at / 2].reads[at % 2]);
+            let with_sums = reads.into_iter().map(|read| {
+                let sums = kernel.drive_sums(self.drives(&read)).unwrap_or_default();
+                TileRead { sums, ..read }
+            });
+            self.pairs[at / 2].reads[at % 2] = with_sums.collect();
         }
     }
 
     /// What a read is driven with.
     fn drives<'b>(&self, read: &'b TileRead<'_>) -> Drives<'b> {
-        Drives::new(&read.codes, self.samples).within(self.greatest)
+        let rows = (self.rows - (read.blocks.end - 1) * BLOCK_ROWS).min(BLOCK_ROWS);
+        let drives = Drives::new(&read.codes, self.samples);
+        let drives = drives.within(self.greatest).with_last_rows(rows);
+        if read.sums.is_empty() { drives } else { drives.with_sums(&read.sums) }
     }
 
     /// Whether every sum fits 31 bits.
@@ -441,31 +463,6 @@ impl<'a> Reader<'a> {
     }
 }
 
-/// The drivings of a part's samples, some samples at a time, each with its place among `sums`: where drives have a sign, two
-/// a sample.
-fn both_phases<'a, T>(
-    part: &'a PanelPart,
-    sums: &'a mut [T],
-) -> impl Iterator<Item = (PanelPart, &'a mut [T])> {
-    const SAMPLES: usize = TOGETHER / 2;
-    let starts = part.samples.clone().step_by(SAMPLES);
-    starts.zip(sums.chunks_mut(SAMPLES * PANEL_COLUMNS)).map(|(start, sums)| {
-        let end = start + sums.len() / PANEL_COLUMNS;
-        (PanelPart { samples: 2 * start..2 * end, ..part.clone() }, sums)
-    })
-}
-
-/// What was read above 0 less what was read below: `[sample][2][32]` becomes `[sample][32]`.
-fn below_from_above<T: Copy + std::ops::Sub<Output = T>>(both: &[T], sums: &mut [T]) {
-    let samples = sums.as_chunks_mut::<PANEL_COLUMNS>().0.iter_mut();
-    for (sums, both) in samples.zip(both.as_chunks::<{ 2 * PANEL_COLUMNS }>().0) {
-        let (above, below) = both.split_at(PANEL_COLUMNS);
-        for (sum, (&above, &below)) in sums.iter_mut().zip(above.iter().zip(below)) {
-            *sum = above - below;
-        }
-    }
-}
-
 /// Greatest slice of a drive.
 fn slice_max(hardware: &Hardware) -> u8 {
     u8::MAX >> 8u32.saturating_sub(hardware.drive.dac_bits)
@@ -543,6 +540,7 @@ fn tile_reads<'a>(
                 tile_blocks: blocks.len(),
                 codes: Cow::Borrowed(&drives[blocks.start * size..blocks.end * size]),
                 blocks,
+                sums: vec![],
             })
             .collect();
     }
@@ -561,7 +559,8 @@ fn tile_reads<'a>(
         if tiles == Tiles::Together && aligned {
             let tile_blocks = hardware.tile.rows.div_ceil(BLOCK_ROWS);
             let codes = sliced(drives);
-            reads.push(TileRead { slice: slice as usize, blocks: 0..blocks, tile_blocks, codes });
+            let (slice, sums) = (slice as usize, vec![]);
+            reads.push(TileRead { slice, blocks: 0..blocks, tile_blocks, codes, sums });
             continue;
         }
         for rows in layer.row_tiles(hardware) {
@@ -572,7 +571,8 @@ fn tile_reads<'a>(
             }
             debug_assert!(blocks.len() <= CHUNK_BLOCKS, "a converted tile is one chunk");
             let tile_blocks = blocks.len();
-            reads.push(TileRead { slice: slice as usize, blocks, tile_blocks, codes });
+            let (slice, sums) = (slice as usize, vec![]);
+            reads.push(TileRead { slice, blocks, tile_blocks, codes, sums });
         }
     }
     reads

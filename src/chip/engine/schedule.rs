@@ -6,7 +6,8 @@
 //! ```text
 //! reads      FWD(rows) of successive layers, in a pipeline of layers and samples
 //!                sum_l (1 + T_fwd(l)) + (B - 1) max_l (1 + again(l))
-//!            a convolution is read P times a sample, back to back:  1 + T_fwd + (P - 1) (1 + again), and P (1 + again)
+//!            a convolution is read P times a sample, back to back:  1 + T_fwd + (P - 1) (1 + again), and P (1 + again);
+//!            from its columns, in rounds, likewise
 //!            a normalised layer is followed by a digital stage of its own, of 2 NG + 32 beats in both sums; one with a
 //!            pool by one of NG beats a position that the pool puts out
 //! rounds     ERR, FWD(columns), UPD(add), UPD(now), sample by sample in the order of the list; in a round a run of

@@ -17,10 +17,11 @@ use super::each::{MOVE, each};
 use super::error::{gates_of, packed_at, stride_of};
 use super::passes::Passes;
 use super::pulses::Pulses;
+use super::window::windows_of;
 use super::{Engine, Lines, Write};
-use crate::chip::crossbar::kernel::{self, WriteCounts};
+use crate::chip::crossbar::kernel::{self, Image, WriteCounts};
 use crate::chip::crossbar::layout::{BLOCK_ROWS, PANEL_COLUMNS};
-use crate::chip::crossbar::{Collect, Crossbar, StripMut, WriteRequest, Written};
+use crate::chip::crossbar::{Collect, Crossbar, Met, StripMut, WriteRequest, Written};
 use crate::chip::hardware::{DitherBits, DitherPattern, PulseCode, Timing, WriteScheme};
 use crate::chip::ledger::{During, Event};
 use crate::chip::population::{Polarity, Stream};
@@ -136,15 +137,17 @@ impl Engine {
         let samples = &self.drivings_of(layer, samples);
         let stride = stride_of(samples.len());
         let sets = self.layers[layer].spec.drive_sets();
+        let convolution = self.layers[layer].spec.convolution.is_some();
         // taken, so that cells can be written while they are read
         let mut kept = std::mem::take(&mut self.registers[layer].turned);
-        let live: Vec<_> = sets
-            .iter()
-            .zip(&mut kept)
-            .map(|(&set, turned)| self.turn(layer, set, samples, turned))
-            .collect();
+        let mut live: Vec<Vec<bool>> = vec![];
+        if !convolution {
+            let sets = sets.iter().zip(&mut kept);
+            live.extend(sets.map(|(&set, turned)| self.turn(layer, set, samples, turned)));
+        }
+        let images = std::mem::take(&mut self.registers[layer].images);
         let registers = std::mem::take(&mut self.registers[layer].gates);
-        let turned = kept
+        let turned: Vec<Vec<_>> = kept
             .iter()
             .zip(&live)
             .map(|(turned, live)| {
@@ -153,7 +156,17 @@ impl Engine {
                 blocks.zip(live).map(|(block, live)| live.then_some(block)).collect()
             })
             .collect();
-        let ready = self.ready(layer, reads, turned, &registers, shift);
+        let plan = self.registers[layer].plan.clone();
+        let met = sets.iter().map(|&set| match (&plan, convolution && !samples.is_empty()) {
+            (Some(plan), true) => {
+                let image = Image::new(plan, &images[set.index()]);
+                let windows = windows_of(&self.layers[layer].spec, &self.hardware, image);
+                Met::Windows { windows, first: samples.start, count: samples.len() }
+            }
+            _ => Met::Turned(turned.get(set.index()).map_or(&[], |turned| &turned[..])),
+        });
+        let met = met.collect();
+        let ready = self.ready(layer, reads, met, &registers, shift);
         let written = if self.layers[layer].requests.are_plain() {
             self.write_at_once(layer, &ready)
         } else {
@@ -166,6 +179,7 @@ impl Engine {
             }
         }
         self.registers[layer].turned = kept;
+        self.registers[layer].images = images;
         self.registers[layer].gates = registers;
         written.into_iter().map(|(array, _, written)| (array, written.counts)).collect()
     }
@@ -175,7 +189,7 @@ impl Engine {
         &self,
         layer: usize,
         reads: &Range<usize>,
-        turned: Vec<Vec<Option<&'a [u8]>>>,
+        met: Vec<Met<'a>>,
         registers: &'a [Lines<i8>; 2],
         shift: u32,
     ) -> Ready<'a> {
@@ -215,7 +229,7 @@ impl Engine {
         Ready {
             samples: phases * reads.len(),
             stride: stride_of(phases * reads.len()),
-            turned,
+            met,
             gates,
             law,
             dither: (write.dither_bits, write.dither_pattern),
@@ -267,8 +281,8 @@ pub(super) struct Ready<'a> {
     /// Products of a cell: reads, or drivings of rows where drives have a sign.
     pub(super) samples: usize,
     pub(super) stride: usize,
-    /// Turned drives by set and block; `None` where all are 0.
-    pub(super) turned: Vec<Vec<Option<&'a [u8]>>>,
+    /// By set of drives.
+    pub(super) met: Vec<Met<'a>>,
     /// By array.
     gates: Vec<Cow<'a, [i8]>>,
     law: kernel::WriteLaw,
@@ -291,7 +305,7 @@ impl Ready<'_> {
     pub(super) fn request(&self, array: usize) -> WriteRequest<'_> {
         let Array { set, negate, place } = self.arrays[array];
         WriteRequest {
-            turned: &self.turned[set],
+            met: self.met[set],
             stride: self.stride,
             write: kernel::WriteLaw { negate, ..self.law },
             dither_bits: self.dither.0,

@@ -5,7 +5,8 @@
 //! cycle before: lanes, tree, converters, front end; then error unit, update, and last the command that is accepted.
 //!
 //! Beyond the page, for networks of tiles (docs/MODEL.md, 4.5): an adder tree outside, more than one tap, remainders,
-//! verified, limited and amplitude-coded pulses, reads from the columns, drives with a sign, and digital actions of more than one cycle.
+//! words pixel by pixel, verified, limited and amplitude-coded pulses, reads from the columns, drives with a sign, and digital
+//! actions of more than one cycle.
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
 mod balance;
