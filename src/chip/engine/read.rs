@@ -15,9 +15,7 @@ use std::ops::Range;
 
 use super::homeostasis::{Noted, Notes};
 use crate::chip::crossbar::Crossbar;
-use crate::chip::crossbar::kernel::{
-    Banks, Conversion, Drives, Greatest, Kernel, Scratch, TOGETHER,
-};
+use crate::chip::crossbar::kernel::{Banks, Conversion, Drives, Greatest, Kernel, Scratch};
 use crate::chip::crossbar::layout::{BLOCK_ROWS, PANEL_COLUMNS};
 use crate::chip::hardware::{Adc, Hardware, Subtract};
 use crate::chip::layer::{CHUNK_BLOCKS, Layer};
