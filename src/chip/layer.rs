@@ -33,6 +33,9 @@ pub use stage::{Gain, Homeostasis, Pool};
 pub enum DrivenBy {
     /// One set of drives, for both streams: data.
     Shared,
+    /// The same, of data with a sign: each row has a code for what is above 0 and one for what is below, and is driven with
+    /// one after the other.
+    Signed,
     /// A set for each stream: activities of the array before.
     Streams,
     /// A set for each stream: normalised activities of the array before, of which code 32 is 1.
@@ -44,9 +47,21 @@ impl DrivenBy {
     #[must_use]
     pub const fn full_drive(self) -> FullDrive {
         match self {
-            Self::Shared | Self::Streams => FullDrive::One,
+            Self::Shared | Self::Signed | Self::Streams => FullDrive::One,
             Self::Normalised => FullDrive::Normalised,
         }
+    }
+
+    /// Whether both streams have the same drives.
+    #[must_use]
+    pub const fn is_shared(self) -> bool {
+        matches!(self, Self::Shared | Self::Signed)
+    }
+
+    /// How often rows are driven for a read: once, or with what is above 0 and then with what is below.
+    #[must_use]
+    pub const fn phases(self) -> usize {
+        if matches!(self, Self::Signed) { 2 } else { 1 }
     }
 }
 
@@ -99,7 +114,7 @@ impl LayerSpec {
     #[must_use]
     pub const fn drives_of(&self, source: Stream) -> Stream {
         match self.driven_by {
-            DrivenBy::Shared => Stream::P,
+            DrivenBy::Shared | DrivenBy::Signed => Stream::P,
             DrivenBy::Streams | DrivenBy::Normalised => source,
         }
     }
@@ -108,7 +123,7 @@ impl LayerSpec {
     #[must_use]
     pub const fn drive_sets(&self) -> &'static [Stream] {
         match self.driven_by {
-            DrivenBy::Shared => &[Stream::P],
+            DrivenBy::Shared | DrivenBy::Signed => &[Stream::P],
             DrivenBy::Streams | DrivenBy::Normalised => self.wiring.sources(),
         }
     }

@@ -42,11 +42,13 @@ pub struct Form<'a> {
     pub squares: bool,
     /// Whether centred sums may be beyond 32 bits: those of more than [`SHORT_READS`] reads.
     pub long: bool,
+    /// Products of a read: 2 where drives have a sign, the second with its gate turned round.
+    pub phases: usize,
 }
 
 impl Form<'_> {
     /// Sums as they are.
-    pub const PLAIN: Self = Self { means: None, squares: false, long: false };
+    pub const PLAIN: Self = Self { means: None, squares: false, long: false, phases: 1 };
 }
 
 /// So many reads have centred sums of 32 bits, whatever they hold: 4096 x 4080 x 127 < 2^31.
@@ -54,6 +56,17 @@ pub const SHORT_READS: usize = 4096;
 
 /// Sums of half blocks that 32 bits do not hold, with their places. Where they belong in the list of all, there is 0.
 pub type LongSums = Vec<(usize, Box<Half<i64>>)>;
+
+/// Sums of the gates of 16 columns, packed as an update takes them, of which every second is turned round: of the others.
+fn totals_above(gates: &[i8]) -> [i32; HALF_COLUMNS] {
+    let mut totals = [0; HALF_COLUMNS];
+    for four in gates.as_chunks::<{ 4 * HALF_COLUMNS }>().0 {
+        for (total, gates) in totals.iter_mut().zip(four.as_chunks::<4>().0) {
+            *total += i32::from(gates[0]) + i32::from(gates[2]);
+        }
+    }
+    totals
+}
 
 /// Forms the sums of a strip.
 pub(super) struct Former<'a> {
@@ -95,7 +108,12 @@ impl<'a> Former<'a> {
             let halves = gates.chunks_exact(HALF_COLUMNS * stride).map(|gates| {
                 let live = is_driven(gates);
                 let wanted = live && form.means.is_some();
-                (live, if wanted { kernel.gate_totals(gates) } else { [0; _] })
+                let totals = match form.phases {
+                    _ if !wanted => [0; _],
+                    1 => kernel.gate_totals(gates),
+                    _ => totals_above(gates),
+                };
+                (live, totals)
             });
             halves.collect()
         };

@@ -41,7 +41,7 @@ impl Engine {
 
     /// Sums of the drives of the rows of a set over all reads, padded.
     fn row_drives(&self, layer: usize, set: Stream) -> Vec<i64> {
-        let (reads, blocks) = (self.reads(layer), self.layers[layer].layout.blocks());
+        let (reads, blocks) = (self.drivings(layer), self.layers[layer].layout.blocks());
         let mut sums = vec![0i64; blocks * BLOCK_ROWS];
         let mut add = |block: usize, codes: &[u8]| {
             let sums = &mut sums[block * BLOCK_ROWS..][..BLOCK_ROWS];

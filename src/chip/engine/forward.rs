@@ -290,7 +290,7 @@ impl Engine {
         let this = &self.layers[layer];
         let [down, across] = this.tiles(&self.hardware).map(|n| n as u64);
         let (rows, columns) = (this.layout.rows as u64, this.layout.columns as u64);
-        let slices = u64::from(self.hardware.slices());
+        let slices = u64::from(self.hardware.slices()) * this.spec.driven_by.phases() as u64;
         let samples = self.reads(layer) as u64;
         let dac_bits = u64::from(self.hardware.drive.dac_bits);
         let wiring = this.spec.wiring;

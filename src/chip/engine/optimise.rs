@@ -75,7 +75,8 @@ impl Engine {
         let this = &mut self.layers[layer];
         // what a mean is taken over: samples, or the pixels below the windows of all of them
         let pixels = this.spec.convolution.map_or(1, |shape| shape.height * shape.width);
-        let samples = (ready.samples / this.spec.positions() * pixels) as i64;
+        let phases = this.spec.driven_by.phases();
+        let samples = (ready.samples / this.spec.drivings() * pixels) as i64;
         let pixels_log2 = log2_ceil(pixels as u64);
         if let (Some(codes), true) = (&codes, first) {
             move_means(&mut this.requests.means, codes, |_, codes| first_mean(codes, samples));
@@ -94,6 +95,7 @@ impl Engine {
                 means: window.map(|_| &row_means[set][..]),
                 squares: looks_at(optimiser, negate),
                 long: ready.samples > SHORT_READS,
+                phases,
             }
         };
         let strip_cells = Crossbar::STRIP_PANELS * layout.panel_cells();
@@ -219,17 +221,22 @@ impl Engine {
             }
             return codes;
         }
+        let signed = spec.driven_by.phases() > 1;
         let turned = ready.met.iter().flat_map(|met| match met {
             Met::Turned(turned) => *turned,
             Met::Windows { .. } => unreachable!("a dense layer has no windows"),
         });
         let blocks: Vec<_> = turned.copied().collect();
         let sums = self.team.alone(blocks, |kernel, block| {
-            block.map_or([0; BLOCK_ROWS], |turned| kernel.drive_totals(turned, ready.stride))
+            let of = |turned| match signed {
+                true => signed_totals(turned, ready.stride),
+                false => kernel.drive_totals(turned, ready.stride).map(i64::from),
+            };
+            block.map_or([0; BLOCK_ROWS], of)
         });
         let rows = sums.chunks((sums.len() / sets.len()).max(1));
         for (set, rows) in sets.iter().zip(rows) {
-            codes[set.index()].extend(rows.as_flattened().iter().map(|&sum| i64::from(sum)));
+            codes[set.index()].extend(rows.as_flattened());
         }
         codes
     }
@@ -259,9 +266,11 @@ impl Engine {
         if !centred {
             return;
         }
+        // codes with a sign have means with one
+        let width = MEAN_WIDTH + u64::from(spec.driven_by.phases() > 1);
         let mut means = |code, count| {
             self.charge(layer, code, During::Update, Event::RowMeans, count);
-            self.charge(layer, code, During::Update, Event::SramBits, MEAN_WIDTH * count);
+            self.charge(layer, code, During::Update, Event::SramBits, width * count);
         };
         // used by every array in each pass that sees it, and kept once a set of drives, or a channel of it
         let constant = usize::from(spec.constant_row);
@@ -276,6 +285,16 @@ impl Engine {
             means(first.expect("drives drive an array").code, kept);
         }
     }
+}
+
+/// Sums of the codes of rows that are turned, `[64 rows][stride]`: of every two, the second lies below 0.
+fn signed_totals(turned: &[u8], stride: usize) -> [i64; BLOCK_ROWS] {
+    let mut totals = [0; BLOCK_ROWS];
+    for (total, codes) in totals.iter_mut().zip(turned.chunks_exact(stride)) {
+        let codes = codes.as_chunks::<2>().0.iter();
+        *total = codes.map(|&[above, below]| i64::from(above) - i64::from(below)).sum();
+    }
+    totals
 }
 
 /// Whether an optimiser squares the sums of an array, which inhibits or excites.

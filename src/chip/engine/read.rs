@@ -21,6 +21,9 @@ use crate::chip::hardware::{Adc, Hardware, Subtract};
 use crate::chip::layer::{CHUNK_BLOCKS, Layer};
 use crate::chip::periphery::{self, Converter};
 use crate::chip::population::{BANKS_MAX, Stream, Wiring};
+use signed::{below_from_above, both_phases};
+
+mod signed;
 
 /// Histogram of the least shifts at which conversions stay off the rail, and the greatest current, by slice.
 pub(super) type Histogram = Vec<([u64; 64], i64)>;
@@ -118,7 +121,9 @@ struct Pair<'a> {
 /// The banks of one target stream, and how they are read.
 pub(super) struct Reader<'a> {
     pairs: Vec<Pair<'a>>,
+    /// Drivings of rows: reads, twice as many where drives have a sign.
     samples: usize,
+    phases: usize,
     /// Converters by slice; none where they are ideal.
     converters: Option<(Vec<Converter>, Subtract)>,
     probe: Option<Converter>,
@@ -166,9 +171,10 @@ impl<'a> Reader<'a> {
             (Some(_), false) => Tiles::Apart,
         };
         let code_max = hardware.drive.bits.code_max();
+        let phases = layer.spec.driven_by.phases();
         let reads = |at: usize| {
             let drives = drives(wiring.pathways()[at].source);
-            tile_reads(layer, hardware, drives, samples, tiles)
+            tile_reads(layer, hardware, drives, samples * phases, tiles)
         };
         let pair = |places: &[usize; 2]| Pair {
             arrays: places.map(|at| &layer.arrays[at]),
@@ -176,7 +182,8 @@ impl<'a> Reader<'a> {
         };
         Self {
             pairs: pairs.iter().map(pair).collect(),
-            samples,
+            samples: samples * phases,
+            phases,
             converters,
             probe,
             dac_bits: hardware.drive.dac_bits,
@@ -229,6 +236,26 @@ impl<'a> Reader<'a> {
 
     /// Accumulators of a panel, `[sample][32]`, where they fit 31 bits.
     pub(super) fn read_narrow(
+        &self,
+        kernel: &Kernel,
+        part: &PanelPart,
+        scratch: &mut Scratch,
+        sums: &mut [i32],
+        seen: &mut Seen,
+    ) {
+        if self.phases == 1 {
+            return self.drive_narrow(kernel, part, scratch, sums, seen);
+        }
+        let mut both = [0; Scratch::SUMS];
+        for (part, sums) in both_phases(part, sums) {
+            let both = &mut both[..2 * sums.len()];
+            self.drive_narrow(kernel, &part, scratch, both, seen);
+            below_from_above(both, sums);
+        }
+    }
+
+    /// What each driving of the rows reads.
+    fn drive_narrow(
         &self,
         kernel: &Kernel,
         part: &PanelPart,
@@ -328,6 +355,19 @@ impl<'a> Reader<'a> {
         sums: &mut [i64],
         seen: &mut Seen,
     ) {
+        if self.phases == 1 {
+            return self.drive_wide(kernel, part, sums, seen);
+        }
+        let mut both = [0; Scratch::SUMS];
+        for (part, sums) in both_phases(part, sums) {
+            let both = &mut both[..2 * sums.len()];
+            self.drive_wide(kernel, &part, both, seen);
+            below_from_above(both, sums);
+        }
+    }
+
+    /// What each driving of the rows reads.
+    fn drive_wide(&self, kernel: &Kernel, part: &PanelPart, sums: &mut [i64], seen: &mut Seen) {
         sums.fill(0);
         let mut currents = [[0; Scratch::SUMS]; 2];
         for (at, pair) in self.pairs.iter().enumerate() {
@@ -438,7 +478,8 @@ fn bound(
     converters: Option<&(Vec<Converter>, Subtract)>,
 ) -> Option<u128> {
     let ceiling = u128::from(hardware.cell.window.ceiling());
-    let (rows, pairs) = (layer.layout.rows, pairs as u128);
+    // of codes of both phases one is taken off the other
+    let (rows, pairs) = (layer.layout.rows, (pairs * layer.spec.driven_by.phases()) as u128);
     let current = |rows: usize, code: u32| rows as u128 * ceiling * u128::from(code);
     match converters {
         None => {

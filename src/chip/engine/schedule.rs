@@ -50,8 +50,17 @@ struct Shape {
     form: u64,
     /// Reads of a sample.
     positions: u64,
+    /// Times that rows are driven for a read.
+    phases: u64,
     /// Cycles of the stage behind it, which normalises or pools a sample and which no command begins; 0 where there is none.
     stage: u64,
+}
+
+impl Shape {
+    /// Products of a sample.
+    const fn drivings(self) -> u64 {
+        self.positions * self.phases
+    }
 }
 
 /// Layers whose commands of one kind run at the same time.
@@ -183,6 +192,7 @@ impl Schedule {
                 words: (layer.delivery.taps.width * layer.heard()) as u64,
                 form: timing.form(layer.delivery.terms() as u64),
                 positions: layer.spec.positions() as u64,
+                phases: layer.spec.driven_by.phases() as u64,
                 stage: match layer.spec.pool {
                     Pool::None if normalised => timing.normalise(columns),
                     Pool::None => 0,
@@ -216,8 +226,8 @@ impl Schedule {
             self.settle(cycles);
             self.segment = Segment::Reads { next: layer, samples: 0, latency: 0, again: 0 };
         }
-        let front = t.accept() + self.reads.again(1, shape.columns);
-        let one = t.accept() + self.reads.read(1, shape.columns, shape.levels[0]);
+        let front = t.accept() + self.reads.again(shape.phases, shape.columns);
+        let one = t.accept() + self.reads.read(shape.phases, shape.columns, shape.levels[0]);
         let one = one + (shape.positions - 1) * front;
         if let Segment::Reads { next, samples: count, latency, again } = &mut self.segment {
             *next = layer + 1;
@@ -227,7 +237,7 @@ impl Schedule {
         }
         let count = samples as u64 * shape.positions;
         cycles.occupy(layer, During::ForwardRows, count * front);
-        self.engage_read(cycles, layer, [count, 1], shape.columns, shape.levels[0]);
+        self.engage_read(cycles, layer, [count, shape.phases], shape.columns, shape.levels[0]);
     }
 
     /// So many reads, each of which goes through all slices so many times.
@@ -339,7 +349,7 @@ impl Schedule {
             return;
         }
         let (t, shape) = (self.timing, self.shapes[layer]);
-        let busy = shape.positions * t.accumulate(shape.rows, shape.columns);
+        let busy = shape.drivings() * t.accumulate(shape.rows, shape.columns);
         for round in self.rounds(cycles, samples) {
             round.join(Doing::Adding, layer, t.accept() + busy, false);
         }
@@ -365,9 +375,9 @@ impl Schedule {
             let squared = t.accumulate(shape.rows, shape.columns);
             cycles.engage(layer, Part::Accumulators, squared);
         }
-        if write == Write::Now && shape.positions > 1 {
-            // products of more than one read are added up before anything is written
-            let added = shape.positions * t.accumulate(shape.rows, shape.columns);
+        if write == Write::Now && shape.drivings() > 1 {
+            // more products than one are added up before anything is written
+            let added = shape.drivings() * t.accumulate(shape.rows, shape.columns);
             cycles.engage(layer, Part::Accumulators, added);
             one += added;
         }

@@ -14,7 +14,7 @@ use std::ops::Range;
 use aligned_vec::AVec;
 
 use super::each::{MOVE, each};
-use super::error::{gates_of, stride_of};
+use super::error::{gates_of, packed_at, stride_of};
 use super::passes::Passes;
 use super::pulses::Pulses;
 use super::window::windows_of;
@@ -34,7 +34,7 @@ impl Engine {
             Write::Add => {
                 assert_eq!(*pending, samples.start, "samples are added in order");
                 *pending = samples.end;
-                let reads = self.reads_of(layer, &samples).len();
+                let reads = self.drivings_of(layer, &samples).len();
                 self.charge_accumulate(layer, reads);
                 // the sum of a cell is read and stored again
                 self.charge_cells(layer, Event::SramBits, 2 * SUM_BITS * reads as u64);
@@ -57,7 +57,7 @@ impl Engine {
                     self.row_sums[layer] = None;
                     return self.write_trains(layer, samples.start, shift, slots_log2);
                 }
-                let reads = self.layers[layer].spec.positions();
+                let reads = self.layers[layer].spec.drivings();
                 self.charge_accumulate(layer, reads);
                 if reads > 1 {
                     // sums of more than one product lie in memory until they are written
@@ -133,7 +133,8 @@ impl Engine {
         samples: &Range<usize>,
         shift: u32,
     ) -> Vec<(usize, WriteCounts)> {
-        let samples = &self.reads_of(layer, samples);
+        let reads = &self.reads_of(layer, samples);
+        let samples = &self.drivings_of(layer, samples);
         let stride = stride_of(samples.len());
         let sets = self.layers[layer].spec.drive_sets();
         let convolution = self.layers[layer].spec.convolution.is_some();
@@ -165,7 +166,7 @@ impl Engine {
             _ => Met::Turned(turned.get(set.index()).map_or(&[], |turned| &turned[..])),
         });
         let met = met.collect();
-        let ready = self.ready(layer, samples, met, &registers, shift);
+        let ready = self.ready(layer, reads, met, &registers, shift);
         let written = if self.layers[layer].requests.are_plain() {
             self.write_at_once(layer, &ready)
         } else {
@@ -187,15 +188,16 @@ impl Engine {
     fn ready<'a>(
         &self,
         layer: usize,
-        samples: &Range<usize>,
+        reads: &Range<usize>,
         met: Vec<Met<'a>>,
         registers: &'a [Lines<i8>; 2],
         shift: u32,
     ) -> Ready<'a> {
         let this = &self.layers[layer];
-        let wiring = this.spec.wiring;
+        let (wiring, phases) = (this.spec.wiring, this.spec.driven_by.phases());
         let of = |target: Stream, polarity| {
-            let gates = gates_of(&registers[target.index()], self.reads(layer), samples);
+            let gates = gates_of(&registers[target.index()], self.reads(layer), reads);
+            let gates = if phases > 1 { both_ways(&gates, reads.len()) } else { gates };
             if self.potentiation_only { rectified(&gates, polarity) } else { gates }
         };
         let gates =
@@ -225,8 +227,8 @@ impl Engine {
             },
         });
         Ready {
-            samples: samples.len(),
-            stride: stride_of(samples.len()),
+            samples: phases * reads.len(),
+            stride: stride_of(phases * reads.len()),
             met,
             gates,
             law,
@@ -257,7 +259,7 @@ impl Engine {
         turned: &mut AVec<u8>,
     ) -> Vec<bool> {
         let size = BLOCK_ROWS * stride_of(samples.len());
-        let (blocks, reads) = (self.layers[layer].layout.blocks(), self.reads(layer));
+        let (blocks, reads) = (self.layers[layer].layout.blocks(), self.drivings(layer));
         turned.resize(blocks * size, 0);
         let drives = &self.registers[layer].drives[set.index()];
         let drives = drives.chunks_exact((reads * BLOCK_ROWS).max(1));
@@ -276,6 +278,7 @@ impl Engine {
 
 /// Everything that a write of a layer is made of, but its cells.
 pub(super) struct Ready<'a> {
+    /// Products of a cell: reads, or drivings of rows where drives have a sign.
     pub(super) samples: usize,
     pub(super) stride: usize,
     /// By set of drives.
@@ -339,6 +342,21 @@ fn verified(timing: Option<Timing>, counts: WriteCounts) -> u64 {
         Some(Timing { verify: true, pulse_code: PulseCode::Amplitude, .. }) => counts.requested,
         _ => 0,
     }
+}
+
+/// Gates of so many reads as drives with a sign meet them: as they are, then, for what lies below 0, turned round.
+fn both_ways(gates: &[i8], reads: usize) -> Cow<'static, [i8]> {
+    let (from, to) = (stride_of(reads), stride_of(2 * reads));
+    let units = gates.len().checked_div(from).unwrap_or(0);
+    let mut out = vec![0; units * to];
+    for unit in 0..units {
+        for read in 0..reads {
+            let gate = gates[packed_at(from, read, unit)];
+            out[packed_at(to, 2 * read, unit)] = gate;
+            out[packed_at(to, 2 * read + 1, unit)] = -gate;
+        }
+    }
+    Cow::Owned(out)
 }
 
 /// Gates that may only potentiate: excitatory arrays take positive ones, inhibitory arrays negative ones.

@@ -34,6 +34,17 @@ impl Engine {
         self.samples * self.layers[layer].spec.positions()
     }
 
+    /// Times that rows of a layer are driven for the samples that are loaded.
+    pub(super) fn drivings(&self, layer: usize) -> usize {
+        self.samples * self.layers[layer].spec.drivings()
+    }
+
+    /// The same of some samples.
+    pub(super) fn drivings_of(&self, layer: usize, samples: &Range<usize>) -> Range<usize> {
+        let drivings = self.layers[layer].spec.drivings();
+        samples.start * drivings..samples.end * drivings
+    }
+
     /// Reads of some samples of a layer.
     pub(super) fn reads_of(&self, layer: usize, samples: &Range<usize>) -> Range<usize> {
         let positions = self.layers[layer].spec.positions();

@@ -93,10 +93,18 @@ impl super::LayerSpec {
         self.convolution.map_or(1, ConvShape::positions)
     }
 
-    /// Codes of a sample below it, of a set of drives.
+    /// Times that its rows are driven for a sample, and that products of drives and gates are formed: twice a read where
+    /// drives have a sign.
+    #[must_use]
+    pub fn drivings(&self) -> usize {
+        self.positions() * self.driven_by.phases()
+    }
+
+    /// Codes of a sample below it, of a set of drives. Where they have a sign: what is above 0 of each, then what is below.
     #[must_use]
     pub fn sample_inputs(&self) -> usize {
-        self.convolution.map_or(self.inputs, |shape| shape.height * shape.width * shape.channels)
+        let inputs = self.inputs.saturating_mul(self.driven_by.phases());
+        self.convolution.map_or(inputs, |shape| shape.height * shape.width * shape.channels)
     }
 
     /// Rows and columns of what its units hand on, behind the pool.

@@ -269,9 +269,11 @@ impl Network {
                     let orders: Vec<_> = writes.iter().map(order).collect();
                     self.play(&orders, Interval::Program);
                     for order in orders {
+                        let bits = self.layers[order.layer].mean_bits();
                         let counts = self.layers[order.layer].mean_counts();
                         for (code, count) in counts {
-                            let charged = [(Event::RowMeans, count), (Event::SramBits, 12 * count)];
+                            let charged =
+                                [(Event::RowMeans, count), (Event::SramBits, bits * count)];
                             for (event, count) in charged {
                                 self.charge(order.layer, code, During::Update, event, count);
                             }
@@ -449,7 +451,7 @@ impl Network {
         let hardware = self.layers[layer].memory;
         let updating = during == During::Update;
         // a product of its own is written as it is formed
-        let alone = now && self.layers[layer].positions() == 1;
+        let alone = now && self.layers[layer].products() == 1;
         let sums = if updating && !alone { 64 * (e.accumulates + e.delta_computations) } else { 0 };
         let rests = 2 * hardware.residual_bits * e.delta_computations;
         let words = 2 * hardware.word_bits * e.optimiser_steps;

@@ -5,8 +5,8 @@
 //! cycle before: lanes, tree, converters, front end; then error unit, update, and last the command that is accepted.
 //!
 //! Beyond the page, for networks of tiles (docs/MODEL.md, 4.5): an adder tree outside, more than one tap, remainders,
-//! words pixel by pixel, verified, limited and amplitude-coded pulses, reads from the columns, and digital actions of
-//! more than one cycle.
+//! words pixel by pixel, verified, limited and amplitude-coded pulses, reads from the columns, drives with a sign, and digital
+//! actions of more than one cycle.
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
 mod balance;
@@ -127,7 +127,7 @@ struct Upd {
     kind: UpdKind,
     row: usize,
     group: usize,
-    /// Read of the sample.
+    /// Product of the sample: a read, or a driving of the rows.
     position: usize,
     phase: UpdPhase,
     pulse: i64,
@@ -360,7 +360,7 @@ impl Tile {
                 self.upd = update(UpdKind::Now, slot, shift);
                 if self.config.more.train_slots.is_some() {
                     self.upd.phase = UpdPhase::Set;
-                } else if self.config.more.positions > 1 {
+                } else if self.products() > 1 {
                     self.upd.phase = UpdPhase::Gather;
                 }
             }

@@ -145,7 +145,7 @@ impl TickLayer {
             delay: added.map(|tiles| timing.beat * tree_levels(tiles as u64)),
             batch: optimise::Batch::new(timing, layer, grid),
         };
-        let slots = slots * this.positions();
+        let slots = slots * this.products();
         let lut = layer.lut.activity.iter().zip(&layer.lut.derivative);
         let table: Vec<[u8; 2]> = lut.map(|(&a, &slope)| [a, slope]).collect();
         for (target, _) in wiring.planes() {
@@ -330,7 +330,7 @@ impl TickLayer {
     /// Puts a drive code on a row of every bank that `stream` drives: of all of them where they share their drives,
     /// or where no stream is named.
     fn load_drive(&mut self, stream: Option<Stream>, slot: usize, row: usize, code: u8) {
-        let shared = self.driven_by == DrivenBy::Shared;
+        let shared = self.driven_by.is_shared();
         for plane in 0..self.planes.len() {
             for bank in 0..2 {
                 if stream.is_some_and(|stream| !shared && stream != self.source(plane, bank)) {

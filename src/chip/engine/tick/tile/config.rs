@@ -154,6 +154,9 @@ pub struct More {
     pub train_slots: Option<u64>,
     /// Reads of a sample, one after the other in the slots: positions of a window.
     pub positions: usize,
+    /// Times that rows are driven for a read: 2 where drives have a sign. Their slots lie one behind the other, what is below
+    /// 0 behind what is above.
+    pub phases: usize,
     /// How words come pixel by pixel; `None`: a sample has one set of words, which all its positions hear.
     pub squares: Option<Squares>,
 }
@@ -208,6 +211,7 @@ impl Default for More {
             centred: None,
             train_slots: None,
             positions: 1,
+            phases: 1,
             squares: None,
         }
     }
@@ -219,7 +223,7 @@ impl TileConfig {
         self.share as u64 * self.convert
     }
 
-    /// `T_A` of a slice; reads from the columns go through all of them twice.
+    /// `T_A` of a slice; reads from the columns, and of drives with a sign, go through all of them twice.
     pub(super) fn settle_of(&self, slice: u32) -> u64 {
         let own = self.more.slice_times.get((slice % self.slices) as usize);
         own.map_or(self.settle, |own| own.settle)

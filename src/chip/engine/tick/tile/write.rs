@@ -170,15 +170,31 @@ impl Tile {
         over
     }
 
-    /// The read whose products are formed.
-    pub(super) const fn learnt(&self) -> usize {
-        self.upd.slot * self.config.more.positions + self.upd.position
+    /// Products of a cell for a sample.
+    pub(super) const fn products(&self) -> usize {
+        self.config.more.positions * self.config.more.phases
+    }
+
+    /// The driving of the rows whose products are formed, and whether it lies below 0.
+    pub(super) const fn learnt_drive(&self) -> (usize, bool) {
+        let below = self.upd.position % self.config.more.phases > 0;
+        (self.upd.slot * self.products() + self.upd.position, below)
+    }
+
+    /// The read whose gates they are formed with.
+    const fn learnt(&self) -> usize {
+        self.upd.slot * self.config.more.positions + self.upd.position / self.config.more.phases
     }
 
     /// The product of a row's drive and a column's gate as a bank takes it.
     pub(super) fn outer(&self, bank: usize, column: usize) -> i64 {
-        let drive = i64::from(self.drive[bank][self.learnt() * self.size.rows + self.upd.row]);
-        drive * self.signed_gate(bank, column)
+        let (driving, below) = self.learnt_drive();
+        let drive = i64::from(self.drive[bank][driving * self.size.rows + self.upd.row]);
+        if below {
+            -drive * self.signed_gate(bank, column)
+        } else {
+            drive * self.signed_gate(bank, column)
+        }
     }
 
     /// A column's gate as a bank takes it.
@@ -213,7 +229,7 @@ impl Tile {
         }
         self.upd.row = 0;
         self.upd.position += 1;
-        if self.upd.position < self.config.more.positions {
+        if self.upd.position < self.products() {
             return;
         }
         let Upd { kind, slot, shift, .. } = self.upd;
@@ -239,7 +255,7 @@ impl Tile {
             for column in 0..self.config.columns {
                 let at = self.upd.row * self.size.columns + column;
                 let sum = match self.upd.kind {
-                    UpdKind::Now if self.config.more.positions == 1 => {
+                    UpdKind::Now if self.products() == 1 => {
                         self.bank_events[bank].accumulates += 1;
                         self.outer(bank, column)
                     }

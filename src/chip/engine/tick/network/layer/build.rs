@@ -103,6 +103,7 @@ pub(super) fn config(
                 WriteScheme::Trains { slots_log2 } => Some(1 << slots_log2),
             },
             positions: layer.spec.positions(),
+            phases: layer.spec.driven_by.phases(),
             squares: (layer.delivery.source == WordSource::Above).then(|| Squares {
                 side: layer.spec.pool.side(),
                 pixels: layer.spec.pooled(),

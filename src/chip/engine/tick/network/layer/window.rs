@@ -9,7 +9,7 @@
 
 use super::TickLayer;
 use crate::chip::crossbar::kernel::ConvShape;
-use crate::chip::layer::{DrivenBy, LayerSpec};
+use crate::chip::layer::LayerSpec;
 use crate::chip::periphery;
 use crate::chip::population::Stream;
 
@@ -50,9 +50,15 @@ impl TickLayer {
         self.window.shape.map_or(1, |shape| shape.output().iter().product())
     }
 
+    /// Products of a cell for a sample: drivings of its row.
+    pub(in super::super) fn products(&self) -> usize {
+        self.positions() * self.driven_by.phases()
+    }
+
     /// Codes of a sample below it.
     pub(in super::super) fn sample_inputs(&self) -> usize {
-        self.window.shape.map_or(self.inputs, |shape| shape.height * shape.width * shape.channels)
+        let inputs = self.inputs * self.driven_by.phases();
+        self.window.shape.map_or(inputs, |shape| shape.height * shape.width * shape.channels)
     }
 
     /// Puts codes of data on the rows of all banks.
@@ -70,15 +76,19 @@ impl TickLayer {
         sample: usize,
         codes: &[u8],
     ) {
-        let shared = self.driven_by == DrivenBy::Shared;
+        let shared = self.driven_by.is_shared();
         if shared && stream.is_some_and(|stream| stream != Stream::P) {
             return;
         }
         let Some(shape) = self.window.shape else {
-            for (row, &code) in codes.iter().enumerate() {
-                self.load_drive(stream, sample, row, code);
+            let phases = self.driven_by.phases();
+            for (phase, codes) in codes.chunks_exact(self.inputs).enumerate() {
+                for (row, &code) in codes.iter().enumerate() {
+                    self.load_drive(stream, sample * phases + phase, row, code);
+                }
             }
-            return self.load_constant(sample);
+            // above 0: below it nothing was ever put on this row
+            return self.load_constant(sample * phases);
         };
         self.window.images[stream.map_or(0, Stream::index)][sample] = codes.to_vec();
         let ConvShape { channels, height, width, side, stride, pad } = shape;
