@@ -15,6 +15,7 @@ use super::hardware::{FloorKind, Hardware, Window};
 use kernel::{Cells, Drives, Kernel};
 use layout::{BLOCK_CELLS, BLOCK_ROWS, HALF_CELLS, HALF_COLUMNS, Layout, PANEL_COLUMNS};
 
+mod form;
 mod initial;
 pub mod kernel;
 pub mod layout;
@@ -25,8 +26,9 @@ mod trains;
 mod words;
 mod write;
 
+pub use form::{Form, LongSums, Met, SHORT_READS};
 pub use initial::{InitialLaw, initial_levels, initial_scale};
-pub use optimise::{Adam, Asks, Form, LongSums, Momentum, SHORT_READS};
+pub use optimise::{Adam, Asks, Momentum};
 pub use pulses::{Collect, Collected, RowPeaks};
 pub use trains::ColumnTrain;
 pub use write::{WriteRequest, Written};
@@ -232,21 +234,24 @@ impl Crossbar {
         &plane[first + blocks.start * BLOCK_CELLS..first + blocks.end * BLOCK_CELLS]
     }
 
-    /// The transposed read: sums of every row over all columns, `[sample][rows padded]`. `gates` are signed bytes
-    /// that lie as drives do, by column.
-    #[must_use]
-    pub fn read_columns(&self, kernel: &Kernel, gates: Drives<'_>) -> Vec<i64> {
+    /// The transposed read: sums of every row over all columns, `[sample][rows padded]`, are put into `sums` and handed
+    /// to `take` with the place of their byte in a level: `sum 2^place`, once a byte plane. `gates` are signed bytes that
+    /// lie as drives do, by column.
+    pub fn read_columns(
+        &self,
+        kernel: &Kernel,
+        gates: Drives<'_>,
+        sums: &mut Vec<i32>,
+        mut take: impl FnMut(&[i32], u32),
+    ) {
         let layout = self.layout;
-        let mut sums = vec![0; gates.samples() * layout.rows_padded()];
-        kernel.read_columns(&self.low, layout, gates, &mut sums);
-        let mut currents: Vec<i64> = sums.iter().map(|&sum| i64::from(sum)).collect();
+        sums.resize(gates.samples() * layout.rows_padded(), 0);
+        kernel.read_columns(&self.low, layout, gates, sums);
+        take(sums, 0);
         if let Some(high) = &self.high {
-            kernel.read_columns(high, layout, gates, &mut sums);
-            for (current, &sum) in currents.iter_mut().zip(&sums) {
-                *current += i64::from(sum) << 8;
-            }
+            kernel.read_columns(high, layout, gates, sums);
+            take(sums, 8);
         }
-        currents
     }
 
     /// The array cut into strips of so many panels that can be written side by side.

@@ -18,7 +18,7 @@ use std::ops::Range;
 use aligned_vec::{AVec, CACHELINE_ALIGN};
 
 use super::crossbar::Collect;
-use super::crossbar::kernel::{Backend, Team};
+use super::crossbar::kernel::{Backend, ConvPlan, Team};
 use super::crossbar::layout::BLOCK_ROWS;
 use super::hardware::Hardware;
 use super::layer::{DrivenBy, Layer, Readings};
@@ -59,7 +59,7 @@ use schedule::Schedule;
 
 pub use calibrate::{CALIBRATION_SAMPLES, Calibration};
 pub use pulses::{Pulses, TilePeaks, active};
-pub use tape::Recorded;
+pub use tape::{Recorded, UpdateStart};
 pub use track::WritesDone;
 pub use unit::{Centre, ErrorUnit};
 
@@ -182,6 +182,8 @@ struct Registers {
     maps: [Lines<u8>; 2],
     /// What windows move over, by set of drives; or what goes in another order into a dense layer.
     images: [Lines<u8>; 2],
+    /// Where the windows of a convolution lie in them.
+    plan: Option<ConvPlan>,
     /// Sums by target stream, where units are normalised: they lie here until all of a stream are known.
     unscaled: [Lines<i32>; 2],
     /// What units that keep to a middle learnt from what was read last.
@@ -264,6 +266,8 @@ pub struct Engine {
     schedule: Option<Schedule>,
     /// What was executed since drives were last loaded, while recording.
     tape: Option<Vec<Recorded>>,
+    /// What there was before that.
+    began: Option<Box<UpdateStart>>,
 }
 
 impl Engine {
@@ -275,7 +279,9 @@ impl Engine {
     pub fn new(hardware: Hardware, backend: Backend, seed: u64, layers: Vec<Layer>) -> Self {
         let joined = layers.windows(2).all(|pair| pair[1].spec.follows(&pair[0].spec));
         assert!(joined && !layers.is_empty(), "layers follow one another");
-        assert!(layers[0].spec.driven_by == DrivenBy::Shared, "data drive both streams alike");
+        assert!(layers[0].spec.driven_by.is_shared(), "data drive both streams alike");
+        let signed = |layer: &Layer| layer.spec.driven_by == DrivenBy::Signed;
+        assert!(!layers[1..].iter().any(signed), "only data have a sign");
         let count = layers.len();
         let schedule = hardware.timing.map(|timing| Schedule::new(&hardware, timing, &layers));
         let ledger =
@@ -310,6 +316,7 @@ impl Engine {
             ledgers: [ledger.clone(), ledger.clone(), ledger],
             schedule,
             tape: None,
+            began: None,
             hardware,
         }
     }
@@ -379,7 +386,16 @@ impl Engine {
     pub fn begin_update(&mut self) {
         if let Some(tape) = &mut self.tape {
             tape.clear();
+            let layers = self.layers.clone();
+            let (unit, unlooked) = (self.unit.clone(), self.unlooked);
+            self.began = Some(Box::new(UpdateStart { layers, unit, unlooked }));
         }
+    }
+
+    /// What there was when the update began that is recorded; nothing before the first one.
+    #[must_use]
+    pub fn update_start(&self) -> Option<&UpdateStart> {
+        self.began.as_deref()
     }
 
     /// The chip.
@@ -493,6 +509,7 @@ impl Engine {
     fn load_drives(&mut self, codes: &[u8]) {
         let layer = &self.layers[0];
         let (inputs, blocks) = (layer.spec.sample_inputs(), layer.layout.blocks());
+        let (rows, phases) = (layer.spec.inputs, layer.spec.driven_by.phases());
         assert!(codes.len().is_multiple_of(inputs), "codes come in whole samples");
         assert!(self.registers.iter().all(|r| r.pending == 0), "sums wait to be programmed");
         let greatest = codes.iter().fold(0, |most, &code| most.max(code));
@@ -504,8 +521,15 @@ impl Engine {
             self.load_image(shape, codes);
         } else {
             let drives = &mut self.registers[0].drives[Stream::P.index()];
-            drives.resize(blocks * samples * BLOCK_ROWS, 0);
-            window::flatten(&mut self.team, codes, samples, inputs, drives);
+            if phases > 1 {
+                let mut halves = codes.chunks_exact(inputs).map(|codes| codes.split_at(rows));
+                let one_side = |(above, below): (&[u8], &[u8])| {
+                    above.iter().zip(below).all(|(&above, &below)| above == 0 || below == 0)
+                };
+                assert!(halves.all(one_side), "a number lies above 0 or below");
+            }
+            drives.resize(blocks * samples * phases * BLOCK_ROWS, 0);
+            window::flatten(&mut self.team, codes, samples * phases, rows, drives);
         }
         self.load_constant(0);
     }
@@ -517,13 +541,14 @@ impl Engine {
         };
         let (inputs, code) = (this.spec.inputs, self.hardware.drive.bits.code_max());
         let (block, row) = (inputs / BLOCK_ROWS, inputs % BLOCK_ROWS);
-        let size = self.reads(layer) * BLOCK_ROWS;
+        let (size, phases) = (self.drivings(layer) * BLOCK_ROWS, this.spec.driven_by.phases());
         for drives in &mut self.registers[layer].drives {
             if let Some(drives) = drives.get_mut(block * size..(block + 1) * size) {
-                for sample in drives.chunks_exact_mut(BLOCK_ROWS) {
+                for (driving, sample) in drives.chunks_exact_mut(BLOCK_ROWS).enumerate() {
                     // a block of its own may hold what another batch left
                     sample[row..].fill(0);
-                    sample[row] = code;
+                    // what is constant lies above 0
+                    sample[row] = if driving % phases == 0 { code } else { 0 };
                 }
             }
         }

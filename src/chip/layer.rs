@@ -33,6 +33,9 @@ pub use stage::{Gain, Homeostasis, Pool};
 pub enum DrivenBy {
     /// One set of drives, for both streams: data.
     Shared,
+    /// The same, of data with a sign: each row has a code for what is above 0 and one for what is below, and is driven with
+    /// one after the other.
+    Signed,
     /// A set for each stream: activities of the array before.
     Streams,
     /// A set for each stream: normalised activities of the array before, of which code 32 is 1.
@@ -44,9 +47,21 @@ impl DrivenBy {
     #[must_use]
     pub const fn full_drive(self) -> FullDrive {
         match self {
-            Self::Shared | Self::Streams => FullDrive::One,
+            Self::Shared | Self::Signed | Self::Streams => FullDrive::One,
             Self::Normalised => FullDrive::Normalised,
         }
+    }
+
+    /// Whether both streams have the same drives.
+    #[must_use]
+    pub const fn is_shared(self) -> bool {
+        matches!(self, Self::Shared | Self::Signed)
+    }
+
+    /// How often rows are driven for a read: once, or with what is above 0 and then with what is below.
+    #[must_use]
+    pub const fn phases(self) -> usize {
+        if matches!(self, Self::Signed) { 2 } else { 1 }
     }
 }
 
@@ -99,7 +114,7 @@ impl LayerSpec {
     #[must_use]
     pub const fn drives_of(&self, source: Stream) -> Stream {
         match self.driven_by {
-            DrivenBy::Shared => Stream::P,
+            DrivenBy::Shared | DrivenBy::Signed => Stream::P,
             DrivenBy::Streams | DrivenBy::Normalised => source,
         }
     }
@@ -108,7 +123,7 @@ impl LayerSpec {
     #[must_use]
     pub const fn drive_sets(&self) -> &'static [Stream] {
         match self.driven_by {
-            DrivenBy::Shared => &[Stream::P],
+            DrivenBy::Shared | DrivenBy::Signed => &[Stream::P],
             DrivenBy::Streams | DrivenBy::Normalised => self.wiring.sources(),
         }
     }
@@ -268,6 +283,39 @@ impl Layer {
             u32::from_le_bytes([value, slope, 0, 0])
         });
         LookUp { entries: entries.collect(), shift: self.lut.shift }
+    }
+
+    /// Words that a unit latches of a sample, one after the other: one, or one a pixel behind the pool where they come from
+    /// the rows of the layer above.
+    #[must_use]
+    pub fn heard(&self) -> usize {
+        match self.delivery.source {
+            WordSource::Above => self.spec.pooled().into_iter().product(),
+            _ => 1,
+        }
+    }
+
+    /// What row sums of its transposed read are shifted by to become words of the layer below; to the left where it is
+    /// negative.
+    ///
+    /// ```text
+    /// table     level_bits - log2(weight_max) + 8 - error_bits                     a level is worth weight_max / 2^level_bits
+    /// gain      lut_bits - 3 + lsh - (drive_bits - 2) - g + 8 - error_bits         so is the slope of a ramp, of which 85 is 2^6
+    /// g         least number >= 0 with 4^g units >= inputs                         of a window channels stride^2 inputs
+    /// ```
+    #[must_use]
+    pub fn back_shift(&self, hardware: &Hardware) -> i64 {
+        let widths = [hardware.digital.lut_bits.get(), hardware.drive.bits.get()].map(i64::from);
+        let worth = match self.spec.homeostasis.gain {
+            Gain::Table => {
+                i64::from(hardware.cell.level_bits.get()) - i64::from(self.spec.weight_max_log2)
+            }
+            Gain::Fixed { .. } | Gain::Tracking => {
+                let evened = i64::from(self.spec.back_gain_log2());
+                widths[0] - 3 + i64::from(self.balance.shift()) - (widths[1] - 2) - evened
+            }
+        };
+        worth + 8 - i64::from(hardware.digital.error_bits.get())
     }
 
     /// Rows of each tile of a column, top to bottom.

@@ -5,9 +5,10 @@
 //! Perfetto   what every part of every tile did when, one track a part; ui.perfetto.dev, chrome://tracing
 //! ```
 //!
-//! The update is found by the fast engine and played again by the cycle-by-cycle network of tiles, which has to reach
-//! the same state in as many cycles: a trace that does not is an error of ours, and said. A run of several networks, whose layers
-//! are numbered through, is played by the one that has the tile's layer.
+//! The update is found by the fast engine and played again by the cycle-by-cycle network of tiles, from what there was when it
+//! began: behind the rollout of a policy, whose reads count for converters that track. The network has to reach the same
+//! state in as many cycles: a trace that does not is an error of ours, and said. A run of several networks, whose layers are
+//! numbered through, is played by the one that has the tile's layer.
 
 use std::cell::RefCell;
 use std::rc::Rc;
@@ -60,25 +61,20 @@ pub fn record(
     let Some(timing) = config.hardware.timing else {
         return Err(RunError::NoTiming { model: config.hardware_name.clone() });
     };
-    let session = || Session::new(config, data::load(&config.source()?, root)?, machine);
-    let before = {
-        let mut session = session()?;
-        session.updates(look.update - 1)?;
-        session
-    };
-    let mut after = session()?;
-    after.keep_tape();
-    after.updates(look.update)?;
-    let counts = before.engines().into_iter().map(|engine| engine.layers().len());
+    let mut session = Session::new(config, data::load(&config.source()?, root)?, machine)?;
+    session.keep_tape();
+    session.updates(look.update)?;
+    let counts = session.engines().into_iter().map(|engine| engine.layers().len());
     let (which, first_layer) = network_of(look.tile.layer, counts);
-    let tape = after.take_tape(which);
-    let engine = before.engines()[which];
+    let tape = session.take_tape(which);
+    let engine = session.engines()[which];
+    let start = engine.update_start().expect("an update was recorded");
     let samples = samples_of(&tape, engine.layers()[0].spec.sample_inputs());
 
-    let mut network = Network::new(&config.hardware, config.seed, engine.layers(), samples);
+    let mut network = Network::new(&config.hardware, config.seed, &start.layers, samples);
     network.set_learning(engine.mantissas(), engine.potentiation_only());
-    network.set_error_unit(engine.error_unit());
-    network.set_unlooked(engine.unlooked());
+    network.set_error_unit(&start.unit);
+    network.set_unlooked(start.unlooked);
     let place = TileAt { layer: look.tile.layer - first_layer, ..look.tile };
     let grid = (place.layer < engine.layers().len()).then(|| network.grid(place.layer));
     let inside = |[targets, downs, acrosses]: [usize; 3]| {
@@ -97,8 +93,9 @@ pub fn record(
     });
     network.play_tape(&tape);
 
-    let reached = after.engines()[which];
-    for (at, layer) in reached.layers().iter().enumerate() {
+    for (at, layer) in engine.layers().iter().enumerate() {
+        let ranges = network.adc_shifts(at);
+        assert!(layer.adc_shifts == ranges, "cycle by cycle, layer {at} reaches other ranges");
         for (array, cells) in layer.arrays.iter().enumerate() {
             let same = cells.levels().eq(network.levels(at, array));
             assert!(same, "cycle by cycle, layer {at} reaches other levels");

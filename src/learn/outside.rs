@@ -22,7 +22,7 @@ use super::rule::UpdateMode;
 use crate::chip::crossbar::kernel::Backend;
 use crate::chip::engine::{Engine, Operation, Phase, Side};
 use crate::chip::hardware::{Adc, Hardware};
-use crate::chip::layer::LayerSpec;
+use crate::chip::layer::{DrivenBy, LayerSpec};
 use crate::chip::population::{Pathway, Stream, Wiring};
 use crate::chip::state::{State, StateError, Visitor};
 use crate::num::fixed::rail;
@@ -101,7 +101,7 @@ impl DrivenNetwork {
     /// Builds the network with its initial levels. A place says of how many updates the training is, over which rates fall.
     ///
     /// # Errors
-    /// When it does not fit together, not on the chip, or has convolutions.
+    /// When it does not fit together, not on the chip, or has convolutions or drives with a sign.
     pub fn new(
         network: &NetworkSpec,
         hardware: &Hardware,
@@ -113,6 +113,10 @@ impl DrivenNetwork {
             let allowed =
                 "a network that is driven from outside is dense; leave network.channels out";
             return Err(NetworkError::misfit("network.channels", "is given", allowed));
+        }
+        if network.layers.first().is_some_and(|layer| layer.driven_by == DrivenBy::Signed) {
+            let allowed = "codes of a network that is driven from outside have none: give the first layer one set of drives";
+            return Err(NetworkError::misfit("network.input", "gives drives a sign", allowed));
         }
         let driver = network.build_hearing(hardware, backend, place, words)?;
         let heard = vec![false; network.layers.len()];

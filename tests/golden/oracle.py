@@ -253,6 +253,8 @@ class Net:
         self.forget_rails()
         self.unlooked = 0
 
+    names = PATH_NAMES
+
     def new_sat(self):
         return {kind: [0] * self.nl for kind in SAT_KINDS}
 
@@ -527,7 +529,7 @@ class Net:
                     d["residuals_sha256"], d["residual_sum"] = sha(rb), int(self.rest[l, p].sum())
                     state += rb
                 assert d["effective"] <= d["attempted"] and d["bounded"] <= d["requested"] <= d["attempted"]
-                out[f"layer{l}.{PATH_NAMES[p]}"] = d
+                out[f"layer{l}.{self.names[p]}"] = d
         shifts = {"ash": copy.deepcopy(self.ash)} if self.tracks else {}
         return {**shifts, "pathways": out, "state_level_part_sha256": sha(state), "mu": self.mu.tolist() if s["centre"] == "running" else None,
                 "saturations_training": {k: sum(v) for k, v in self.sat_train.items()},

@@ -112,6 +112,10 @@ def on_off(x, full_scale):
     return np.concatenate([to_byte(on, full_scale - m), to_byte(off, m)], axis=3), 255, m
 
 
+# A pair of a single stream: the numbers of its pathways.
+E, I = 0, 4
+
+
 # ---------------------------------------------------------------- constants of a layer
 def ramp_table(lut_bits):
     """Code 255 at three deviations of 2^(lut_bits - 3) indices: 10 bits give rsh(85 i, 7)."""
@@ -153,7 +157,7 @@ DEFAULTS = dict(
     level_bits=8, floor=0, ceiling=None, floor_kind="recoverable", drive_bits=8, dac_bits=8, tile_rows=128,
     adc="ideal", adc_bits=None, subtract="digital", adc_range=None, headroom=1, lut_bits=10, error_bits=8,
     error="one_vs_all", temperature=1, centre="batch", mode="accumulate", d_max=7, dither_bits=8, dither="per_cell", residual_bits=0,
-    taps=1, tap_shift=None, decay="constant", layers=None)
+    taps=1, tap_shift=None, decay="constant", rule="ed", layers=None)
 # Of an array; `side` makes it a convolution of `units` channels.
 ARRAY = dict(
     units=None, side=None, stride=1, border=0, pool=None, pool_side=2, act="sigmoid", alpha=4, weight_max=4, rate=20, mantissa=1,
@@ -170,7 +174,10 @@ class ConvNet(Net):
         s["tap_shift"] = (s["taps"] - 1).bit_length() if s["tap_shift"] is None else s["tap_shift"]
         self.s, self.nl = s, len(s["layers"])
         self.ns = -(-s["drive_bits"] // s["dac_bits"])
-        self.softmax = s["error"] == "softmax"
+        self.softmax, self.back = s["error"] == "softmax", s["rule"] == "bp"
+        assert not self.back or s["adc"] == "ideal"
+        if self.back:
+            self.names = {E: "e", I: "i"}
         self.raw, self.y = images(s["examples"], s["height"], s["width"], s["channels"], s["classes"], s["full_scale"])
         self.means_of_data = None
         if s["coding"] == "white":
@@ -210,7 +217,7 @@ class ConvNet(Net):
             a["positions"] = P = a["map"][0] * a["map"][1]
             K, N = a["fan_in"], a["units"]
             self.layers.append(a)
-            self.paths.append([PP, NP] if out else [PP, NP, NN, PN])
+            self.paths.append([E, I] if self.back else [PP, NP] if out else [PP, NP, NN, PN])
             lsh, unit = table_shift(a["act"], a["alpha"], a["weight_max"], s["level_bits"], s["drive_bits"], s["lut_bits"])
             self.lsh.append(lsh)
             self.lut.append(None if a["act"] == "accumulator" else ramp_table(s["lut_bits"]) if a["act"] == "ramp"
@@ -219,15 +226,15 @@ class ConvNet(Net):
             self.taps.append(tap_table(N, s["classes"], s["taps"]))
             self.G.append({})
             for p in self.paths[l]:
-                gain = Fr(1) if out else (Fr(3, 2) if p in (PP, NN) else Fr(1, 2))
-                self.G[l][PATH_NAMES[p]] = G = gain_word(gain, s["level_bits"], a["weight_max"], K)
+                gain = Fr(1) if out or self.back else (Fr(3, 2) if p in (PP, NN) else Fr(1, 2))
+                self.G[l][self.names[p]] = G = gain_word(gain, s["level_bits"], a["weight_max"], K)
                 u, r = (draw_cells(s["seed"], SITE_INIT, l, p, sub, 0, K, N, 2) for sub in (0, 1))
                 self.level[l, p] = np.clip((u * G + (r << 16)) >> 32, s["floor"], s["ceiling"])
                 self.rest[l, p], self.pruned[l, p], self.writes[l, p] = np.zeros((K, N), I64), np.zeros((K, N), bool), 0
                 for counts in (self.counts, self.counts_free):
                     counts[l, p] = dict(requested=0, bounded=0, attempted=0, effective=0)
             if a["threshold"]:
-                self.T[l] = {st: np.zeros(N, I64) for st in "pn"}
+                self.T[l] = {st: np.zeros(N, I64) for st in self.streams(l)}
             if a["gain"] == "tracking":
                 self.V[l] = 0
             if a["centred"]:
@@ -307,6 +314,8 @@ class ConvNet(Net):
 
     def read_layer(self, l, maps, count, ideal):
         """Accumulators of a layer's streams, [read, unit], and the reads they are of."""
+        if self.back:
+            maps = {"p": maps["p"], "n": maps["p"]}       # one stream: n is looked at by nobody
         rec = {"map_p": maps["p"], "map_n": maps["n"], "xp": self.reads(l, maps["p"]), "xn": self.reads(l, maps["n"])}
         for st in self.streams(l):
             rec["acc_" + st] = self.accumulate(l, st, rec["xp"], rec["xn"], count, ideal)
@@ -365,23 +374,23 @@ class ConvNet(Net):
         maps = {"p": codes, "n": codes}
         self.lsh_before = list(self.lsh)
         for l in range(self.nl):
-            a = self.layers[l]
+            a, streams = self.layers[l], self.streams(l)
             if self.by_layer:
                 self.fit_converters(l, {"xp": self.reads(l, maps["p"]), "xn": self.reads(l, maps["n"])})
             rec = self.read_layer(l, maps, count, self.s["adc"] == "ideal")
             n = len(codes) * a["positions"]
             if l in self.T:
-                for st in "pn":
+                for st in streams:
                     self.T[l][st] = (2 * (rec["acc_" + st].sum(axis=0) << 8) + n) // (2 * n)
             if a["gain"] != "table":
-                z = sum(squares(self.distances(l, st, rec["acc_" + st])) for st in "pn")
+                z = sum(squares(self.distances(l, st, rec["acc_" + st])) for st in streams)
                 lsh = -8
                 while not z < n * self.constant(l, 1, 15 + 2 * lsh):
                     lsh += 1
                 self.lsh[l] = lsh + (a["spread"] if a["gain"] == "fixed" else 0)
             maps = self.look_up(l, rec, count)
             if l in self.V:
-                self.V[l] = ((squares(rec["i_p"]) + squares(rec["i_n"])) << 4) // len(codes) // a["positions"]
+                self.V[l] = (sum(squares(rec["i_" + st]) for st in streams) << 4) // len(codes) // a["positions"]
 
     def move(self, recs, samples):
         """Thresholds and gains, of these samples of a batch."""
@@ -390,7 +399,7 @@ class ConvNet(Net):
             w = a["window"] + ceil_log2(P)
             rows = np.concatenate([np.arange(b * P, (b + 1) * P) for b in samples])
             if l in self.V:
-                z = squares(recs[l]["i_p"][rows]) + squares(recs[l]["i_n"][rows])
+                z = sum(squares(recs[l]["i_" + st][rows]) for st in self.streams(l))
                 self.V[l] += rsh((z << 4) - n * self.V[l], w)
                 if self.V[l] >= self.constant(l, 1, 19):
                     self.lsh[l], self.V[l] = self.lsh[l] + 1, self.V[l] >> 2
@@ -398,7 +407,7 @@ class ConvNet(Net):
                     self.lsh[l], self.V[l] = self.lsh[l] - 1, self.V[l] << 2
                 assert -8 <= self.lsh[l] <= 47, "reaches an end"
             if l in self.T:
-                for st in "pn":
+                for st in self.streams(l):
                     self.T[l][st] = self.T[l][st] + rsh((recs[l]["acc_" + st][rows].sum(axis=0) << 8) - n * self.T[l][st], w)
 
     # ---- errors and gates
@@ -434,13 +443,95 @@ class ConvNet(Net):
             out.append(u)
         return out
 
+    # ---- back-propagation (section 3.8)
+    def streams(self, l):
+        return ["p"] if self.back else super().streams(l)
+
+    def currents(self, l, stream, xp, xn):
+        if not self.back:
+            yield from super().currents(l, stream, xp, xn)
+            return
+        for sl in range(self.ns):
+            pick = (xp >> (sl * self.s["dac_bits"])) & ((1 << self.s["dac_bits"]) - 1)
+            yield sl, 0, pick @ self.level[l, E], pick @ self.level[l, I]
+
+    def accumulate(self, l, stream, xp, xn, count, ideal):
+        if not self.back:
+            return super().accumulate(l, stream, xp, xn, count, ideal)
+        if count is self.sat_train:
+            self.event("shift_adds", len(xp) * self.layers[l]["units"] * -(-self.widths[l] // self.s["tile_rows"]) * self.ns * 2)
+        return sum((e - i) << (sl * self.s["dac_bits"]) for sl, _, e, i in self.currents(l, stream, xp, xn))
+
+    def read_back(self, l, u):
+        """What a transposed read gives: a sum a code of the map below, [sample, y, x, channel], or a row of a dense layer."""
+        a, d = self.layers[l], u @ (self.level[l, E] - self.level[l, I]).T
+        self.event("conversions", d.size * 2 * 2 * self.ns)
+        self.event("shift_adds", d.size * 2 * 2 * self.ns)
+        if not a["side"]:
+            return d
+        (h, w, _), side, b = a["map"], a["side"], a["border"]
+        height, width, channels = a["below"]
+        out = np.zeros((len(d) // (h * w), height, width, channels), I64)
+        d = d.reshape(len(out), h, w, side, side, channels)
+        for y in range(h):
+            for x in range(w):
+                for ky in range(side):
+                    for kx in range(side):
+                        py, px = y * a["stride"] + ky - b, x * a["stride"] + kx - b
+                        if 0 <= py < height and 0 <= px < width:
+                            out[:, py, px] += d[:, y, x, ky, kx]
+                            self.event("shift_adds", d[:, y, x, ky, kx].size)
+        return out
+
+    def heard(self, l, rec, words):
+        """Words of the pixels behind a pool, [sample, y, x, unit], as positions hear them: [read, unit]."""
+        a = self.layers[l]
+        q, (h, w, n) = a["pool_side"] if a["pool"] else 1, a["map"]
+        words = words.reshape(-1, h // q, w // q, n)
+        if a["pool"] != "max":
+            return words.repeat(q, axis=1).repeat(q, axis=2).reshape(-1, n)
+        codes, out = activity_codes(rec["a_p"], self.s["drive_bits"]).reshape(-1, h, w, n), np.zeros((len(words), h, w, n), I64)
+        for i, y, x, j in np.ndindex(words.shape):
+            box = [(int(codes[i, y * q + v, x * q + c, j]), -v, -c) for v in range(q) for c in range(q)]
+            _, v, c = max(box)                            # the first of the greatest: y, then x
+            out[i, y * q - v, x * q - c, j] = words[i, y, x, j]
+        return out.reshape(-1, n)
+
+    def words_back(self, recs, S):
+        """Gates by read, from the outputs downward."""
+        eb, out, err = self.s["error_bits"], [None] * self.nl, S
+        for l in reversed(range(self.nl)):
+            a = self.layers[l]
+            u, n = sat(rsh(err * recs[l]["d_p"], eb), 8)
+            self.event("multiplies", u.size)
+            self.event("bus_words", S.size if l == self.nl - 1 else words.size)
+            self.sat_train["gate"][l] += n
+            out[l] = {"p": u}
+            if l:
+                sums, by = self.read_back(l, u), self.worth(l) + 8 - eb
+                words, n = sat(rsh(sums, by) if by >= 0 else sums << -by, eb)
+                self.sat_train["error_word"][l - 1] += n
+                err = self.heard(l - 1, recs[l - 1], words)
+        return out
+
+    def worth(self, l):
+        """Bits that a level, or a step of a ramp, of the layer read takes off its row sums."""
+        a, s = self.layers[l], self.s
+        if a["gain"] == "table":
+            return s["level_bits"] - int(math.log2(a["weight_max"]))
+        rows = a["below"][2] * a["stride"] ** 2 if a["side"] else a["fan_in"]
+        g = 0
+        while 4 ** g * a["units"] < rows:
+            g += 1
+        return s["lut_bits"] - 3 + self.lsh[l] - (s["drive_bits"] - 2) - g
+
     # ---- writes
     def requests(self, l, recs, u, samples):
         """By pathway: (sum that the optimiser sees, without the pathway's sign)."""
         a, P, out = self.layers[l], self.layers[l]["positions"], {}
         rows = np.concatenate([np.arange(b * P, (b + 1) * P) for b in samples])
         for p in self.paths[l]:
-            source, target = "p" if p in (PP, PN) else "n", "p" if p in (PP, NP) else "n"
+            source, target = "p" if p in (PP, PN, I) else "n", "p" if p in (PP, NP, I) else "n"
             g = u[l][target][rows]
             total = recs[l]["x" + source][rows].T @ g
             self.event("accumulates", total.size * len(rows))
@@ -454,7 +545,7 @@ class ConvNet(Net):
     def row_means(self, l, recs, first):
         """A of a row or, in a convolution, of a channel of the map below, border not counted."""
         a = self.layers[l]
-        for st in "pn":
+        for st in "p" if self.back else "pn":
             m = recs[l]["map_" + st]
             b = len(m)
             m = m.reshape(b, -1, m.shape[3]) if a["side"] else m.reshape(b, 1, -1)
@@ -474,10 +565,11 @@ class ConvNet(Net):
         sums = self.requests(l, recs, u, samples)
         bits = 4 if a["centred"] else 0
         D, F = self.s["dither_bits"], self.s["residual_bits"]
-        sign = lambda p: 1 if p in (PP, NN) else -1
+        sign = lambda p: 1 if p in (PP, NN) else -1       # E is the number of PP
+        pairs = int(self.back)                            # a pair moves by two cells
         if a["optimiser"] == "plain":
             for p, v in sums.items():
-                self.program(l, p, self.stochastic(sign(p) * v * a["mantissa"], self.k[l] + bits - F, l, p))
+                self.program(l, p, self.stochastic(sign(p) * v * a["mantissa"], self.k[l] + bits + pairs - F, l, p))
         elif a["optimiser"] == "sign":
             t = 0
             if a["dead_zone"]:
@@ -496,7 +588,7 @@ class ConvNet(Net):
                 self.held[l] += kept != X
                 m, s = power_table(kept & 255)
             for p, v in sums.items():
-                self.program(l, p, self.stochastic(sign(p) * v * m, (kept >> 8) + s - F, l, p) if z else np.zeros_like(v))
+                self.program(l, p, self.stochastic(sign(p) * v * m, (kept >> 8) + s + pairs - F, l, p) if z else np.zeros_like(v))
         if a["centred"] and not first:
             self.row_means(l, recs, False)
 
@@ -507,6 +599,7 @@ class ConvNet(Net):
             r = draw_cells(seed, SITE_DITHER, l, p, 1, count, K, 1, 2) ^ draw_cells(seed, SITE_DITHER, l, p, 2, count, N, 1, 2).T
         else:
             r = draw_cells(seed, SITE_DITHER, l, p, 0, count, K, N, 2)
+        k += self.back                                    # both cells of a pair take it
         go = (r < (1 << (16 - k))) if k <= 16 else np.zeros_like(v, bool)
         if t is not None:
             go &= np.abs(v) >= 1 << t
@@ -521,8 +614,11 @@ class ConvNet(Net):
         """One batch, or one sample online."""
         recs = self.forward(self.x[rows], self.sat_train)
         S = self.error_words(self.told(recs[-1]), self.y[rows])
-        self.event("bus_words", sum(len(rows) * self.s["classes"] * len(self.streams(l)) for l in range(self.nl)))
-        u = self.spread_words(recs, S)
+        if self.back:
+            u = self.words_back(recs, S)
+        else:
+            self.event("bus_words", sum(len(rows) * self.s["classes"] * len(self.streams(l)) for l in range(self.nl)))
+            u = self.spread_words(recs, S)
         if self.first is None:
             self.first = (recs, S, u)
         everyone = list(range(len(rows)))
@@ -554,8 +650,8 @@ class ConvNet(Net):
         for d in out["pathways"].values():
             for key in ("first_row_head", "if_pruned_cells_are_not_counted", "pruned_sha256", "residuals_sha256", "on_floor"):
                 d.pop(key, None)
-        of = lambda l, d: [int(x) for st in ("p", "n") for x in d[l][st]]
-        means = lambda l: None if self.A[l] is None else [int(x) for st in ("p", "n")[:2 if l else 1] for x in self.A[l][st]]
+        of = lambda l, d: [int(x) for st in self.streams(l) for x in d[l][st]]
+        means = lambda l: None if self.A[l] is None else [int(x) for st in ("p", "n")[:2 if l and not self.back else 1] for x in self.A[l][st]]
         sections = {                                      # of the state hash, in the order of layers, by tag
             "2": [[-1 if self.R[l] is None else self.R[l], self.held[l]] for l in self.R],
             "5": [of(l, self.T) for l in self.T],
@@ -659,6 +755,17 @@ CASES = [
      dict(seed=114, taps=3, residual_bits=2, decay="linear", epochs=3, layers=[dense(13, alpha=6, optimiser="rms", rate=0.2), dense(11, alpha=4, optimiser="rms", rate=0.3, weight_max=2), readout(optimiser="rms", rate=0.4, alpha=6)])),
     ("dense_sign", "no convolution: sign with and without a dead zone, cosine, 3-bit levels",
      dict(seed=115, level_bits=3, decay="cosine", epochs=3, layers=[dense(13, alpha=6, optimiser="sign", rate=0.1, dead_zone=True), dense(11, alpha=4, optimiser="sign", rate=0.2), readout(optimiser="sign", dead_zone=True, rate=0.3, alpha=6)])),
+    ("back_average", "back-propagation: average pools, borders, a dense layer below the outputs, one against all, tiles of 40 rows, a short last batch",
+     dict(seed=120, rule="bp", tile_rows=40, examples=44, epochs=3, layers=[conv(8, border=1, pool="average", alpha=3, rate=600), conv(12, border=1, pool="average", pool_side=3, alpha=3, rate=600), dense(17, alpha=6, rate=600), readout(alpha=6, rate=200)])),
+    ("back_max_stride", "back-propagation: a max pool of 3-bit codes, strides that leave columns out, windows of side 2, borders of 2, replay, remainders, running centre, maps that are not square",
+     dict(seed=121, rule="bp", height=8, width=6, channels=2, drive_bits=3, dac_bits=2, mode="replay", centre="running", residual_bits=4, classes=5, examples=30, error_bits=6,
+          layers=[conv(9, border=1, pool="max", alpha=3, rate=60), conv(12, side=2, stride=2, border=1, alpha=3, rate=60), conv(10, border=2, alpha=3, rate=40), readout(alpha=6, rate=20)])),
+    ("back_recipe", "back-propagation through the recipe: white input, ramp, thresholds, tracking gains, centred, softmax, rms, cosine; average and max pools",
+     dict(seed=122, rule="bp", height=8, width=8, channels=3, coding="white", error="softmax", decay="cosine", examples=42, classes=10, epochs=3,
+          layers=[conv(10, border=1, pool="average", weight_max=2, window=5, **RECIPE), conv(10, border=1, pool="max", weight_max=2, window=6, **RECIPE), dense(20, weight_max=1, window=5, **RECIPE), readout(**SOFT)])),
+    ("back_online", "back-propagation online: thresholds before sigmoid tables, 12-bit levels, a convolution below the outputs without a pool",
+     dict(seed=123, rule="bp", level_bits=12, mode="online", centre="none", batch=5, examples=33, classes=3,
+          layers=[conv(6, border=1, pool="average", alpha=3, threshold=True, window=5, rate=20), conv(7, side=2, alpha=3, threshold=True, window=6, rate=20), readout(rate=5)])),
     ("centred_one_vs_all", "centred by thresholds with one-vs-all errors; error words of 9 bits, rms in hidden layers and plain at the output; strides that leave columns out",
      dict(seed=113, height=8, width=8, error_bits=9, classes=4, centre="none",
           layers=[conv(12, stride=2, window=6, **RECIPE), dense(12, window=6, **RECIPE), readout(rate=5)])),

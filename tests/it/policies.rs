@@ -60,14 +60,19 @@ fn a_policy_is_the_same_on_every_back_end_and_any_number_of_threads() {
 
 #[test]
 fn a_policy_that_was_stopped_goes_on_to_the_same_bits_and_is_verified() {
-    let config = config(&["environment.steps=48"]);
+    for input in ["split", "signed"] {
+        stopped_and_verified(&config(&["environment.steps=48", &format!("network.input={input}")]));
+    }
+}
+
+fn stopped_and_verified(config: &Config) {
     let machine = machine(Backend::best(), 1);
     let work = tempfile::tempdir().unwrap();
-    let whole = trained(&config, &work.path().join("whole"), machine);
+    let whole = trained(config, &work.path().join("whole"), machine);
     // stopped inside the second epoch
     let part = work.path().join("part");
     let mut go_on = |event: RunEvent<'_>| !matches!(event, RunEvent::Batch(at) if at.epoch == 1);
-    let stopped = run::train(&config, &root(), &part, machine, &mut go_on);
+    let stopped = run::train(config, &root(), &part, machine, &mut go_on);
     assert!(matches!(stopped, Err(RunError::Stopped { epoch: 1, .. })), "{stopped:?}");
     let folder = only_run(&part);
     let made = run::resume(&folder, &root(), machine, &mut |_| true).unwrap();
@@ -122,6 +127,7 @@ fn a_seed_and_an_environment_make_another_policy() {
         of(&["ppo.gamma=0.5"]),
         of(&["environment.id=Pendulum-v1"]),
         of(&["network.input=offset"]),
+        of(&["network.input=signed"]),
         of(&["learning.control=frozen_hidden"]),
         of(&["learning.control=same_sign_hidden"]),
         of(&["learning.control=same_sign"]),

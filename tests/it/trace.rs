@@ -195,6 +195,22 @@ fn a_tile_or_an_update_that_is_not_there_is_said() {
     }
 }
 
+/// Once it began before the rollout, whose reads tracking converters count: the first update took no step that the engine took.
+#[test]
+fn an_update_of_a_policy_begins_behind_its_rollout() {
+    let experiment = Some(("it", super::policies::TINY));
+    let settings =
+        ["hw.adc={bits=4, range=\"tracking\"}", "environment.rollouts=2"].map(str::to_owned);
+    let config = Config::load(&Sources { experiment, settings: &settings, ..Sources::default() });
+    let (config, root) = (config.unwrap(), DataRoot::new("none"));
+    for (update, layer) in [(1, 0), (1, 2), (2, 0), (5, 1), (5, 3)] {
+        let tile = TileAt { layer, target: 0, down: 0, across: 0 };
+        let look = Look { update, tile, all: false };
+        // what it reaches, ranges included, is what the engine reaches, or it panics
+        record(&config, &root, Machine::new(Backend::best(), 1).unwrap(), look).unwrap();
+    }
+}
+
 #[test]
 fn the_network_that_has_the_layer_is_shown() {
     let settings = [super::policies::TINY.to_owned()];

@@ -46,6 +46,7 @@ mod optimise;
 #[cfg(target_arch = "x86_64")]
 mod peak;
 mod pulses;
+mod reads;
 mod requests;
 mod scalar;
 mod sums;
@@ -63,14 +64,15 @@ pub use self::{amx::Amx, avx2::Avx2, avx512::Avx512};
 pub use self::{
     backend::{Backend, UnknownBackend},
     chacha::Draws,
-    conv::{ConvPlan, ConvScratch, ConvShape, ConvTurned, Image, Pixels, assemble},
+    conv::{ConvPlan, ConvScratch, ConvShape, ConvTurned, Image, Pixels, Windows},
     data::{
         Banks, Cells, Conversion, Dither, Drives, Ends, Extremes, Greatest, Half, LookUp,
         OneSample, Peaks, Pulsed, Rails, Scratch, TOGETHER, WriteCounts, WriteLaw, is_driven,
     },
     normalise::{HandOn, SQUARED_MAX},
-    offsets::OFFSET_MAX,
+    offsets::{MiddleOf, OFFSET_MAX},
     optimise::{MEAN_BITS, SignLaw, Squares, joined},
+    reads::ReadsScratch,
     sums::Sums,
     team::Team,
 };
@@ -133,6 +135,16 @@ impl Kernel {
         if !out.is_empty() {
             call!(self, read(cells, drives, samples, out));
         }
+    }
+
+    /// What the drives of each sample add up to, where reads of this back end take that: given to them by
+    /// [`Drives::with_sums`], it is not added up for every panel again. Otherwise nothing.
+    #[must_use]
+    pub fn drive_sums(&self, drives: Drives<'_>) -> Option<Vec<i32>> {
+        let sums = self.ops.drive_sums?;
+        let mut out = vec![0; drives.samples()];
+        call!(sums, (drives, &mut out));
+        Some(out)
     }
 
     /// Reads one panel of two banks tile by tile, converts each and adds `code_E - code_I` to `codes` (32 a
@@ -229,36 +241,6 @@ impl Kernel {
         call!(self, look_up(accumulators, table, live, values, derivatives))
     }
 
-    /// Takes an offset a unit off the sums of a panel of 32 units, `[sample][32]`, and raises what is left by a power of two;
-    /// the sums of each unit, as they were, are added to its total. The plan proves that differences fit: numbers lie below
-    /// [`OFFSET_MAX`], `raise` below it where they are raised.
-    ///
-    /// # Panics
-    /// When the sizes do not match.
-    pub fn offset(
-        &self,
-        sums: &mut [i32],
-        offsets: &[i32; PANEL_COLUMNS],
-        raise: u32,
-        totals: &mut [i64; PANEL_COLUMNS],
-    ) {
-        assert!(sums.len().is_multiple_of(PANEL_COLUMNS) && raise < 31, "32 units a sample");
-        call!(self, offset(sums, offsets, raise, totals));
-    }
-
-    /// Sum of the squares of the places at which the first `live` units of a panel (`[sample][32]`) are looked up, counted from
-    /// the middle of a table of `2 half` entries.
-    ///
-    /// # Panics
-    /// When the sizes do not match.
-    #[must_use]
-    pub fn index_squares(&self, sums: &[i32], shift: u32, half: i32, live: usize) -> u64 {
-        assert!(sums.len().is_multiple_of(PANEL_COLUMNS), "32 units a sample");
-        assert!(live <= PANEL_COLUMNS && shift <= 30, "a panel has 32 columns");
-        assert!((1..=1 << 15).contains(&half), "squares of indices fit 32 bits");
-        call!(self, index_squares(sums, shift, half, live))
-    }
-
     /// `sums = E - I`, sum by sum. The plan proves that it fits.
     ///
     /// # Panics
@@ -334,6 +316,37 @@ impl Kernel {
         assert!(stride.is_multiple_of(4) && stride * BLOCK_ROWS >= errors.len(), "padded samples");
         assert_eq!(gates.len(), stride * BLOCK_ROWS, "every gate has its place");
         call!(self, gate(errors, derivatives, negate, bits, stride, gates))
+    }
+
+    /// [`Kernel::gate`] of samples, so many of which in a row share a word: `errors` lies `[sample / shared][64]`.
+    ///
+    /// # Panics
+    /// When the sizes do not match.
+    pub fn gate_shared(
+        &self,
+        (errors, shared): (&[i16], usize),
+        derivatives: &[u8],
+        negate: bool,
+        bits: ErrorBits,
+        stride: usize,
+        gates: &mut [i8],
+    ) -> u64 {
+        assert_eq!(errors.len() * shared, derivatives.len(), "every unit has an error");
+        match self.ops.gate_shared {
+            Some(gate) if shared > 1 => {
+                assert!(errors.len().is_multiple_of(BLOCK_ROWS), "64 columns a sample");
+                let padded = stride.is_multiple_of(4) && stride * BLOCK_ROWS >= derivatives.len();
+                assert!(padded && gates.len() == stride * BLOCK_ROWS, "every gate has its place");
+                call!(gate, ((errors, shared), derivatives, negate, bits, stride, gates))
+            }
+            None if shared > 1 => {
+                let all = errors.as_chunks::<BLOCK_ROWS>().0.iter();
+                let all = all.flat_map(|errors| std::iter::repeat_n(errors, shared));
+                let all: Vec<i16> = all.flatten().copied().collect();
+                self.gate(&all, derivatives, negate, bits, stride, gates)
+            }
+            _ => self.gate(errors, derivatives, negate, bits, stride, gates),
+        }
     }
 
     /// Turns one block of drives (`[sample][64]`) into rows of samples, `[64][stride]`, padded with 0.

@@ -1,4 +1,5 @@
-//! Writing in two passes, for optimisers that look at sums before they ask: sums are formed and kept, then programmed.
+//! Writing of sums that were formed: those of an optimiser that looks at them before it asks, or that are not asked for as
+//! they are. Where they are of many reads they are kept from one pass to the next; of few, they are formed again.
 //!
 //! ```text
 //! sums   [half block, in the order of levels][64 rows][16 columns]       i32, of the panels of a strip
@@ -7,8 +8,6 @@
 //! What is kept is 0 where rows and columns do not exist. See docs/MODEL.md, 3.10.
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
-use std::ops::Range;
-
 mod adam;
 mod momentum;
 
@@ -16,33 +15,15 @@ pub use adam::Adam;
 pub use momentum::Momentum;
 
 use super::StripMut;
-use super::kernel::{
-    Draws, Half, Kernel, MEAN_BITS, SignLaw, WriteCounts, WriteLaw, is_driven, joined,
-};
-use super::layout::{BLOCK_ROWS, HALF_CELLS, HALF_COLUMNS, PANEL_COLUMNS};
+use super::form::{Form, Former, LongSums, place};
+use super::kernel::{Draws, Half, Kernel, SignLaw, WriteCounts, WriteLaw};
+use super::layout::HALF_COLUMNS;
 use super::pulses::Collector;
 use super::words::Words;
 use super::write::{WriteRequest, Written};
 use crate::chip::hardware::DitherBits;
 
-/// What is formed of the products of a write.
-#[derive(Debug, Clone, Copy)]
-pub struct Form<'a> {
-    /// Mean drives of the rows, padded, of centred updates.
-    pub means: Option<&'a [i32]>,
-    /// Whether the squares of the sums are wanted.
-    pub squares: bool,
-    /// Whether centred sums may be beyond 32 bits: those of more than [`SHORT_READS`] reads.
-    pub long: bool,
-}
-
-/// So many reads have centred sums of 32 bits, whatever they hold: 4096 x 4080 x 127 < 2^31.
-pub const SHORT_READS: usize = 4096;
-
-/// Sums of half blocks that 32 bits do not hold, with their places. Where they belong in the list of all, there is 0.
-pub type LongSums = Vec<(usize, Box<Half<i64>>)>;
-
-/// What is asked for by sums that were kept.
+/// What is asked for by sums that were formed.
 #[derive(Debug)]
 pub enum Asks<'a> {
     /// A pulse towards each that is loud, with a chance. Words are of 16 bits, whatever the chip rounds with. Beside it what is
@@ -91,165 +72,144 @@ impl Asks<'_> {
 }
 
 impl StripMut<'_> {
-    /// Forms the sums of these panels, and the sum of their squares if it is wanted. `gates` are those of a
-    /// [`StripMut::write`].
-    pub fn form(
-        &self,
-        kernel: &Kernel,
-        request: &WriteRequest<'_>,
-        gates: &[i8],
-        form: Form<'_>,
-        sums: &mut [i32],
-    ) -> (u128, LongSums) {
-        let blocks = self.layout.blocks();
-        let (mut squares, mut long) = (0, LongSums::new());
-        if request.stride == 0 {
-            sums.fill(0);
-            return (squares, long);
-        }
-        for (half, gates) in gates.chunks_exact(HALF_COLUMNS * request.stride).enumerate() {
-            let live = is_driven(gates);
-            let centred = live && form.means.is_some();
-            let totals = if centred { kernel.gate_totals(gates) } else { [0; _] };
-            for (block, turned) in request.turned.iter().enumerate() {
-                let at = place(half, block, blocks);
-                let sums = half_of(sums, at);
-                match turned {
-                    Some(turned) if live => kernel.accumulate(turned, request.stride, gates, sums),
-                    _ => sums.fill(0),
-                }
-                if let (Some(means), true) = (form.means, live) {
-                    let means = means[block * BLOCK_ROWS..].first_chunk().expect("whole blocks");
-                    if !form.long || stays_short(kernel, sums, &totals) {
-                        kernel.centre(sums, means, &totals);
-                    } else if let Some(beyond) = centre_long(sums, means, &totals) {
-                        let each = beyond.iter().map(|sum| u128::from(sum.unsigned_abs()).pow(2));
-                        squares += if form.squares { each.sum() } else { 0 };
-                        sums.fill(0);
-                        long.push((at, beyond));
-                    }
-                }
-                if form.squares && live {
-                    let more = kernel.squares(sums, form.means.is_some());
-                    squares += joined(more);
-                }
-            }
-        }
-        (squares, long)
-    }
-
     /// Programs sums that were kept.
     pub fn write_kept(
         &mut self,
         kernel: &Kernel,
         request: &WriteRequest<'_>,
         (sums, long): (&[i32], &LongSums),
-        mut asks: Asks<'_>,
+        asks: Asks<'_>,
     ) -> Written {
-        let Range { start, end } = self.panels();
-        let columns = start * PANEL_COLUMNS..end * PANEL_COLUMNS;
-        let mut collector = Collector::new(request.collect, self.layout, columns.clone());
-        let mut counts = WriteCounts::default();
-        if matches!(asks, Asks::Nothing | Asks::Signs(SignLaw { chance: 0, .. }, _)) {
-            return Written { counts, collected: collector.finish(kernel) };
-        }
-        let bits = asks.bits(request.dither_bits);
-        let request = WriteRequest { dither_bits: bits, ..*request };
-        let draws = Draws::new(request.place, self.layout.rows);
-        let mut words = Words::new(&request, draws, columns.clone());
         let blocks = self.layout.blocks();
+        let mut pass = Pass::new(self, request, asks);
+        if pass.is_idle() {
+            return pass.end(kernel);
+        }
         for block in 0..blocks {
-            for half in 0..columns.len() / HALF_COLUMNS {
-                let (at, column) =
-                    (place(half, block, blocks), columns.start + half * HALF_COLUMNS);
-                let mut sums: &Half<i32> = sums[at..].first_chunk().expect("a half block");
+            for half in 0..self.halves() {
+                let at = place(half, block, blocks);
                 let beyond = long.iter().find(|(place, _)| *place == at).map(|(_, sums)| &**sums);
-                let held = beyond.map(|beyond| held(beyond, &asks));
-                if let Some(held) = &held {
-                    sums = held;
-                }
-                let mut cells = self.half(half, block);
-                cells.pulses = collector.half(kernel, (column, block));
-                let groups = if let Asks::Signs(law, _) = asks {
-                    // what is held is loud, or 0
-                    let least = if beyond.is_some() { 1 } else { law.least };
-                    let law = SignLaw { least, ..law };
-                    let groups = kernel.loud(sums, law.least);
-                    if groups != 0 {
-                        let law = SignLaw { groups, ..law };
-                        let words = if law.is_certain() {
-                            None
-                        } else {
-                            words.draw_halves(kernel, column, block)
-                        };
-                        counts +=
-                            kernel.program_signs(cells, sums, &law, words, request.write.ends());
-                    }
-                    groups
-                } else if matches!(asks, Asks::Narrow)
-                    || (matches!(asks, Asks::Sums)
-                        && beyond.is_none()
-                        && fits(kernel, sums, &request))
-                {
-                    let groups = kernel.may_move(sums, &request.write, bits.get());
-                    if groups != 0 {
-                        let law = WriteLaw { groups, ..request.write };
-                        let words = words.draw(kernel, column, block);
-                        counts += kernel.program(cells, sums, &law, words);
-                    }
-                    groups
-                } else {
-                    let requests =
-                        asks.requests(beyond.map_or_else(|| sums.map(i64::from), |b| *b), at);
-                    let groups = kernel.may_move(&requests, &request.write, bits.get());
-                    if groups != 0 {
-                        let law = WriteLaw { groups, ..request.write };
-                        let words = words.draw(kernel, column, block);
-                        counts += kernel.program(cells, &requests, &law, words);
-                    }
-                    groups
-                };
-                if groups != 0 {
-                    collector.take(kernel, (column, block), groups);
+                let sums: &Half<i32> = sums[at..].first_chunk().expect("a half block");
+                pass.program(kernel, self, (half, block), (sums, beyond));
+            }
+        }
+        pass.end(kernel)
+    }
+
+    /// Forms the sums of these panels and programs them. `gates` are those of a [`StripMut::write`].
+    pub fn write_formed(
+        &mut self,
+        kernel: &Kernel,
+        request: &WriteRequest<'_>,
+        (gates, form): (&[i8], Form<'_>),
+        asks: Asks<'_>,
+    ) -> Written {
+        let mut pass = Pass::new(self, request, asks);
+        if pass.is_idle() {
+            return pass.end(kernel);
+        }
+        let mut former = Former::new(kernel, self, request, gates, form);
+        let together = former.together();
+        for block in 0..self.layout.blocks() {
+            for first in (0..self.halves()).step_by(together) {
+                former.form(kernel, block, first..first + together);
+                for half in first..first + together {
+                    let beyond = former.long.iter().find(|(at, _)| *at == half);
+                    let sums = (&former.sums[half], beyond.map(|(_, sums)| &**sums));
+                    pass.program(kernel, self, (half, block), sums);
                 }
             }
         }
-        Written { counts, collected: collector.finish(kernel) }
+        pass.end(kernel)
     }
 }
 
-/// Whether centred sums are below 2^31 for certain: sums below 2^26 and gates that add up to little.
-fn stays_short(kernel: &Kernel, sums: &Half<i32>, totals: &[i32; HALF_COLUMNS]) -> bool {
-    let most = totals.iter().map(|total| total.unsigned_abs()).max().unwrap_or(0);
-    most <= TOTAL_SHORT && kernel.loud(sums, SUM_SHORT) == 0
+/// What goes from one half block of a write to the next.
+struct Pass<'a> {
+    request: WriteRequest<'a>,
+    asks: Asks<'a>,
+    words: Words,
+    collector: Collector,
+    counts: WriteCounts,
+    /// First column.
+    column: usize,
 }
 
-/// Sums and totals of gates below which nothing centred goes beyond 32 bits: 16 x 2^26 + 4080 x 2^18 < 2^31.
-const SUM_SHORT: u32 = 1 << 26;
-const TOTAL_SHORT: u32 = 1 << 18;
+impl<'a> Pass<'a> {
+    fn new(strip: &StripMut<'_>, request: &WriteRequest<'a>, asks: Asks<'a>) -> Self {
+        let columns = strip.columns();
+        let collector = Collector::new(request.collect, strip.layout, columns.clone());
+        let dither_bits = asks.bits(request.dither_bits);
+        let request = WriteRequest { dither_bits, ..*request };
+        let draws = Draws::new(request.place, strip.layout.rows);
+        let (column, counts) = (columns.start, WriteCounts::default());
+        let words = Words::new(&request, draws, columns);
+        Self { request, asks, words, collector, counts, column }
+    }
 
-/// Takes means off in 64 bits; gives what 32 do not hold.
-fn centre_long(
-    sums: &mut Half<i32>,
-    means: &[i32; BLOCK_ROWS],
-    totals: &[i32; HALF_COLUMNS],
-) -> Option<Box<Half<i64>>> {
-    let mut centred = Box::new([0i64; _]);
-    let rows = sums.as_chunks::<HALF_COLUMNS>().0.iter().zip(means);
-    for ((sums, &mean), out) in rows.zip(centred.as_chunks_mut::<HALF_COLUMNS>().0) {
-        for ((out, &sum), &total) in out.iter_mut().zip(sums).zip(totals) {
-            *out = (i64::from(sum) << MEAN_BITS) - i64::from(mean) * i64::from(total);
+    /// Whether nothing is asked for, whatever the sums.
+    const fn is_idle(&self) -> bool {
+        matches!(self.asks, Asks::Nothing | Asks::Signs(SignLaw { chance: 0, .. }, _))
+    }
+
+    fn end(self, kernel: &Kernel) -> Written {
+        Written { counts: self.counts, collected: self.collector.finish(kernel) }
+    }
+
+    /// Programs a half block of a strip: its sums, and beside them what 32 bits do not hold.
+    fn program(
+        &mut self,
+        kernel: &Kernel,
+        strip: &mut StripMut<'_>,
+        (half, block): (usize, usize),
+        (mut sums, beyond): (&Half<i32>, Option<&Half<i64>>),
+    ) {
+        let Self { request, asks, words, collector, counts, .. } = self;
+        let (bits, write) = (request.dither_bits.get(), &request.write);
+        let column = self.column + half * HALF_COLUMNS;
+        let held = beyond.map(|beyond| held(beyond, asks));
+        if let Some(held) = &held {
+            sums = held;
+        }
+        let at = place(half, block, strip.layout.blocks());
+        let mut cells = strip.half(half, block);
+        cells.pulses = collector.half(kernel, (column, block));
+        let groups = if let &mut Asks::Signs(law, _) = asks {
+            // what is held is loud, or 0
+            let least = if beyond.is_some() { 1 } else { law.least };
+            let law = SignLaw { least, ..law };
+            let groups = kernel.loud(sums, law.least);
+            if groups != 0 {
+                let law = SignLaw { groups, ..law };
+                let words =
+                    if law.is_certain() { None } else { words.draw_halves(kernel, column, block) };
+                *counts += kernel.program_signs(cells, sums, &law, words, write.ends());
+            }
+            groups
+        } else if matches!(asks, Asks::Narrow)
+            || (matches!(asks, Asks::Sums) && beyond.is_none() && fits(kernel, sums, request))
+        {
+            let groups = kernel.may_move(sums, write, bits);
+            if groups != 0 {
+                let law = WriteLaw { groups, ..*write };
+                let words = words.draw(kernel, column, block);
+                *counts += kernel.program(cells, sums, &law, words);
+            }
+            groups
+        } else {
+            let requests = asks.requests(beyond.map_or_else(|| sums.map(i64::from), |b| *b), at);
+            let groups = kernel.may_move(&requests, write, bits);
+            if groups != 0 {
+                let law = WriteLaw { groups, ..*write };
+                let words = words.draw(kernel, column, block);
+                *counts += kernel.program(cells, &requests, &law, words);
+            }
+            groups
+        };
+        if groups != 0 {
+            collector.take(kernel, (column, block), groups);
         }
     }
-    // the least number of 32 bits has no opposite
-    let short = -i64::from(i32::MAX)..=i64::from(i32::MAX);
-    if centred.iter().any(|sum| !short.contains(sum)) {
-        return Some(centred);
-    }
-    for (sum, &centred) in sums.iter_mut().zip(centred.iter()) {
-        *sum = i32::try_from(centred).expect("just looked at");
-    }
-    None
 }
 
 /// What stands for sums beyond 32 bits where only their sign, and whether they are loud, is asked for.
@@ -264,13 +224,4 @@ fn held(beyond: &Half<i64>, asks: &Asks<'_>) -> Half<i32> {
 /// Whether sums times their mantissa fit 32 bits, and so does their shift.
 fn fits(kernel: &Kernel, sums: &Half<i32>, request: &WriteRequest<'_>) -> bool {
     request.write.shift <= 31 && kernel.loud(sums, 1 << 27) == 0
-}
-
-/// Place of a half block of a strip of panels.
-const fn place(half: usize, block: usize, blocks: usize) -> usize {
-    ((half / 2 * blocks + block) * 2 + half % 2) * HALF_CELLS
-}
-
-fn half_of(sums: &mut [i32], at: usize) -> &mut Half<i32> {
-    (&mut sums[at..at + HALF_CELLS]).try_into().expect("a half block has 1024 sums")
 }

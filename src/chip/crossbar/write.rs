@@ -7,10 +7,12 @@
 use std::ops::Range;
 
 use super::StripMut;
+use super::form::{Form, Met};
 use super::kernel::{
     Cells, Dither, Draws, Half, Kernel, OneSample, WriteCounts, WriteLaw, is_driven,
 };
 use super::layout::{BLOCK_CELLS, HALF_CELLS, HALF_COLUMNS, PANEL_COLUMNS};
+use super::optimise::Asks;
 use super::pulses::{Collect, Collected, Collector, RowPeaks};
 use super::words::Words;
 use crate::chip::hardware::{DitherBits, DitherPattern};
@@ -23,8 +25,8 @@ const UNASKED: usize = 7;
 /// Everything a write needs beside the cells and gates.
 #[derive(Debug, Clone, Copy)]
 pub struct WriteRequest<'a> {
-    /// Drives of the written samples, `[block][64 rows][stride]`; `None` where all are 0.
-    pub turned: &'a [Option<&'a [u8]>],
+    /// Drives of the written samples.
+    pub met: Met<'a>,
     /// Samples, padded with zero drives.
     pub stride: usize,
     /// Rounding, bound and window.
@@ -55,21 +57,32 @@ impl StripMut<'_> {
         self.first..self.first + self.low.len() / self.layout.panel_cells()
     }
 
+    /// Its columns, of whole panels.
+    pub(super) fn columns(&self) -> Range<usize> {
+        let Range { start, end } = self.panels();
+        start * PANEL_COLUMNS..end * PANEL_COLUMNS
+    }
+
     /// Accumulates, rounds, bounds and programs these panels. `gates` lies
     /// `[half][stride / 4][16 columns][4 samples]`.
     ///
     /// Passed over without a draw: blocks that are not driven, columns without a gate, and sums that round to 0
     /// whatever their words. A remainder alone is less than a pulse.
     pub fn write(&mut self, kernel: &Kernel, request: &WriteRequest<'_>, gates: &[i8]) -> Written {
+        let turned = match request.met {
+            Met::Turned(turned) => turned,
+            Met::Windows { .. } => {
+                return self.write_formed(kernel, request, (gates, Form::PLAIN), Asks::Narrow);
+            }
+        };
         let stride = request.stride;
         let mut counts = WriteCounts::default();
-        let Range { start, end } = self.panels();
         let draws = Draws::new(request.place, self.layout.rows);
-        if let Some(written) = self.write_single(kernel, request, gates, &draws) {
+        if let Some(written) = self.write_single(kernel, request, (turned, gates), &draws) {
             return written;
         }
         let mut sums = Sums([0; HALF_CELLS]);
-        let columns = start * PANEL_COLUMNS..end * PANEL_COLUMNS;
+        let columns = self.columns();
         let mut collector = Collector::new(request.collect, self.layout, columns.clone());
         let mut words = Words::new(request, draws, columns);
         let live: Vec<_> = gates
@@ -83,7 +96,7 @@ impl StripMut<'_> {
         let may_be_ahead = ahead;
         let mut unasked = 0;
         let mut write = request.write;
-        for (block, turned) in request.turned.iter().enumerate() {
+        for (block, turned) in turned.iter().enumerate() {
             let Some(turned) = turned else { continue };
             for &(half, gates) in &live {
                 let column = self.first * PANEL_COLUMNS + half * HALF_COLUMNS;
@@ -137,7 +150,7 @@ impl StripMut<'_> {
         &mut self,
         kernel: &Kernel,
         request: &WriteRequest<'_>,
-        gates: &[i8],
+        (turned, gates): (&[Option<&[u8]>], &[i8]),
         draws: &Draws,
     ) -> Option<Written> {
         let plain = self.high.is_none() && self.residual.is_none() && self.pruned.is_none();
@@ -157,7 +170,7 @@ impl StripMut<'_> {
         let counts = kernel.one_sample(OneSample {
             low: self.low,
             blocks: self.layout.blocks(),
-            turned: request.turned,
+            turned,
             gates,
             column: self.first * PANEL_COLUMNS,
             draws,

@@ -1,45 +1,80 @@
-//! `FWD(columns)`: the transposed read. Gates drive the columns, positive phase then negative phase.
+//! `FWD(columns)`: the transposed read. Gates drive the columns, positive phase then negative phase; of a convolution
+//! position by position.
 //!
 //! ```text
 //! d[row] = (E - I) u+  -  (E - I) u-  =  (E - I) u           sums are exact: two phases are one signed product
 //! ```
+//!
+//! Row sums of all positions are added to the pixels that drove the rows. See docs/MODEL.md, 3.8.
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
-use super::Engine;
-use super::error::stride_of;
-use crate::chip::crossbar::kernel::{Drives, Kernel};
+use std::ops::Range;
+
+use super::each::each;
+use super::error::{packed_at, stride_of};
+use super::update::SUM_BITS;
+use super::{Engine, window};
+use crate::chip::crossbar::kernel::Drives;
 use crate::chip::crossbar::layout::{BLOCK_ROWS, HALF_COLUMNS};
 use crate::chip::ledger::{During, Event};
 use crate::chip::population::Stream;
 
 /// Bits of an error word in memory.
 pub(super) const WORD_BITS: u64 = 16;
+/// Reads whose row sums are kept before they are added up.
+const READS_TOGETHER: usize = 256;
+/// Reads that are worth a thread: levels are turned anew for each part.
+const READS_A_PART: usize = 64;
 
 impl Engine {
     pub(super) fn forward_columns(&mut self, layer: usize) {
         let this = &self.layers[layer];
-        let (layout, wiring) = (this.layout, this.spec.wiring);
+        let (layout, spec) = (this.layout, &this.spec);
         assert!(
             self.hardware.tile.transposed_read,
             "only tiles with column drivers are read backwards"
         );
-        let samples = self.samples;
+        let [pair] = spec.wiring.pairs(Stream::P) else {
+            unreachable!("rows that several pairs of a target share are not read backwards")
+        };
+        let arrays = pair.map(|at| &this.arrays[at]);
+        let (samples, reads) = (self.samples, self.reads(layer));
+        let (positions, inputs) = (spec.positions(), spec.sample_inputs());
         let mut backward = std::mem::take(&mut self.registers[layer].backward);
         backward.clear();
-        if samples > 0 {
-            let gates = unpack(&self.registers[layer].gates[Stream::P.index()], samples);
-            let gates = Drives::new(&gates, samples);
-            let kernel = Kernel::start(self.backend);
-            let [pair] = wiring.pairs(Stream::P) else {
-                unreachable!("rows that several pairs of a target share are not read backwards")
-            };
-            let [e, i] = pair.map(|at| this.arrays[at].read_columns(&kernel, gates));
-            let stride = layout.rows_padded();
-            for (e, i) in e.chunks_exact(stride).zip(i.chunks_exact(stride)) {
-                let rows = e.iter().zip(i).take(this.spec.inputs);
-                backward.extend(rows.map(|(e, i)| e - i));
-            }
-        }
+        backward.resize(samples * inputs, 0);
+        let packed = &self.registers[layer].gates[Stream::P.index()];
+        let apart = samples.div_ceil(self.team.threads()).max(READS_A_PART.div_ceil(positions));
+        let parts = backward.chunks_mut(apart * inputs).enumerate();
+        let parts = parts.map(|(at, sums)| (at * apart, (at * apart, sums))).collect();
+        each(
+            &mut self.team,
+            2 * reads * layout.cells(),
+            samples,
+            parts,
+            |kernel, (first, sums)| {
+                let mut gates = Vec::new();
+                let mut row_sums = Vec::new();
+                let first = first * positions;
+                let end = first + sums.len() / inputs * positions;
+                for from in (first..end).step_by(READS_TOGETHER) {
+                    let group = from..(from + READS_TOGETHER).min(end);
+                    unpack(packed, reads, &group, &mut gates);
+                    let gates = Drives::new(&gates, group.len());
+                    for (array, negate) in arrays.iter().zip([false, true]) {
+                        array.read_columns(kernel, gates, &mut row_sums, |rows, shift| {
+                            for (read, rows) in
+                                group.clone().zip(rows.chunks_exact(layout.rows_padded()))
+                            {
+                                let at = (read - first) / positions * inputs;
+                                let pixels = &mut sums[at..at + inputs];
+                                window::fold(spec, rows, read % positions, (shift, negate), pixels);
+                            }
+                        });
+                    }
+                }
+            },
+        );
         self.registers[layer].backward = backward;
         self.charge_columns(layer);
         self.time(|schedule, cycles| schedule.columns(cycles, layer, samples));
@@ -49,12 +84,13 @@ impl Engine {
         let this = &self.layers[layer];
         let [down, across] = this.tiles(&self.hardware).map(|n| n as u64);
         let (rows, columns) = (this.layout.rows as u64, this.layout.columns as u64);
-        let reads = 2 * u64::from(self.hardware.slices()) * self.samples as u64;
-        let (wiring, inputs) = (this.spec.wiring, this.spec.inputs as u64);
+        let reads = 2 * u64::from(self.hardware.slices()) * self.reads(layer) as u64;
+        let (wiring, inputs) = (this.spec.wiring, this.spec.sample_inputs() as u64);
+        let folded = (self.samples * window::folded(&this.spec)) as u64;
         let dac_bits = u64::from(self.hardware.drive.dac_bits);
+        let during = During::ForwardColumns;
         for &at in wiring.banks(Stream::P) {
             let code = wiring.pathways()[at].code;
-            let during = During::ForwardColumns;
             let driven = columns * down * reads;
             self.charge(layer, code, during, Event::DacSlices, driven);
             self.charge(layer, code, during, Event::SramBits, driven * dac_bits);
@@ -63,29 +99,29 @@ impl Engine {
             self.charge(layer, code, during, Event::Conversions, rows * across * reads);
             self.charge(layer, code, during, Event::ShiftAdds, rows * across * reads);
         }
-        // what is handed down is kept as error words until it is heard
         let code = Self::code_of(wiring, Stream::P);
+        // the sum of a pixel is read and stored where a row is added to it
+        self.charge(layer, code, during, Event::ShiftAdds, folded);
+        self.charge(layer, code, during, Event::SramBits, 2 * SUM_BITS * folded);
+        // what is handed down is kept as error words until it is heard
         let kept = WORD_BITS * inputs * self.samples as u64;
-        self.charge(layer, code, During::ForwardColumns, Event::SramBits, kept);
+        self.charge(layer, code, during, Event::SramBits, kept);
     }
 }
 
-/// Packed gates as drives lie: `[block][sample][64]`.
-fn unpack(packed: &[i8], samples: usize) -> Vec<u8> {
-    let stride = stride_of(samples);
+/// Packed gates of some reads of `all` as drives lie: `[block][read][64]`.
+fn unpack(packed: &[i8], all: usize, reads: &Range<usize>, out: &mut Vec<u8>) {
+    let stride = stride_of(all);
     let blocks = packed.len() / (stride * BLOCK_ROWS);
-    let mut out = vec![0; blocks * samples * BLOCK_ROWS];
-    let halves = packed.chunks_exact(HALF_COLUMNS * stride);
-    for (half, packed) in halves.enumerate() {
-        let (block, from) = (half / 4, half % 4 * HALF_COLUMNS);
-        for (quad, packed) in packed.as_chunks::<64>().0.iter().enumerate() {
-            for s in 0..4.min(samples.saturating_sub(quad * 4)) {
-                let at = (block * samples + quad * 4 + s) * BLOCK_ROWS + from;
-                let to: &mut [u8; HALF_COLUMNS] =
-                    out[at..].first_chunk_mut().expect("16 columns a half");
-                *to = std::array::from_fn(|c| packed[c * 4 + s].cast_unsigned());
+    out.resize(blocks * reads.len() * BLOCK_ROWS, 0);
+    let halves = out.chunks_exact_mut(reads.len() * BLOCK_ROWS).enumerate();
+    for (block, out) in halves {
+        for (read, out) in reads.clone().zip(out.chunks_exact_mut(BLOCK_ROWS)) {
+            for (half, out) in out.as_chunks_mut::<HALF_COLUMNS>().0.iter_mut().enumerate() {
+                let from = packed_at(stride, read, block * BLOCK_ROWS + half * HALF_COLUMNS);
+                let gates: &[i8] = &packed[from..];
+                *out = std::array::from_fn(|c| gates[c * 4].cast_unsigned());
             }
         }
     }
-    out
 }

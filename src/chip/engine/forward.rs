@@ -13,11 +13,14 @@
 
 use std::ops::Range;
 
+use aligned_vec::{AVec, avec};
+
 use super::Engine;
 use super::each::each;
 use super::homeostasis::Middle;
 use super::read::{Histogram, Mode, PanelPart, Reader, Seen};
-use crate::chip::crossbar::kernel::{HandOn, Kernel, LookUp, Scratch, TOGETHER};
+use super::window::windows_of;
+use crate::chip::crossbar::kernel::{HandOn, Image, Kernel, LookUp, Scratch, TOGETHER, Windows};
 use crate::chip::crossbar::layout::{BLOCK_ROWS, PANEL_COLUMNS};
 use crate::chip::hardware::{Adc, Hardware, Subtract};
 use crate::chip::layer::Layer;
@@ -26,6 +29,10 @@ use crate::chip::periphery;
 use crate::chip::population::{Pathway, Polarity, Stream};
 use crate::num::fixed::DriveBits;
 use crate::num::tables::Activation;
+
+/// Reads of a convolution whose drives are gathered: three groups that are read together, and blocks of them lie so that half
+/// the blocks meet in one half of the first cache, and half in the other.
+const NEAR: usize = 3 * TOGETHER;
 
 /// What the units of a layer do with their accumulators.
 #[derive(Debug, Clone)]
@@ -135,6 +142,9 @@ impl Engine {
 
     /// Reads a layer whose units need nothing but their own accumulators. What was seen, by target.
     fn put_out(&mut self, layer: usize, mode: Mode) -> Vec<Seen> {
+        if self.layers[layer].spec.convolution.is_some() {
+            return self.put_out_near(layer, mode);
+        }
         let samples = self.reads(layer);
         let notes = self.notes(layer, mode);
         let direct = self.hands_on_directly(layer);
@@ -189,6 +199,71 @@ impl Engine {
         Seen::by_target(wiring, seen)
     }
 
+    /// The same of a convolution, which is read so often that its drives would leave the second cache: all its units read some
+    /// positions, and then the next. The arrays of a convolution are small.
+    fn put_out_near(&mut self, layer: usize, mode: Mode) -> Vec<Seen> {
+        let reads = self.reads(layer);
+        let notes = self.notes(layer, mode);
+        let direct = self.hands_on_directly(layer);
+        let (head, tail) = self.registers.split_at_mut(layer + 1);
+        let own = &mut head[layer];
+        let (this, hardware) = (&self.layers[layer], &self.hardware);
+        let wiring = this.spec.wiring;
+        let mut values: [&mut [u8]; 2] = match tail.first_mut() {
+            Some(next) if direct => next.drives.each_mut().map(|drives| &mut drives[..]),
+            Some(_) => own.maps.each_mut().map(|map| &mut map[..]),
+            None => own.activities.each_mut().map(|activities| &mut activities[..]),
+        };
+        let mut kept = own.accumulators.each_mut().map(|kept| &mut kept[..]);
+        let starts = (0..reads).step_by(NEAR);
+        let mut parts: Vec<(Range<usize>, Vec<Out<'_>>)> =
+            starts.map(|start| (start..(start + NEAR).min(reads), vec![])).collect();
+        for (&target, derivatives) in wiring.targets().iter().zip(&mut own.derivatives) {
+            // empty where a layer only hands on, or is only read out
+            let mut values =
+                std::mem::take(&mut values[target.index()]).chunks_mut(reads * BLOCK_ROWS);
+            let mut kept = std::mem::take(&mut kept[target.index()]).chunks_mut(reads * BLOCK_ROWS);
+            let blocks = derivatives.chunks_mut(reads * BLOCK_ROWS).enumerate();
+            for (block, derivatives) in blocks {
+                let mut values = values.next().unwrap_or_default().chunks_mut(NEAR * BLOCK_ROWS);
+                let mut kept = kept.next().unwrap_or_default().chunks_mut(NEAR * BLOCK_ROWS);
+                let derivatives = derivatives.chunks_mut(NEAR * BLOCK_ROWS);
+                for ((_, outs), derivatives) in parts.iter_mut().zip(derivatives) {
+                    let values = values.next().unwrap_or_default();
+                    let accumulators = kept.next();
+                    outs.push(Out { target, block, values, derivatives, accumulators });
+                }
+            }
+        }
+        let units = &self.units[layer];
+        let plan = own.plan.as_ref().expect("windows lie where samples are loaded");
+        let met = |&set: &Stream| Image::new(plan, &own.images[set.index()]);
+        let met = this.spec.drive_sets().iter().map(met);
+        let windows: Vec<_> = met.map(|image| windows_of(&this.spec, hardware, image)).collect();
+        let blocks = this.layout.blocks();
+        let work = reads * this.layout.cells() * wiring.pathways().len();
+        let places = parts.len();
+        let seen = each(&mut self.team, work, places, parts.into_iter().enumerate().collect(), {
+            |kernel, (some, outs): (Range<usize>, _)| {
+                let near = windows.iter().map(|windows| gathered(windows, blocks, &some));
+                let near: Vec<_> = near.collect();
+                let drives = |source: Stream| &near[this.spec.drives_of(source).index()][..];
+                let samples = some.len();
+                let reader = |&target| {
+                    let mut reader = Reader::new(this, hardware, target, samples, mode, drives);
+                    reader.prepare(kernel);
+                    let middle = Middle::of(this, target, &reader, notes);
+                    (Seen::new(&reader), reader, middle)
+                };
+                let mut readers: Vec<_> = wiring.targets().iter().map(reader).collect();
+                put_out_all(kernel, units, samples, outs, &mut readers);
+                let seen = readers.into_iter().map(|(seen, ..)| seen);
+                wiring.targets().iter().map(|target| target.index()).zip(seen).collect::<Vec<_>>()
+            }
+        });
+        Seen::by_target(wiring, seen.into_iter().flatten().collect())
+    }
+
     /// Charges what depended on the numbers read.
     fn charge_seen(&mut self, layer: usize, seen: Vec<Seen>) -> Vec<Histogram> {
         let wiring = self.layers[layer].spec.wiring;
@@ -215,7 +290,7 @@ impl Engine {
         let this = &self.layers[layer];
         let [down, across] = this.tiles(&self.hardware).map(|n| n as u64);
         let (rows, columns) = (this.layout.rows as u64, this.layout.columns as u64);
-        let slices = u64::from(self.hardware.slices());
+        let slices = u64::from(self.hardware.slices()) * this.spec.driven_by.phases() as u64;
         let samples = self.reads(layer) as u64;
         let dac_bits = u64::from(self.hardware.drive.dac_bits);
         let wiring = this.spec.wiring;
@@ -277,6 +352,34 @@ fn put_out(
     seen
 }
 
+/// Reads all units of all targets and looks them up, some samples at a time. What is seen, the reader and the middle of a target
+/// stand at its number.
+fn put_out_all(
+    kernel: &Kernel,
+    units: &Units,
+    samples: usize,
+    mut outs: Vec<Out<'_>>,
+    readers: &mut [(Seen, Reader<'_>, Option<Middle>)],
+) {
+    let mut scratch = Scratch::new();
+    let mut sums = [0; Scratch::SUMS];
+    for start in (0..samples).step_by(TOGETHER) {
+        let group = start..(start + TOGETHER).min(samples);
+        for out in &mut outs {
+            let (seen, reader, middle) = &mut readers[out.target.index()];
+            let (units, scratch) = ((units, middle.as_ref()), (&mut scratch, &mut sums));
+            put_out_group(kernel, reader, units, out, &group, scratch, seen);
+        }
+    }
+}
+
+/// Drives of some reads, `[block][read][64]`.
+fn gathered(windows: &Windows<'_>, blocks: usize, some: &Range<usize>) -> AVec<u8> {
+    let mut near = avec![0; blocks * some.len() * BLOCK_ROWS];
+    windows.assemble(0..blocks, some.clone(), &mut Vec::new(), &mut near);
+    near
+}
+
 /// Reads the two panels of a block for a group of samples.
 fn put_out_group(
     kernel: &Kernel,
@@ -312,9 +415,12 @@ fn put_out_group(
                 }
                 Units::Homeostatic(table) => {
                     let middle = middle.expect("made with the read");
-                    if middle.is_narrow() {
+                    if middle.is_narrow() && kept.is_some() {
                         middle.take_off(kernel, (panel, live), table.shift, sums, seen);
                         seen.look_ups += kernel.look_up(sums, table, live, values, derivatives);
+                    } else if middle.is_narrow() {
+                        let out = (values, derivatives);
+                        middle.put_out(kernel, (panel, live), (table, sums), out, seen);
                     } else {
                         let mut wide = [0; Scratch::SUMS];
                         wide.iter_mut().zip(&*sums).for_each(|(wide, &sum)| *wide = sum.into());

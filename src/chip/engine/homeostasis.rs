@@ -17,7 +17,7 @@ mod tests;
 
 use super::read::{Mode, Reader, Seen};
 use super::{BLOCK_ROWS, Engine, Phase};
-use crate::chip::crossbar::kernel::{Kernel, OFFSET_MAX};
+use crate::chip::crossbar::kernel::{Kernel, LookUp, MiddleOf, OFFSET_MAX};
 use crate::chip::crossbar::layout::PANEL_COLUMNS;
 use crate::chip::layer::{Gain, Layer, Readings};
 use crate::chip::ledger::{During, Event};
@@ -104,6 +104,28 @@ impl Middle {
     /// Whether differences fit 32 bits where accumulators do.
     pub(super) const fn is_narrow(&self) -> bool {
         !self.narrow.is_empty()
+    }
+
+    /// Takes thresholds off the accumulators of a panel, `[sample][32]`, looks up what is left and notes what it is to note. The
+    /// accumulators are not used any more.
+    pub(super) fn put_out(
+        &self,
+        kernel: &Kernel,
+        (panel, live): (usize, usize),
+        (table, sums): (&LookUp, &mut [i32]),
+        out: (&mut [u8], &mut [u8]),
+        seen: &mut Seen,
+    ) {
+        let at = panel * PANEL_COLUMNS;
+        let offsets = self.narrow[at..].first_chunk().expect("padded to whole blocks");
+        let middle = MiddleOf { offsets, raise: self.raise };
+        let mut totals = [0; PANEL_COLUMNS];
+        let [squares, saturated] = kernel.put_out(sums, (middle, table), live, &mut totals, out);
+        self.note_sums(at, &totals[..live], seen);
+        seen.look_ups += saturated;
+        if self.notes.squares {
+            seen.noted.squares += squares;
+        }
     }
 
     /// Takes thresholds off the accumulators of a panel, `[sample][32]`, and notes what it is to note. What is left is

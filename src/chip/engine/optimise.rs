@@ -11,12 +11,17 @@
 #[cfg(test)]
 mod tests;
 
+use std::borrow::Cow;
+
 use super::Engine;
 use super::each::each;
-use super::update::{Ready, SUM_BITS, strips};
+use super::update::{Array, Ready, SUM_BITS, strips};
+use super::window::channel_sums;
 use crate::chip::crossbar::kernel::{MEAN_BITS, SignLaw};
 use crate::chip::crossbar::layout::{BLOCK_ROWS, PANEL_COLUMNS};
-use crate::chip::crossbar::{Adam, Asks, Crossbar, Form, Momentum, SHORT_READS, Written};
+use crate::chip::crossbar::{
+    Adam, Asks, Crossbar, Form, LongSums, Met, Momentum, SHORT_READS, Written,
+};
 use crate::chip::layer::requests::{dead_zone, first_mean, next_mean};
 use crate::chip::layer::{Optimiser, Requests};
 use crate::chip::ledger::{During, Event};
@@ -24,6 +29,11 @@ use crate::chip::population::Polarity;
 use crate::num::fixed::log2_ceil;
 use crate::num::tables::Scales;
 
+/// So many reads are multiplied again in less time than their sums take to memory and back.
+const FORMED_AGAIN: usize = 128;
+/// So many reads have centred sums that a mantissa leaves in 32 bits: 256 x 4080 x 127 x 15 < 2^31 - 2^27.
+const SUMMED_SHORT: usize = 256;
+const _: () = assert!(SUMMED_SHORT * 4080 * 127 * 15 < (1 << 31) - (1 << 27));
 /// Bits of the mean of a row.
 const MEAN_WIDTH: u64 = 8 + MEAN_BITS as u64;
 
@@ -65,42 +75,62 @@ impl Engine {
         let this = &mut self.layers[layer];
         // what a mean is taken over: samples, or the pixels below the windows of all of them
         let pixels = this.spec.convolution.map_or(1, |shape| shape.height * shape.width);
-        let samples = (ready.samples / this.spec.positions() * pixels) as i64;
+        let phases = this.spec.driven_by.phases();
+        let samples = (ready.samples / this.spec.drivings() * pixels) as i64;
         let pixels_log2 = log2_ceil(pixels as u64);
         if let (Some(codes), true) = (&codes, first) {
             move_means(&mut this.requests.means, codes, |_, codes| first_mean(codes, samples));
         }
+        let keep = this.spec.convolution.is_some() || ready.samples > FORMED_AGAIN;
         let mut kept = std::mem::take(&mut self.registers[layer].sums);
         let work = this.layout.cells() * this.arrays.len() * ready.samples;
         let panels = this.layout.panels();
         let (requests, layout) = (&this.requests, this.layout);
-        let window = requests.window_log2;
-        let row_means = requests.by_row(&this.spec, layout.rows_padded());
-        let parts = strips(&mut this.arrays);
+        let (window, optimiser) = (requests.window_log2, requests.optimiser);
+        // what follows changes them
+        let row_means = requests.by_row(&this.spec, layout.rows_padded()).map(Cow::into_owned);
+        let form = |array: usize| {
+            let Array { set, negate, .. } = ready.arrays[array];
+            Form {
+                means: window.map(|_| &row_means[set][..]),
+                squares: looks_at(optimiser, negate),
+                long: ready.samples > SHORT_READS,
+                phases,
+            }
+        };
         let strip_cells = Crossbar::STRIP_PANELS * layout.panel_cells();
-        kept.resize(ready.arrays.len() * layout.cells_padded(), 0);
-        let sums = kept.chunks_exact_mut(layout.cells_padded());
-        let sums = sums.flat_map(|array| array.chunks_mut(strip_cells));
-        let parts = parts.into_iter().zip(sums);
-        let parts = parts.map(|((place, (array, strip)), sums)| (place, (array, strip, sums)));
-        let formed = each(&mut self.team, work, panels, parts.collect(), |kernel, part| {
-            let (array, strip, sums) = part;
-            let means = window.map(|_| &row_means[ready.arrays[array].set][..]);
-            let negate = ready.arrays[array].negate;
-            let long = ready.samples > SHORT_READS;
-            let form = Form { means, squares: looks_at(requests.optimiser, negate), long };
-            let gates = ready.gates(array, &strip);
-            let (squares, long) = strip.form(kernel, &ready.request(array), gates, form, sums);
-            (strip.panels().start, (array, strip, &*sums, long), squares)
-        });
-        let squares: u128 = formed.iter().map(|(.., squares)| squares).sum();
+        let mut long: Vec<LongSums> = vec![];
+        let mut squares = 0u128;
+        if keep {
+            kept.resize(ready.arrays.len() * layout.cells_padded(), 0);
+            let sums = kept.chunks_exact_mut(layout.cells_padded());
+            let sums = sums.flat_map(|array| array.chunks_mut(strip_cells));
+            let parts = strips(&mut this.arrays).into_iter().zip(sums);
+            let parts = parts.map(|((place, (array, strip)), sums)| (place, (array, strip, sums)));
+            let formed = each(&mut self.team, work, panels, parts.collect(), |kernel, part| {
+                let (array, strip, sums) = part;
+                let gates = ready.gates(array, &strip);
+                strip.form(kernel, &ready.request(array), gates, form(array), sums)
+            });
+            for (more, beyond) in formed {
+                squares += more;
+                long.push(beyond);
+            }
+        } else if optimiser.looks_at_layer() {
+            let parts = strips(&mut this.arrays).into_iter();
+            let parts = parts.filter(|(_, (array, _))| form(*array).squares).collect();
+            let formed = each(&mut self.team, work, panels, parts, |kernel, (array, strip)| {
+                let gates = ready.gates(array, &strip);
+                strip.squares(kernel, &ready.request(array), gates, form(array))
+            });
+            squares = formed.into_iter().sum();
+        }
         let finer = if window.is_some() { MEAN_BITS } else { 0 };
         let pairs = this.spec.wiring.shift_extra();
         let chance = shift + pairs;
         let (mut shift, mut scale) = (shift + pairs + finer, self.mantissas[layer]);
         let (mut least, mut silent) = (1u64, false);
-        let Requests { optimiser, followed, words, .. } = &mut this.requests;
-        let optimiser = *optimiser;
+        let Requests { followed, words, .. } = &mut this.requests;
         match optimiser {
             Optimiser::Plain | Optimiser::Sign { dead_zone: false } => {}
             Optimiser::Sign { dead_zone: true } => {
@@ -124,16 +154,17 @@ impl Engine {
             let mut parts = words.each_mut().map(|words| words.chunks_mut(strip_cells));
             (0..strips_of).map(move |_| parts.each_mut().map(|p| p.next().unwrap_or_default()))
         });
-        let parts = formed.into_iter().zip(words);
-        let parts = parts.map(|((place, part, _), words)| (place, (part, words))).collect();
+        let parts = strips(&mut this.arrays).into_iter().zip(words).enumerate();
+        let parts = parts.map(|(at, ((place, part), words))| (place, (at, part, words))).collect();
+        let short = finer == 0 || ready.samples <= SUMMED_SHORT;
         let written = each(&mut self.team, work, panels, parts, |kernel, part| {
-            let ((array, mut strip, sums, long), [one, two]) = part;
+            let (at, (array, mut strip), [one, two]) = part;
             let mut request = ready.request(array);
             request.write.shift = shift;
             request.write.mantissa = i32::try_from(scale).expect("1..=15");
             let asks = match optimiser {
                 _ if silent => Asks::Nothing,
-                Optimiser::Plain | Optimiser::Rms if finer == 0 && shift <= 31 => Asks::Narrow,
+                Optimiser::Plain | Optimiser::Rms if short && shift <= 31 => Asks::Narrow,
                 Optimiser::Plain | Optimiser::Rms => Asks::Sums,
                 Optimiser::Sign { .. } => {
                     let short = u32::try_from(least).unwrap_or(u32::MAX);
@@ -146,8 +177,16 @@ impl Engine {
                     Asks::Adam(adam, [one, two])
                 }
             };
-            let written = strip.write_kept(kernel, &request, (sums, &long), asks);
-            (array, strip.panels().start * PANEL_COLUMNS, written)
+            let first = strip.panels().start * PANEL_COLUMNS;
+            let written = if keep {
+                let from = array * layout.cells_padded() + first * layout.rows_padded();
+                strip.write_kept(kernel, &request, (&kept[from..], &long[at]), asks)
+            } else {
+                let form = Form { squares: false, ..form(array) };
+                let gates = ready.gates(array, &strip);
+                strip.write_formed(kernel, &request, (gates, form), asks)
+            };
+            (array, first, written)
         });
         if let (Some(codes), Some(window), false) = (&codes, window, first) {
             let requests = &mut this.requests;
@@ -174,19 +213,30 @@ impl Engine {
             assert!(samples == self.samples, "means are taken of all that is loaded");
             let pixels = (samples * shape.height * shape.width) as i64;
             let constant = pixels * i64::from(self.hardware.drive.bits.code_max());
-            for set in sets {
-                codes[set.index()] = self.channel_sums(layer, set.index());
+            for (set, met) in sets.iter().zip(&ready.met) {
+                if let Met::Windows { windows, .. } = met {
+                    codes[set.index()] = channel_sums(windows.image().codes(), shape.channels);
+                }
                 codes[set.index()].extend(spec.constant_row.then_some(constant));
             }
             return codes;
         }
-        let blocks: Vec<_> = ready.turned.iter().flatten().copied().collect();
+        let signed = spec.driven_by.phases() > 1;
+        let turned = ready.met.iter().flat_map(|met| match met {
+            Met::Turned(turned) => *turned,
+            Met::Windows { .. } => unreachable!("a dense layer has no windows"),
+        });
+        let blocks: Vec<_> = turned.copied().collect();
         let sums = self.team.alone(blocks, |kernel, block| {
-            block.map_or([0; BLOCK_ROWS], |turned| kernel.drive_totals(turned, ready.stride))
+            let of = |turned| match signed {
+                true => signed_totals(turned, ready.stride),
+                false => kernel.drive_totals(turned, ready.stride).map(i64::from),
+            };
+            block.map_or([0; BLOCK_ROWS], of)
         });
         let rows = sums.chunks((sums.len() / sets.len()).max(1));
         for (set, rows) in sets.iter().zip(rows) {
-            codes[set.index()].extend(rows.as_flattened().iter().map(|&sum| i64::from(sum)));
+            codes[set.index()].extend(rows.as_flattened());
         }
         codes
     }
@@ -216,9 +266,11 @@ impl Engine {
         if !centred {
             return;
         }
+        // codes with a sign have means with one
+        let width = MEAN_WIDTH + u64::from(spec.driven_by.phases() > 1);
         let mut means = |code, count| {
             self.charge(layer, code, During::Update, Event::RowMeans, count);
-            self.charge(layer, code, During::Update, Event::SramBits, MEAN_WIDTH * count);
+            self.charge(layer, code, During::Update, Event::SramBits, width * count);
         };
         // used by every array in each pass that sees it, and kept once a set of drives, or a channel of it
         let constant = usize::from(spec.constant_row);
@@ -233,6 +285,16 @@ impl Engine {
             means(first.expect("drives drive an array").code, kept);
         }
     }
+}
+
+/// Sums of the codes of rows that are turned, `[64 rows][stride]`: of every two, the second lies below 0.
+fn signed_totals(turned: &[u8], stride: usize) -> [i64; BLOCK_ROWS] {
+    let mut totals = [0; BLOCK_ROWS];
+    for (total, codes) in totals.iter_mut().zip(turned.chunks_exact(stride)) {
+        let codes = codes.as_chunks::<2>().0.iter();
+        *total = codes.map(|&[above, below]| i64::from(above) - i64::from(below)).sum();
+    }
+    totals
 }
 
 /// Whether an optimiser squares the sums of an array, which inhibits or excites.

@@ -21,6 +21,9 @@ use crate::chip::hardware::{Adc, Hardware, Subtract};
 use crate::chip::layer::{CHUNK_BLOCKS, Layer};
 use crate::chip::periphery::{self, Converter};
 use crate::chip::population::{BANKS_MAX, Stream, Wiring};
+use signed::{below_from_above, both_phases};
+
+mod signed;
 
 /// Histogram of the least shifts at which conversions stay off the rail, and the greatest current, by slice.
 pub(super) type Histogram = Vec<([u64; 64], i64)>;
@@ -50,6 +53,8 @@ struct TileRead<'a> {
     /// Blocks of a physical tile among them.
     tile_blocks: usize,
     codes: Cow<'a, [u8]>,
+    /// What the drives of each sample add up to, where that is known.
+    sums: Vec<i32>,
 }
 
 /// What reads counted.
@@ -116,7 +121,9 @@ struct Pair<'a> {
 /// The banks of one target stream, and how they are read.
 pub(super) struct Reader<'a> {
     pairs: Vec<Pair<'a>>,
+    /// Drivings of rows: reads, twice as many where drives have a sign.
     samples: usize,
+    phases: usize,
     /// Converters by slice; none where they are ideal.
     converters: Option<(Vec<Converter>, Subtract)>,
     probe: Option<Converter>,
@@ -127,6 +134,7 @@ pub(super) struct Reader<'a> {
     /// Sums lie below this.
     bound: u128,
     pub(super) columns: usize,
+    rows: usize,
 }
 
 impl<'a> Reader<'a> {
@@ -163,9 +171,10 @@ impl<'a> Reader<'a> {
             (Some(_), false) => Tiles::Apart,
         };
         let code_max = hardware.drive.bits.code_max();
+        let phases = layer.spec.driven_by.phases();
         let reads = |at: usize| {
             let drives = drives(wiring.pathways()[at].source);
-            tile_reads(layer, hardware, drives, samples, tiles)
+            tile_reads(layer, hardware, drives, samples * phases, tiles)
         };
         let pair = |places: &[usize; 2]| Pair {
             arrays: places.map(|at| &layer.arrays[at]),
@@ -173,7 +182,8 @@ impl<'a> Reader<'a> {
         };
         Self {
             pairs: pairs.iter().map(pair).collect(),
-            samples,
+            samples: samples * phases,
+            phases,
             converters,
             probe,
             dac_bits: hardware.drive.dac_bits,
@@ -190,12 +200,28 @@ impl<'a> Reader<'a> {
             narrow,
             bound: bound.unwrap_or(u128::MAX),
             columns: layer.layout.columns,
+            rows: layer.layout.rows,
+        }
+    }
+
+    /// Adds up once what reads of every panel take, where the kernel's do.
+    pub(super) fn prepare(&mut self, kernel: &Kernel) {
+        for at in 0..2 * self.pairs.len() {
+            let reads = std::mem::take(&mut self.pairs[at / 2].reads[at % 2]);
+            let with_sums = reads.into_iter().map(|read| {
+                let sums = kernel.drive_sums(self.drives(&read)).unwrap_or_default();
+                TileRead { sums, ..read }
+            });
+            self.pairs[at / 2].reads[at % 2] = with_sums.collect();
         }
     }
 
     /// What a read is driven with.
     fn drives<'b>(&self, read: &'b TileRead<'_>) -> Drives<'b> {
-        Drives::new(&read.codes, self.samples).within(self.greatest)
+        let rows = (self.rows - (read.blocks.end - 1) * BLOCK_ROWS).min(BLOCK_ROWS);
+        let drives = Drives::new(&read.codes, self.samples);
+        let drives = drives.within(self.greatest).with_last_rows(rows);
+        if read.sums.is_empty() { drives } else { drives.with_sums(&read.sums) }
     }
 
     /// Whether every sum fits 31 bits.
@@ -210,6 +236,26 @@ impl<'a> Reader<'a> {
 
     /// Accumulators of a panel, `[sample][32]`, where they fit 31 bits.
     pub(super) fn read_narrow(
+        &self,
+        kernel: &Kernel,
+        part: &PanelPart,
+        scratch: &mut Scratch,
+        sums: &mut [i32],
+        seen: &mut Seen,
+    ) {
+        if self.phases == 1 {
+            return self.drive_narrow(kernel, part, scratch, sums, seen);
+        }
+        let mut both = [0; Scratch::SUMS];
+        for (part, sums) in both_phases(part, sums) {
+            let both = &mut both[..2 * sums.len()];
+            self.drive_narrow(kernel, &part, scratch, both, seen);
+            below_from_above(both, sums);
+        }
+    }
+
+    /// What each driving of the rows reads.
+    fn drive_narrow(
         &self,
         kernel: &Kernel,
         part: &PanelPart,
@@ -309,6 +355,19 @@ impl<'a> Reader<'a> {
         sums: &mut [i64],
         seen: &mut Seen,
     ) {
+        if self.phases == 1 {
+            return self.drive_wide(kernel, part, sums, seen);
+        }
+        let mut both = [0; Scratch::SUMS];
+        for (part, sums) in both_phases(part, sums) {
+            let both = &mut both[..2 * sums.len()];
+            self.drive_wide(kernel, &part, both, seen);
+            below_from_above(both, sums);
+        }
+    }
+
+    /// What each driving of the rows reads.
+    fn drive_wide(&self, kernel: &Kernel, part: &PanelPart, sums: &mut [i64], seen: &mut Seen) {
         sums.fill(0);
         let mut currents = [[0; Scratch::SUMS]; 2];
         for (at, pair) in self.pairs.iter().enumerate() {
@@ -419,7 +478,8 @@ fn bound(
     converters: Option<&(Vec<Converter>, Subtract)>,
 ) -> Option<u128> {
     let ceiling = u128::from(hardware.cell.window.ceiling());
-    let (rows, pairs) = (layer.layout.rows, pairs as u128);
+    // of codes of both phases one is taken off the other
+    let (rows, pairs) = (layer.layout.rows, (pairs * layer.spec.driven_by.phases()) as u128);
     let current = |rows: usize, code: u32| rows as u128 * ceiling * u128::from(code);
     match converters {
         None => {
@@ -478,6 +538,7 @@ fn tile_reads<'a>(
                 tile_blocks: blocks.len(),
                 codes: Cow::Borrowed(&drives[blocks.start * size..blocks.end * size]),
                 blocks,
+                sums: vec![],
             })
             .collect();
     }
@@ -496,7 +557,8 @@ fn tile_reads<'a>(
         if tiles == Tiles::Together && aligned {
             let tile_blocks = hardware.tile.rows.div_ceil(BLOCK_ROWS);
             let codes = sliced(drives);
-            reads.push(TileRead { slice: slice as usize, blocks: 0..blocks, tile_blocks, codes });
+            let (slice, sums) = (slice as usize, vec![]);
+            reads.push(TileRead { slice, blocks: 0..blocks, tile_blocks, codes, sums });
             continue;
         }
         for rows in layer.row_tiles(hardware) {
@@ -507,7 +569,8 @@ fn tile_reads<'a>(
             }
             debug_assert!(blocks.len() <= CHUNK_BLOCKS, "a converted tile is one chunk");
             let tile_blocks = blocks.len();
-            reads.push(TileRead { slice: slice as usize, blocks, tile_blocks, codes });
+            let (slice, sums) = (slice as usize, vec![]);
+            reads.push(TileRead { slice, blocks, tile_blocks, codes, sums });
         }
     }
     reads

@@ -6,7 +6,8 @@
 //! ```text
 //! reads      FWD(rows) of successive layers, in a pipeline of layers and samples
 //!                sum_l (1 + T_fwd(l)) + (B - 1) max_l (1 + again(l))
-//!            a convolution is read P times a sample, back to back:  1 + T_fwd + (P - 1) (1 + again), and P (1 + again)
+//!            a convolution is read P times a sample, back to back:  1 + T_fwd + (P - 1) (1 + again), and P (1 + again);
+//!            from its columns, in rounds, likewise
 //!            a normalised layer is followed by a digital stage of its own, of 2 NG + 32 beats in both sums; one with a
 //!            pool by one of NG beats a position that the pool puts out
 //! rounds     ERR, FWD(columns), UPD(add), UPD(now), sample by sample in the order of the list; in a round a run of
@@ -43,14 +44,23 @@ struct Shape {
     levels: [u64; 2],
     /// Tiles.
     tiles: u64,
-    /// Words on the bus.
+    /// Words on the bus, of a sample.
     words: u64,
     /// Cycles in which the error unit forms the words of a sample.
     form: u64,
     /// Reads of a sample.
     positions: u64,
+    /// Times that rows are driven for a read.
+    phases: u64,
     /// Cycles of the stage behind it, which normalises or pools a sample and which no command begins; 0 where there is none.
     stage: u64,
+}
+
+impl Shape {
+    /// Products of a sample.
+    const fn drivings(self) -> u64 {
+        self.positions * self.phases
+    }
 }
 
 /// Layers whose commands of one kind run at the same time.
@@ -179,9 +189,10 @@ impl Schedule {
                 columns,
                 levels: [tree_levels(down * pairs), tree_levels(across)],
                 tiles: planes * down * across,
-                words: layer.delivery.taps.width as u64,
+                words: (layer.delivery.taps.width * layer.heard()) as u64,
                 form: timing.form(layer.delivery.terms() as u64),
                 positions: layer.spec.positions() as u64,
+                phases: layer.spec.driven_by.phases() as u64,
                 stage: match layer.spec.pool {
                     Pool::None if normalised => timing.normalise(columns),
                     Pool::None => 0,
@@ -215,8 +226,8 @@ impl Schedule {
             self.settle(cycles);
             self.segment = Segment::Reads { next: layer, samples: 0, latency: 0, again: 0 };
         }
-        let front = t.accept() + self.reads.again(1, shape.columns);
-        let one = t.accept() + self.reads.read(1, shape.columns, shape.levels[0]);
+        let front = t.accept() + self.reads.again(shape.phases, shape.columns);
+        let one = t.accept() + self.reads.read(shape.phases, shape.columns, shape.levels[0]);
         let one = one + (shape.positions - 1) * front;
         if let Segment::Reads { next, samples: count, latency, again } = &mut self.segment {
             *next = layer + 1;
@@ -226,7 +237,7 @@ impl Schedule {
         }
         let count = samples as u64 * shape.positions;
         cycles.occupy(layer, During::ForwardRows, count * front);
-        self.engage_read(cycles, layer, [count, 1], shape.columns, shape.levels[0]);
+        self.engage_read(cycles, layer, [count, shape.phases], shape.columns, shape.levels[0]);
     }
 
     /// So many reads, each of which goes through all slices so many times.
@@ -317,7 +328,9 @@ impl Schedule {
             self.settle(cycles);
         }
         let (t, shape) = (self.timing, self.shapes[layer]);
+        let front = t.accept() + self.reads.again(2, shape.rows);
         let one = t.accept() + self.reads.read(2, shape.rows, shape.levels[1]);
+        let one = one + (shape.positions - 1) * front;
         for round in self.rounds(cycles, &(0..samples)) {
             round.close();
             round.passed[Interval::Columns as usize] += one;
@@ -325,8 +338,7 @@ impl Schedule {
         if let Segment::Rounds { columns, .. } = &mut self.segment {
             *columns = true;
         }
-        let count = samples as u64;
-        let front = t.accept() + self.reads.again(2, shape.rows);
+        let count = samples as u64 * shape.positions;
         cycles.occupy(layer, During::ForwardColumns, count * front);
         self.engage_read(cycles, layer, [count, 2], shape.rows, shape.levels[1]);
     }
@@ -337,7 +349,7 @@ impl Schedule {
             return;
         }
         let (t, shape) = (self.timing, self.shapes[layer]);
-        let busy = shape.positions * t.accumulate(shape.rows, shape.columns);
+        let busy = shape.drivings() * t.accumulate(shape.rows, shape.columns);
         for round in self.rounds(cycles, samples) {
             round.join(Doing::Adding, layer, t.accept() + busy, false);
         }
@@ -363,9 +375,9 @@ impl Schedule {
             let squared = t.accumulate(shape.rows, shape.columns);
             cycles.engage(layer, Part::Accumulators, squared);
         }
-        if write == Write::Now && shape.positions > 1 {
-            // products of more than one read are added up before anything is written
-            let added = shape.positions * t.accumulate(shape.rows, shape.columns);
+        if write == Write::Now && shape.drivings() > 1 {
+            // more products than one are added up before anything is written
+            let added = shape.drivings() * t.accumulate(shape.rows, shape.columns);
             cycles.engage(layer, Part::Accumulators, added);
             one += added;
         }

@@ -3,7 +3,20 @@
 
 use std::ops::Range;
 
-use super::{Operation, Side, Write, WritesDone};
+use super::{ErrorUnit, Operation, Side, Write, WritesDone};
+use crate::chip::layer::Layer;
+
+/// What an engine holds when an update begins: what plays its tape starts from here. Reads before it, as those of a rollout,
+/// count for converters that track.
+#[derive(Debug, Clone)]
+pub struct UpdateStart {
+    /// The layers: cells, ranges of converters and the codes counted for them, thresholds, what optimisers remember.
+    pub layers: Vec<Layer>,
+    /// The error unit.
+    pub unit: ErrorUnit,
+    /// Samples written one by one since ranges were last looked at.
+    pub unlooked: u64,
+}
 
 /// An operation with numbers of its own, or what happens between operations.
 #[derive(Debug, Clone, PartialEq, Eq)]

@@ -10,6 +10,6 @@ mod tile;
 
 pub use network::{Network, PartSpan, Span, TileAt};
 pub use tile::{
-    BankEvents, Command, Launch, More, Tile, TileAdc, TileBalance, TileConfig, TileEvents,
+    BankEvents, Command, Launch, More, Squares, Tile, TileAdc, TileBalance, TileConfig, TileEvents,
     TileSize, TileUnits,
 };

@@ -40,7 +40,7 @@ impl Engine {
             Adc::Finite { subtract: Subtract::Current, .. } => banks / 2,
             _ => banks,
         };
-        let all = (self.reads(layer) * this.layout.columns * down * converted) as u64;
+        let all = (self.drivings(layer) * this.layout.columns * down * converted) as u64;
         let rails = &mut self.layers[layer].rails[target.index()];
         for ([on_rail, codes], reached) in rails.iter_mut().zip(reached) {
             *on_rail += reached;

@@ -14,13 +14,14 @@ use std::ops::Range;
 use aligned_vec::AVec;
 
 use super::each::{MOVE, each};
-use super::error::{gates_of, stride_of};
+use super::error::{gates_of, packed_at, stride_of};
 use super::passes::Passes;
 use super::pulses::Pulses;
+use super::window::windows_of;
 use super::{Engine, Lines, Write};
-use crate::chip::crossbar::kernel::{self, WriteCounts};
+use crate::chip::crossbar::kernel::{self, Image, WriteCounts};
 use crate::chip::crossbar::layout::{BLOCK_ROWS, PANEL_COLUMNS};
-use crate::chip::crossbar::{Collect, Crossbar, StripMut, WriteRequest, Written};
+use crate::chip::crossbar::{Collect, Crossbar, Met, StripMut, WriteRequest, Written};
 use crate::chip::hardware::{DitherBits, DitherPattern, PulseCode, Timing, WriteScheme};
 use crate::chip::ledger::{During, Event};
 use crate::chip::population::{Polarity, Stream};
@@ -33,7 +34,7 @@ impl Engine {
             Write::Add => {
                 assert_eq!(*pending, samples.start, "samples are added in order");
                 *pending = samples.end;
-                let reads = self.reads_of(layer, &samples).len();
+                let reads = self.drivings_of(layer, &samples).len();
                 self.charge_accumulate(layer, reads);
                 // the sum of a cell is read and stored again
                 self.charge_cells(layer, Event::SramBits, 2 * SUM_BITS * reads as u64);
@@ -56,7 +57,7 @@ impl Engine {
                     self.row_sums[layer] = None;
                     return self.write_trains(layer, samples.start, shift, slots_log2);
                 }
-                let reads = self.layers[layer].spec.positions();
+                let reads = self.layers[layer].spec.drivings();
                 self.charge_accumulate(layer, reads);
                 if reads > 1 {
                     // sums of more than one product lie in memory until they are written
@@ -132,18 +133,21 @@ impl Engine {
         samples: &Range<usize>,
         shift: u32,
     ) -> Vec<(usize, WriteCounts)> {
-        let samples = &self.reads_of(layer, samples);
+        let reads = &self.reads_of(layer, samples);
+        let samples = &self.drivings_of(layer, samples);
         let stride = stride_of(samples.len());
         let sets = self.layers[layer].spec.drive_sets();
+        let convolution = self.layers[layer].spec.convolution.is_some();
         // taken, so that cells can be written while they are read
         let mut kept = std::mem::take(&mut self.registers[layer].turned);
-        let live: Vec<_> = sets
-            .iter()
-            .zip(&mut kept)
-            .map(|(&set, turned)| self.turn(layer, set, samples, turned))
-            .collect();
+        let mut live: Vec<Vec<bool>> = vec![];
+        if !convolution {
+            let sets = sets.iter().zip(&mut kept);
+            live.extend(sets.map(|(&set, turned)| self.turn(layer, set, samples, turned)));
+        }
+        let images = std::mem::take(&mut self.registers[layer].images);
         let registers = std::mem::take(&mut self.registers[layer].gates);
-        let turned = kept
+        let turned: Vec<Vec<_>> = kept
             .iter()
             .zip(&live)
             .map(|(turned, live)| {
@@ -152,7 +156,17 @@ impl Engine {
                 blocks.zip(live).map(|(block, live)| live.then_some(block)).collect()
             })
             .collect();
-        let ready = self.ready(layer, samples, turned, &registers, shift);
+        let plan = self.registers[layer].plan.clone();
+        let met = sets.iter().map(|&set| match (&plan, convolution && !samples.is_empty()) {
+            (Some(plan), true) => {
+                let image = Image::new(plan, &images[set.index()]);
+                let windows = windows_of(&self.layers[layer].spec, &self.hardware, image);
+                Met::Windows { windows, first: samples.start, count: samples.len() }
+            }
+            _ => Met::Turned(turned.get(set.index()).map_or(&[], |turned| &turned[..])),
+        });
+        let met = met.collect();
+        let ready = self.ready(layer, reads, met, &registers, shift);
         let written = if self.layers[layer].requests.are_plain() {
             self.write_at_once(layer, &ready)
         } else {
@@ -165,6 +179,7 @@ impl Engine {
             }
         }
         self.registers[layer].turned = kept;
+        self.registers[layer].images = images;
         self.registers[layer].gates = registers;
         written.into_iter().map(|(array, _, written)| (array, written.counts)).collect()
     }
@@ -173,15 +188,16 @@ impl Engine {
     fn ready<'a>(
         &self,
         layer: usize,
-        samples: &Range<usize>,
-        turned: Vec<Vec<Option<&'a [u8]>>>,
+        reads: &Range<usize>,
+        met: Vec<Met<'a>>,
         registers: &'a [Lines<i8>; 2],
         shift: u32,
     ) -> Ready<'a> {
         let this = &self.layers[layer];
-        let wiring = this.spec.wiring;
+        let (wiring, phases) = (this.spec.wiring, this.spec.driven_by.phases());
         let of = |target: Stream, polarity| {
-            let gates = gates_of(&registers[target.index()], self.reads(layer), samples);
+            let gates = gates_of(&registers[target.index()], self.reads(layer), reads);
+            let gates = if phases > 1 { both_ways(&gates, reads.len()) } else { gates };
             if self.potentiation_only { rectified(&gates, polarity) } else { gates }
         };
         let gates =
@@ -211,9 +227,9 @@ impl Engine {
             },
         });
         Ready {
-            samples: samples.len(),
-            stride: stride_of(samples.len()),
-            turned,
+            samples: phases * reads.len(),
+            stride: stride_of(phases * reads.len()),
+            met,
             gates,
             law,
             dither: (write.dither_bits, write.dither_pattern),
@@ -243,7 +259,7 @@ impl Engine {
         turned: &mut AVec<u8>,
     ) -> Vec<bool> {
         let size = BLOCK_ROWS * stride_of(samples.len());
-        let (blocks, reads) = (self.layers[layer].layout.blocks(), self.reads(layer));
+        let (blocks, reads) = (self.layers[layer].layout.blocks(), self.drivings(layer));
         turned.resize(blocks * size, 0);
         let drives = &self.registers[layer].drives[set.index()];
         let drives = drives.chunks_exact((reads * BLOCK_ROWS).max(1));
@@ -262,10 +278,11 @@ impl Engine {
 
 /// Everything that a write of a layer is made of, but its cells.
 pub(super) struct Ready<'a> {
+    /// Products of a cell: reads, or drivings of rows where drives have a sign.
     pub(super) samples: usize,
     pub(super) stride: usize,
-    /// Turned drives by set and block; `None` where all are 0.
-    pub(super) turned: Vec<Vec<Option<&'a [u8]>>>,
+    /// By set of drives.
+    pub(super) met: Vec<Met<'a>>,
     /// By array.
     gates: Vec<Cow<'a, [i8]>>,
     law: kernel::WriteLaw,
@@ -288,7 +305,7 @@ impl Ready<'_> {
     pub(super) fn request(&self, array: usize) -> WriteRequest<'_> {
         let Array { set, negate, place } = self.arrays[array];
         WriteRequest {
-            turned: &self.turned[set],
+            met: self.met[set],
             stride: self.stride,
             write: kernel::WriteLaw { negate, ..self.law },
             dither_bits: self.dither.0,
@@ -325,6 +342,21 @@ fn verified(timing: Option<Timing>, counts: WriteCounts) -> u64 {
         Some(Timing { verify: true, pulse_code: PulseCode::Amplitude, .. }) => counts.requested,
         _ => 0,
     }
+}
+
+/// Gates of so many reads as drives with a sign meet them: as they are, then, for what lies below 0, turned round.
+fn both_ways(gates: &[i8], reads: usize) -> Cow<'static, [i8]> {
+    let (from, to) = (stride_of(reads), stride_of(2 * reads));
+    let units = gates.len().checked_div(from).unwrap_or(0);
+    let mut out = vec![0; units * to];
+    for unit in 0..units {
+        for read in 0..reads {
+            let gate = gates[packed_at(from, read, unit)];
+            out[packed_at(to, 2 * read, unit)] = gate;
+            out[packed_at(to, 2 * read + 1, unit)] = -gate;
+        }
+    }
+    Cow::Owned(out)
 }
 
 /// Gates that may only potentiate: excitatory arrays take positive ones, inhibitory arrays negative ones.

@@ -4,7 +4,8 @@
 //! ```text
 //! map       [block of 64 channels][read][64]          codes of the units of a stream; read = sample P + position
 //! image     [sample][height + 2 pad][width + 2 pad][channels]                          pooled, with its border of 0
-//! drives    [block of 64 rows][read][64]              what a window meets: as the drives of a dense layer lie
+//! drives    [block of 64 rows][read][64]              what windows meet, as the drives of a dense layer lie: of some reads,
+//!                                                     put together where they are read and where they are written
 //! ```
 //!
 //! A read of a convolution is to its array what a sample is to a dense one, so everything before and behind, from
@@ -16,18 +17,32 @@ use std::ops::Range;
 
 use super::Engine;
 use super::each::{MOVE, each};
-use crate::chip::crossbar::kernel::{ConvPlan, ConvShape, Image, Pixels, Team, assemble};
+use crate::chip::crossbar::kernel::{ConvPlan, ConvShape, Image, Pixels, Team, Windows};
 use crate::chip::crossbar::layout::BLOCK_ROWS;
+use crate::chip::hardware::Hardware;
 use crate::chip::layer::{LayerSpec, Pool};
 use crate::chip::ledger::Event;
+use crate::chip::population::Stream;
 
-/// Samples whose windows one thread puts together before it looks for other work.
-const TOGETHER: usize = 4;
+mod back;
+
+pub(super) use back::{fold, folded, spread};
 
 impl Engine {
     /// Reads of a layer of the loaded samples: positions of all of them.
     pub(super) fn reads(&self, layer: usize) -> usize {
         self.samples * self.layers[layer].spec.positions()
+    }
+
+    /// Times that rows of a layer are driven for the samples that are loaded.
+    pub(super) fn drivings(&self, layer: usize) -> usize {
+        self.samples * self.layers[layer].spec.drivings()
+    }
+
+    /// The same of some samples.
+    pub(super) fn drivings_of(&self, layer: usize, samples: &Range<usize>) -> Range<usize> {
+        let drivings = self.layers[layer].spec.drivings();
+        samples.start * drivings..samples.end * drivings
     }
 
     /// Reads of some samples of a layer.
@@ -59,7 +74,7 @@ impl Engine {
                 image[at..at + line].copy_from_slice(codes);
             }
         });
-        self.assemble(0, 0);
+        self.lay_windows(0);
     }
 
     /// What the units of a layer put out becomes drives of the next one.
@@ -85,7 +100,7 @@ impl Engine {
                 pool(&spec, map, (sample, samples), pad, image);
             });
             if next.convolution.is_some() {
-                self.assemble(layer + 1, at);
+                self.lay_windows(layer + 1);
             } else {
                 let to = &mut tail[0];
                 to.drives[at].resize(samples * rows, 0);
@@ -101,51 +116,44 @@ impl Engine {
         }
     }
 
-    /// Puts together what the windows of a convolution meet, of a set of drives.
-    fn assemble(&mut self, layer: usize, set: usize) {
-        let this = &self.layers[layer];
-        let shape = this.spec.convolution.expect("only windows are put together");
-        let (samples, positions) = (self.samples, shape.positions());
-        let reads = samples * positions;
-        let registers = &mut self.registers[layer];
-        registers.drives[set].resize(this.layout.rows_padded() * reads, 0);
-        if samples == 0 {
-            return;
-        }
-        let plan = ConvPlan::new(shape, samples, Pixels::Packed);
-        let image = Image::new(&plan, &registers.images[set]);
-        let groups = samples.div_ceil(TOGETHER);
-        let mut by_group: Vec<Vec<&mut [u8]>> = (0..groups).map(|_| Vec::new()).collect();
-        for block in registers.drives[set].chunks_exact_mut(reads * BLOCK_ROWS).take(plan.blocks())
-        {
-            let groups = block.chunks_mut(TOGETHER * positions * BLOCK_ROWS);
-            by_group.iter_mut().zip(groups).for_each(|(rows, group)| rows.push(group));
-        }
-        let work = reads * plan.blocks() * BLOCK_ROWS * MOVE / 8;
-        let parts = (0..samples).step_by(TOGETHER).zip(by_group);
-        let parts = parts.map(|(sample, rows)| (sample, (sample, rows))).collect();
-        each(&mut self.team, work, samples, parts, |_, (sample, mut rows)| {
-            let last = (sample + TOGETHER).min(samples);
-            let mut line = Vec::new();
-            let positions = sample * positions..last * positions;
-            assemble(image, 0..plan.blocks(), positions, &mut line, &mut rows);
-        });
+    /// What the windows of a convolution meet, of a set of drives; nothing where no sample is loaded.
+    pub(super) fn windows(&self, layer: usize, set: Stream) -> Option<Windows<'_>> {
+        let registers = &self.registers[layer];
+        let plan = registers.plan.as_ref()?;
+        let image = Image::new(plan, &registers.images[set.index()]);
+        Some(windows_of(&self.layers[layer].spec, &self.hardware, image))
     }
 
-    /// Sums of the codes below a convolution, by channel, of a set of drives; the border adds nothing.
-    pub(super) fn channel_sums(&self, layer: usize, set: usize) -> Vec<i64> {
-        let channels = self.layers[layer].spec.convolution.map_or(1, |shape| shape.channels);
-        let mut sums = vec![0i64; channels];
-        // rows of at most 2^24 codes are added in 32 bits
-        for rows in self.registers[layer].images[set].chunks(channels << 12) {
-            let mut part = vec![0u32; channels];
-            for pixel in rows.chunks_exact(channels) {
-                part.iter_mut().zip(pixel).for_each(|(sum, &code)| *sum += u32::from(code));
-            }
-            sums.iter_mut().zip(part).for_each(|(sum, part)| *sum += i64::from(part));
-        }
-        sums
+    /// Says where windows of the loaded samples lie.
+    fn lay_windows(&mut self, layer: usize) {
+        let shape = self.layers[layer].spec.convolution.expect("only windows are laid");
+        let plan = (self.samples > 0).then(|| ConvPlan::new(shape, self.samples, Pixels::Packed));
+        self.registers[layer].plan = plan;
     }
+}
+
+/// What the windows of a convolution meet that move over an image.
+pub(super) fn windows_of<'a>(
+    spec: &LayerSpec,
+    hardware: &Hardware,
+    image: Image<'a>,
+) -> Windows<'a> {
+    let code_max = hardware.drive.bits.code_max();
+    Windows::new(image, spec.constant_row.then_some((spec.inputs, code_max)))
+}
+
+/// Sums of the codes below a convolution, by channel; the border adds nothing.
+pub(super) fn channel_sums(image: &[u8], channels: usize) -> Vec<i64> {
+    let mut sums = vec![0i64; channels];
+    // rows of at most 2^24 codes are added in 32 bits
+    for rows in image.chunks(channels << 12) {
+        let mut part = vec![0u32; channels];
+        for pixel in rows.chunks_exact(channels) {
+            part.iter_mut().zip(pixel).for_each(|(sum, &code)| *sum += u32::from(code));
+        }
+        sums.iter_mut().zip(part).for_each(|(sum, part)| *sum += i64::from(part));
+    }
+    sums
 }
 
 /// Pools the map of a sample into its image, whose border stays 0.

@@ -55,13 +55,12 @@ impl Engine {
 
     /// What the layer above read from its columns, as words.
     fn words_above(&self, layer: usize, samples: &Range<usize>) -> (Vec<i16>, u64) {
-        let above = &self.layers[layer + 1].spec;
-        let sums = &self.registers[layer + 1].backward;
-        assert_eq!(sums.len(), self.samples * above.inputs, "the layer above was read backwards");
+        let above = &self.layers[layer + 1];
+        let (sums, inputs) = (&self.registers[layer + 1].backward, above.spec.sample_inputs());
+        assert_eq!(sums.len(), self.samples * inputs, "the layer above was read backwards");
         backward_words(
-            &sums[samples.start * above.inputs..samples.end * above.inputs],
-            self.hardware.cell.level_bits.get(),
-            above.weight_max_log2,
+            &sums[samples.start * inputs..samples.end * inputs],
+            above.back_shift(&self.hardware),
             self.hardware.digital.error_bits,
         )
     }
@@ -129,18 +128,12 @@ fn bounded_all(sums: &[i32], shift: u32, bits: ErrorBits, words: &mut [i16]) -> 
 /// Row sums of a transposed read as error words.
 ///
 /// ```text
-/// S_below = sat_eb( rsh( d, level_bits - log2(weight_max) + 8 - error_bits ) )
+/// S_below = sat_eb( rsh( d, shift ) )
 /// ```
 ///
-/// A level is worth `weight_max / 2^level_bits` and a gate `2^(8 - error_bits)` of a word; a negative shift is a
-/// multiplication. The derivative's peak, `1 / (2 alpha)`, is left to the layer's rate.
-fn backward_words(
-    sums: &[i64],
-    level_bits: u32,
-    weight_max_log2: i32,
-    bits: ErrorBits,
-) -> (Vec<i16>, u64) {
-    let shift = i64::from(level_bits) - i64::from(weight_max_log2) + 8 - i64::from(bits.get());
+/// The shift is that of [`Layer::back_shift`](crate::chip::layer::Layer::back_shift); a negative one is a multiplication.
+/// The derivative's peak, `1 / (2 alpha)`, is left to the layer's rate.
+fn backward_words(sums: &[i64], shift: i64, bits: ErrorBits) -> (Vec<i16>, u64) {
     let rail = rail(bits.get());
     let mut saturated = 0;
     // no branch: which sums saturate is hard to guess
@@ -173,10 +166,10 @@ mod tests {
         let eight = ErrorBits::new(8).unwrap();
         // 8 bits, weight_max 4: 64 levels are a weight of 1
         let (words, saturated) =
-            backward_words(&[64, 32, -32, 31, 64 * 127, 64 * 128], 8, 2, eight);
+            backward_words(&[64, 32, -32, 31, 64 * 127, 64 * 128], 8 - 2, eight);
         assert_eq!((words, saturated), (vec![1, 1, 0, 0, 127, 127], 1));
         // 1 bit, weight_max 4: a level is worth 2
-        assert_eq!(backward_words(&[3, -5], 1, 2, eight).0, [6, -10]);
+        assert_eq!(backward_words(&[3, -5], 1 - 2, eight).0, [6, -10]);
     }
 
     #[test]

@@ -4,7 +4,7 @@
 //! output   S[c]                                                   the words of the output layer, as they are
 //! sum      sat_eb( rsh( sum_c S[c], shift ) )                     one word
 //! signed   sat_eb( rsh( sum_c +-S[c], shift ) )                   a word a unit, by fixed signs
-//! above    sat_eb( rsh( d, level_bits - log2(weight_max) + 8 - error_bits ) )       d: row sums of the layer above
+//! above    sat_eb( rsh( d, back shift of the layer above ) )                         d: its row sums
 //! taps     err_j = S[w_j],  or  sat_eb( rsh( sum_t S[w_jt], shift ) );  stream n takes -err_j, or err_j where streams are alike
 //! ```
 //!
@@ -52,7 +52,8 @@ pub enum WordSource {
         /// Shift of the sum.
         shift: u32,
     },
-    /// A word a unit, from the rows of the layer above: its last transposed read.
+    /// A word a unit, of a convolution one a unit and pixel behind its pool, from the rows of the layer above: its last
+    /// transposed read.
     Above,
 }
 

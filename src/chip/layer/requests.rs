@@ -10,7 +10,8 @@
 //!           A  = floor( (2 (sum of codes << 4) + B') / (2 B') )                before the first write of the layer
 //! ```
 //!
-//! A is the mean drive of a row of a set of drives, with 4 fractional bits, 0 ..= 16 x 255. Of differential pairs, each
+//! A is the mean drive of a row of a set of drives, with 4 fractional bits, 0 ..= 16 x 255, or -16 x 255 ..= 16 x 255 where
+//! drives have a sign. Of differential pairs, each
 //! cell takes the sign of its own polarity, with `k + 1`. State: A. See docs/MODEL.md, 3.10.
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
@@ -18,7 +19,7 @@ use std::borrow::Cow;
 
 use crate::chip::crossbar::kernel::MEAN_BITS;
 use crate::chip::crossbar::layout::{BLOCK_ROWS, HALF_CELLS, HALF_COLUMNS, Layout};
-use crate::chip::layer::LayerSpec;
+use crate::chip::layer::{DrivenBy, LayerSpec};
 use crate::chip::population::{Stream, Wiring};
 use crate::chip::state::{Piece, Section, StateError, Visitor};
 use crate::num::fixed::rsh;
@@ -103,6 +104,8 @@ pub struct Requests {
     /// `A` by set of drives and row, padded, or channel of what a window moves over, the constant row behind; empty where
     /// updates are not centred.
     pub(crate) means: [Vec<i32>; 2],
+    /// Whether codes, and so their means, have a sign.
+    signed: bool,
     /// The scale of the layer, of `rms`.
     pub(crate) followed: Followed,
     /// Words of each array, first and second, one a cell where sums lie (`crossbar::optimise`), padded.
@@ -115,6 +118,7 @@ impl Requests {
         optimiser: Optimiser::Plain,
         window_log2: None,
         means: [vec![], vec![]],
+        signed: false,
         followed: Followed::NOTHING,
         words: vec![],
     };
@@ -137,6 +141,7 @@ impl Requests {
     /// Centres updates with a window, of a layer of so many padded rows.
     pub(crate) fn set_window(&mut self, window_log2: Option<u32>, spec: &LayerSpec, rows: usize) {
         self.window_log2 = window_log2;
+        self.signed = spec.driven_by == DrivenBy::Signed;
         self.means = [vec![], vec![]];
         let channels = spec.convolution.map(|s| s.channels + usize::from(spec.constant_row));
         if window_log2.is_some() {
@@ -222,6 +227,7 @@ impl Requests {
             }
         }
         for (means, set) in self.means.iter_mut().zip(["p", "n"]) {
+            let most = 255 << MEAN_BITS;
             // padded where they are of rows
             let kept = means.len().min(layout.rows);
             let Some(means) = means.get_mut(..kept).filter(|means| !means.is_empty()) else {
@@ -230,7 +236,7 @@ impl Requests {
             let piece = Piece {
                 name: &format!("{layer}.row_means.{set}"),
                 section: Some(Section::RowMeans),
-                within: 0..=255 << MEAN_BITS,
+                within: if self.signed { -most..=most } else { 0..=most },
             };
             let now: Vec<i64> = means.iter().map(|&mean| mean.into()).collect();
             if let Some(new) = visitor.numbers(&piece, &now)? {
@@ -255,7 +261,7 @@ fn places(layout: Layout) -> impl Iterator<Item = usize> {
 /// A mean before the first write: that of `samples` samples whose codes add up to `codes`.
 #[must_use]
 pub fn first_mean(codes: i64, samples: i64) -> i64 {
-    (2 * (codes << MEAN_BITS) + samples) / (2 * samples).max(1)
+    (2 * (codes << MEAN_BITS) + samples).div_euclid((2 * samples).max(1))
 }
 
 /// A mean after a write of `samples` samples whose codes add up to `codes`.

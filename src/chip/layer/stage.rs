@@ -93,10 +93,18 @@ impl super::LayerSpec {
         self.convolution.map_or(1, ConvShape::positions)
     }
 
-    /// Codes of a sample below it, of a set of drives.
+    /// Times that its rows are driven for a sample, and that products of drives and gates are formed: twice a read where
+    /// drives have a sign.
+    #[must_use]
+    pub fn drivings(&self) -> usize {
+        self.positions() * self.driven_by.phases()
+    }
+
+    /// Codes of a sample below it, of a set of drives. Where they have a sign: what is above 0 of each, then what is below.
     #[must_use]
     pub fn sample_inputs(&self) -> usize {
-        self.convolution.map_or(self.inputs, |shape| shape.height * shape.width * shape.channels)
+        let inputs = self.inputs.saturating_mul(self.driven_by.phases());
+        self.convolution.map_or(inputs, |shape| shape.height * shape.width * shape.channels)
     }
 
     /// Rows and columns of what its units hand on, behind the pool.
@@ -111,6 +119,16 @@ impl super::LayerSpec {
     pub fn sample_outputs(&self) -> usize {
         let [height, width] = self.pooled();
         height * width * self.units
+    }
+
+    /// What words that come back through its rows lose by there being fewer columns than rows, as a power of two: the root of
+    /// their ratio. In a window a pixel meets `side^2 / stride^2` rows.
+    #[must_use]
+    pub(crate) fn back_gain_log2(&self) -> u32 {
+        let inputs =
+            self.convolution.map_or(self.inputs, |shape| shape.channels * shape.stride.pow(2));
+        let (inputs, units) = (inputs as u128, self.units as u128);
+        (0..).find(|&gain| units << (2 * gain) >= inputs).expect("sizes are far below 2^64")
     }
 
     /// What is wrong with the sizes of its window and pool, if anything is: what was found, and what is allowed.

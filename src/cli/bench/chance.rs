@@ -63,6 +63,13 @@ pub(super) fn images(count: usize) -> Examples {
     Examples::new(values, labels, 784, 255, 10).expect("784 values an image, 10 classes")
 }
 
+/// Images of 32 x 32 pixels with three planes of any values, with labels that mean nothing.
+pub(super) fn pictures(count: usize) -> Examples {
+    let values = bytes(4, count * 3 * 32 * 32).to_vec();
+    let labels = bytes(5, count).iter().map(|byte| byte % 10).collect();
+    Examples::new(values, labels, 3 * 32 * 32, 255, 10).expect("3072 values an image, 10 classes")
+}
+
 /// The configuration that some settings make.
 pub(super) fn config(settings: &[String]) -> Config {
     let sources = Sources { experiment: Some(("bench", "")), settings, ..Sources::default() };

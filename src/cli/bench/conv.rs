@@ -1,7 +1,8 @@
-//! Convolutions: reads of a batch of images, and sums of an update.
+//! Convolutions: reads of a batch of images, sums of an update, and updates of whole networks.
 
 use std::hint::black_box;
 
+use super::net::Net;
 use super::table::{BenchTable, Cell, Column, shown};
 use super::time::{Arm, race};
 use super::{BenchPlan, chance, giga, kernels, peak};
@@ -14,6 +15,8 @@ use crate::chip::crossbar::layout::{HALF_CELLS, HALF_COLUMNS, Layout, PANEL_COLU
 /// Channels in and out, and rows and columns of pixels.
 const SHAPES: [[usize; 3]; 4] = [[64, 64, 32], [64, 128, 32], [128, 256, 32], [128, 256, 8]];
 const BATCH: usize = 8;
+/// Images of an update of a whole network.
+const STEP_BATCH: usize = 32;
 /// Positions whose sums are used before the next are read.
 const POSITIONS: usize = 128;
 
@@ -43,7 +46,82 @@ pub(super) fn measure(plan: &BenchPlan) -> Vec<BenchTable> {
         .notes
         .push("pixels: rows, and columns, of an image; sums are of all its positions".into());
     table.notes.push("peak: the kernel's own, in registers, in the same race".into());
-    vec![table]
+    vec![table, steps(plan)]
+}
+
+/// Networks of convolutions and what they are made of: that of the paper's size, and that of `examples/cifar10_conv.toml`.
+const NETS: [(&str, [&str; 6]); 2] = [
+    (
+        "3-64-128-256, 1800",
+        [
+            "network.channels=[64,128,256]",
+            "network.hidden=[1800]",
+            "network.input='raw'",
+            "learning.rate=0.1",
+            "learning.decay=constant",
+            "learning.batch=32",
+        ],
+    ),
+    (
+        "6-60-40, 160",
+        [
+            "network.channels=[60,40]",
+            "network.hidden=[160]",
+            "network.input='white'",
+            "learning.rate=0.1",
+            "learning.decay=constant",
+            "learning.batch=32",
+        ],
+    ),
+];
+/// Updates of a run.
+const STEPS: usize = 2;
+
+const STEP_COLUMNS: &[Column] = &[
+    shown("net", "net", 0),
+    shown("kernel", "kernel", 0),
+    shown("batch", "batch", 0),
+    shown("milliseconds_best", "ms/step", 2),
+    shown("milliseconds_median", "median", 2),
+    shown("milliseconds_image", "ms/image", 3),
+    shown("gmac_per_second_best", "GMAC/s", 1),
+    shown("peak_percent", "% of peak", 1),
+];
+
+/// Whole updates of networks with convolutions, beside the peak.
+fn steps(plan: &BenchPlan) -> BenchTable {
+    let title = "conv step: one update of a whole network of convolutions, 32 x 32 pixels, its epoch loop with it";
+    let mut table = BenchTable::new("conv_step", title, STEP_COLUMNS);
+    for (name, settings) in NETS {
+        let settings: Vec<String> =
+            std::iter::once("data.set=cifar10").chain(settings).map(String::from).collect();
+        for &backend in plan.backends.iter().filter(|&&backend| backend != Backend::Scalar) {
+            let kernels = kernels(&[backend]);
+            let kernel = &kernels[0].1;
+            let pictures = chance::pictures(STEPS * STEP_BATCH);
+            let mut net = Net::of_images(&settings, [32, 32, 3], backend, &pictures);
+            let products = net.products();
+            let times = race(vec![Arm::new(|| net.epoch()), peak::arm(kernel)], plan.seconds(4.0));
+            let [best, median] = [times[0].best, times[0].median].map(|t| t / STEPS as f64);
+            let most = giga(peak::products(kernel), times[1].best);
+            let rate = giga(products, best);
+            table.row(vec![
+                name.into(),
+                backend.name().into(),
+                STEP_BATCH.into(),
+                (1e3 * best).into(),
+                (1e3 * median).into(),
+                (1e3 * best / STEP_BATCH as f64).into(),
+                rate.into(),
+                if most > 0.0 { (100.0 * rate / most).into() } else { Cell::Nothing },
+            ]);
+        }
+    }
+    table.notes.push(
+        "pixels of chance; products: cells x positions x images, of each array read and written"
+            .into(),
+    );
+    table
 }
 
 fn measure_one(

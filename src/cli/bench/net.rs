@@ -30,8 +30,27 @@ impl<'a> Net<'a> {
     pub(super) fn new(settings: &[String], backend: Backend, examples: &'a Examples) -> Self {
         let all: Vec<String> =
             COMMON.iter().map(|&s| s.into()).chain(settings.iter().cloned()).collect();
-        let experiment = chance::config(&all)
-            .experiment(examples.features(), examples.classes(), None)
+        Self::of(&all, None, backend, examples)
+    }
+
+    /// A fresh network of these settings alone, of examples that are images of a height, a width and channels.
+    pub(super) fn of_images(
+        settings: &[String],
+        image: [usize; 3],
+        backend: Backend,
+        examples: &'a Examples,
+    ) -> Self {
+        Self::of(settings, Some(image), backend, examples)
+    }
+
+    fn of(
+        settings: &[String],
+        image: Option<[usize; 3]>,
+        backend: Backend,
+        examples: &'a Examples,
+    ) -> Self {
+        let experiment = chance::config(settings)
+            .experiment(examples.features(), examples.classes(), image)
             .expect("a bench's networks fit their data");
         let batch = experiment.network.batch.get() as usize;
         let seeded =
@@ -82,7 +101,7 @@ impl<'a> Net<'a> {
         let layers = self.trainer.driver().engine().layers().iter().enumerate();
         let passes = layers.map(|(at, layer)| {
             let times = if backward && at > 0 { 3 } else { 2 };
-            times * layer.arrays.len() * layer.layout.cells()
+            times * layer.arrays.len() * layer.layout.cells() * layer.spec.positions()
         });
         (self.batch * passes.sum::<usize>()) as f64
     }

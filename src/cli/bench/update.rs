@@ -7,7 +7,7 @@ use super::time::{Arm, race};
 use super::{BenchPlan, chance, kernels, panels_timed};
 use crate::chip::crossbar::kernel::{Backend, Half, Kernel, WriteLaw};
 use crate::chip::crossbar::layout::{BLOCK_ROWS, HALF_CELLS, HALF_COLUMNS, Layout, PANEL_COLUMNS};
-use crate::chip::crossbar::{Collect, Crossbar, WriteRequest};
+use crate::chip::crossbar::{Collect, Crossbar, Met, WriteRequest};
 use crate::chip::hardware::Hardware;
 use crate::num::draw::{Place, Site};
 
@@ -117,7 +117,7 @@ fn written<'a>(
 ) -> Arm<'a> {
     let mut array = chance::array(3, layout, hardware);
     let mut request = WriteRequest {
-        turned: blocks,
+        met: Met::Turned(blocks),
         stride: BATCH,
         write: WriteLaw {
             shift: SHIFT,

@@ -137,7 +137,7 @@ impl Config {
                 initial: InitialLevels::Uniform { gain_64ths: self.gain_64ths[usize::from(last)] },
                 constant_row: match self.bias {
                     Bias::None => false,
-                    Bias::InputRow => driven_by == DrivenBy::Shared,
+                    Bias::InputRow => driven_by.is_shared(),
                     Bias::Rows => true,
                 },
                 convolution: window.map(|window| window.shape),

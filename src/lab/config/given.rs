@@ -190,6 +190,7 @@ fn policy(experiment: &PolicyExperiment) -> Vec<Given> {
         match input {
             InputCoding::Split => "split",
             InputCoding::Offset => "offset",
+            InputCoding::Signed => "signed",
         },
     );
     list.network("actor", 0, actor);
@@ -372,6 +373,7 @@ impl List {
         // data drive the first layer, activities every other one: there is no single frozen default
         match (number, driven_by) {
             (0, DrivenBy::Shared) | (1.., DrivenBy::Streams) => {}
+            (_, DrivenBy::Signed) => put("driven_by", &"signed"),
             (0, DrivenBy::Streams) => put("driven_by", &"streams"),
             (1.., DrivenBy::Shared) => put("driven_by", &"shared"),
             (_, DrivenBy::Normalised) => put("driven_by", &"normalised"),

@@ -1,7 +1,7 @@
 //! What a configuration makes of an environment: actor, critic, and the experiment around them.
 
 use super::{Config, ConfigError};
-use crate::chip::layer::InitialLevels;
+use crate::chip::layer::{DrivenBy, InitialLevels};
 use crate::learn::network::NetworkSpec;
 use crate::learn::route::Route;
 use crate::task::environment::{EnvSpec, Shown, Taken};
@@ -127,6 +127,10 @@ impl Config {
             Part::Critic => (&policy.critic_hidden, 1),
         };
         let mut network = self.network_of(policy.rows(), hidden, outputs);
+        let dense = matches!(policy.environment.shown, Shown::Dense(_));
+        if policy.input == InputCoding::Signed && dense {
+            network.layers[0].driven_by = DrivenBy::Signed;
+        }
         for (at, layer) in network.layers.iter_mut().enumerate() {
             let gain = match (part, at == hidden.len()) {
                 (_, false) => [1, 1],

@@ -43,6 +43,7 @@ pub(super) fn check(network: &NetworkSpec, hardware: &Hardware) -> Checked {
     wiring(network)?;
     batches(network, hardware)?;
     convolutions(network, hardware)?;
+    signed(network, hardware)?;
     routes(network)?;
     control(network)?;
     optimisers(network, hardware)?;
@@ -211,6 +212,7 @@ fn wiring(network: &NetworkSpec) -> Checked {
         }
         let below = at.checked_sub(1).map(|below| network.layers[below].activation);
         let drives = match below {
+            None if layer.driven_by == DrivenBy::Signed => DrivenBy::Signed,
             None => DrivenBy::Shared,
             Some(Activation::Rms) => DrivenBy::Normalised,
             Some(_) => DrivenBy::Streams,
@@ -218,6 +220,7 @@ fn wiring(network: &NetworkSpec) -> Checked {
         if layer.driven_by != drives {
             let shared = |drives: DrivenBy| match drives {
                 DrivenBy::Shared => "one set of drives",
+                DrivenBy::Signed => "one set of drives with a sign",
                 DrivenBy::Streams => "a set of drives for each stream",
                 DrivenBy::Normalised => "a set of normalised drives for each stream",
             };
@@ -264,6 +267,44 @@ fn batches(network: &NetworkSpec, hardware: &Hardware) -> Checked {
     Ok(())
 }
 
+/// Samples whose products with drives that have a sign a sum holds: two a sample.
+const SIGNED_MAX: u32 = 2048;
+
+/// What a first layer can do whose drives have a sign.
+fn signed(network: &NetworkSpec, hardware: &Hardware) -> Checked {
+    let first = &network.layers[0];
+    if first.driven_by != DrivenBy::Signed {
+        return Ok(());
+    }
+    let found = |what: &str| format!("is \"signed\" {what}");
+    if first.convolution.is_some() {
+        let allowed =
+            "a window moves over codes of one sign: use \"split\", or a dense first layer";
+        return misfit("network.input", found("beside convolutions"), allowed);
+    }
+    if first.homeostasis.is_on() {
+        let allowed = "thresholds and gains follow what drives of one sign read: use \"split\", or take them out";
+        return misfit("network.input", found("beside network.threshold or network.gain"), allowed);
+    }
+    if hardware.write.scheme != WriteScheme::Rounded {
+        let allowed = "a train has no sign of its own for what lies below 0: use \"split\", or hw.write.scheme = \"rounded\"";
+        return misfit("network.input", found("beside hw.write.scheme = \"rank1\""), allowed);
+    }
+    if network.rule == Rule::Kaneko {
+        let allowed =
+            "Kaneko's rule only potentiates, and takes drives of one sign: use another rule";
+        return misfit("network.input", found("beside rule = \"kaneko\""), allowed);
+    }
+    if network.batch.get() > SIGNED_MAX {
+        let allowed = format!(
+            "of numbers with a sign a sum takes two products a sample, and 4096 at most: use a batch of {SIGNED_MAX} or \
+             fewer, or input = \"split\""
+        );
+        return misfit("learning.batch", format!("is {}", network.batch.get()), allowed);
+    }
+    Ok(())
+}
+
 /// Reads of a sum that 32 bits hold: 65,536 products of a drive and a gate.
 const READS_MAX: u64 = 65_536;
 
@@ -288,10 +329,6 @@ fn convolutions(network: &NetworkSpec, hardware: &Hardware) -> Checked {
                 READS_MAX / positions
             );
             return misfit("learning.batch", found, allowed);
-        }
-        if network.rule == Rule::Bp {
-            let allowed = "back-propagation through convolutions is not built; use another rule, or leave network.channels out";
-            return misfit("learning.rule", "is \"bp\" beside convolutions", allowed);
         }
         if hardware.write.scheme != WriteScheme::Rounded {
             let allowed = "a train writes one read of one sample, and a sample of a convolution has many: use \"rounded\"";

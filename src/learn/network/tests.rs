@@ -3,7 +3,7 @@ use crate::chip::crossbar::kernel::ConvShape;
 use crate::chip::engine::Phase;
 use crate::chip::hardware::{Adc, AdcRange, HardwareSpec, Subtract, WriteScheme};
 use crate::chip::layer::{DrivenBy, Gain, Homeostasis, Pool};
-use crate::chip::ledger::Event;
+use crate::chip::ledger::{During, Event};
 use crate::chip::population::Wiring;
 use crate::learn::rule::Readout;
 use crate::num::fixed::{AdcBits, ResidualBits};
@@ -454,5 +454,84 @@ fn every_rule_learns_from_errors_that_a_task_hands() {
         assert!(after > before, "{rule:?}: {before} became {after}");
         let words = driver.engine_mut().output_words(&[1 << 20, 1 << 23, 0]);
         assert_eq!(words, [32, 127, 0]);
+    }
+}
+
+/// A convolution with a pool, one without, a dense layer and outputs.
+fn windows(rule: Rule, control: Control) -> NetworkSpec {
+    let mut network = match rule {
+        Rule::Dfa | Rule::Bp => baseline(rule),
+        _ => NetworkSpec { rule, ..plain() },
+    };
+    let classes = if rule == Rule::Kaneko { 1 } else { 3 };
+    let shape = ConvShape { channels: 2, height: 6, width: 6, side: 3, stride: 1, pad: 1 };
+    let [hidden, last] = &network.layers[..] else { panic!("two layers") };
+    let hidden = LayerSpec { wiring: rule.wiring(None), ..hidden.clone() };
+    let one = LayerSpec {
+        inputs: shape.rows(),
+        units: 6,
+        convolution: Some(shape),
+        pool: Pool::Max { side: 2 },
+        ..hidden.clone()
+    };
+    let above = ConvShape { channels: 6, height: 3, width: 3, pad: 0, side: 2, ..shape };
+    let driven_by = DrivenBy::Streams;
+    let two = LayerSpec {
+        inputs: above.rows(),
+        units: 5,
+        driven_by,
+        convolution: Some(above),
+        ..hidden.clone()
+    };
+    let dense = LayerSpec { inputs: 20, units: 7, driven_by, ..hidden };
+    let wiring = rule.wiring(Some(Readout::P));
+    let last = LayerSpec { inputs: 7, units: classes, wiring, driven_by, ..last.clone() };
+    network.layers = vec![one, two, dense, last];
+    network.rates = vec![Positive::new(20.0).unwrap(); 4];
+    network.mantissas = vec![RateMantissa::new(1).unwrap(); 4];
+    network.optimisers = vec![Optimiser::Plain; 4];
+    network.centred = vec![false; 4];
+    NetworkSpec { control, ..network }
+}
+
+#[test]
+fn every_rule_and_control_learns_through_convolutions() {
+    let both = |h: &mut HardwareSpec| h.tile.transposed_read = true;
+    let hardware = Hardware::reference().with(both).unwrap();
+    let rules = [Rule::Ed, Rule::EdNonDalean, Rule::Kaneko, Rule::Dfa, Rule::Bp];
+    let controls =
+        [Control::None, Control::FrozenHidden, Control::SameSignHidden, Control::SameSign];
+    let other = [Route::RandomSparse, Route::ScalarBroadcast, Route::RandomDense { shift: None }];
+    let routes = other.map(|route| (Rule::Ed, Control::None, Some(route)));
+    let cases = rules.into_iter().flat_map(|rule| controls.map(|control| (rule, control, None)));
+    for (rule, control, route) in cases.chain(routes) {
+        let mut network = windows(rule, control);
+        network.route = route.or(network.route);
+        let built = network.build(&hardware, Backend::best(), PLACE);
+        let one_stream = matches!(rule, Rule::Dfa | Rule::Bp);
+        if one_stream && matches!(control, Control::SameSign | Control::SameSignHidden) {
+            assert_eq!(built.err().map(|e| e.key()), Some("learning.control"), "{rule:?}");
+            continue;
+        }
+        let mut driver = built.unwrap_or_else(|error| panic!("{rule:?} {control:?}: {error}"));
+        let codes: Vec<u8> = (0..8 * 72).map(|at| (at * 37 % 256) as u8).collect();
+        for _ in 0..3 {
+            driver.learn(&codes, |engine, first, list| {
+                let outputs = engine.layers()[3].spec.units;
+                let samples = first..first + engine.samples();
+                list.extend(samples.flat_map(|s| {
+                    (0..outputs).map(move |o| (s * 7 + o * 11) as i32 % 23 * 12 - 130)
+                }));
+            });
+        }
+        let ledger = driver.engine().ledger(Phase::Training);
+        for layer in 0..4 {
+            let codes = driver.engine().layers()[layer].spec.wiring.pathways();
+            let moved = codes.iter().map(|pathway| {
+                ledger.get(layer, pathway.code, During::Update, Event::PulsesEffective)
+            });
+            let frozen = control == Control::FrozenHidden && layer < 3;
+            assert_eq!(moved.sum::<u64>() == 0, frozen, "{rule:?} {control:?} {route:?} {layer}");
+        }
     }
 }

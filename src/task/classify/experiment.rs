@@ -5,7 +5,7 @@ use super::coding::{Coder, Coding};
 use super::examples::Examples;
 use crate::chip::crossbar::kernel::Backend;
 use crate::chip::hardware::Hardware;
-use crate::chip::layer::LayerSpec;
+use crate::chip::layer::{DrivenBy, LayerSpec};
 use crate::learn::driver::Driver;
 use crate::learn::error::OutputError;
 use crate::learn::network::{NetworkError, NetworkPlace, NetworkSpec};
@@ -62,6 +62,10 @@ impl Experiment {
     /// When something does not, with the key that says it.
     pub fn check(&self) -> Result<(), NetworkError> {
         self.network.check(&self.hardware)?;
+        if self.network.layers[0].driven_by == DrivenBy::Signed {
+            let allowed = "values of examples have none: give the first layer one set of drives";
+            return Err(NetworkError::misfit("network.input", "gives drives a sign", allowed));
+        }
         let (last, hidden) = self.network.layers.split_last().expect("a network that was checked");
         let thresholds = hidden.iter().all(|layer| layer.homeostasis.threshold);
         let alone = self.network.error == OutputError::OneVsAll;

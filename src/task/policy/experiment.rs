@@ -4,6 +4,7 @@
 use fixed::types::U1F31;
 
 use crate::chip::hardware::Hardware;
+use crate::chip::layer::DrivenBy;
 use crate::learn::network::{NetworkError, NetworkSpec};
 use crate::num::fixed::narrow;
 use crate::num::tables::Activation;
@@ -12,7 +13,7 @@ use crate::task::environment::{EnvSpec, Shown, Taken};
 /// A number from 0 to 1, or a little more: a discount, a probability, a coefficient.
 pub type Share = U1F31;
 
-/// How numbers of an observation become drives, which have no sign.
+/// How numbers of an observation become drives. What is on a row has no sign.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum InputCoding {
@@ -20,6 +21,9 @@ pub enum InputCoding {
     Split,
     /// One row a number, half the scale added.
     Offset,
+    /// One row a number, driven with what is above 0 and then with what is below, which counts against it: two phases a read.
+    /// The first layers are [`DrivenBy::Signed`].
+    Signed,
 }
 
 /// Steps of a run, at most.
@@ -89,7 +93,7 @@ impl PolicyExperiment {
     pub const fn rows(&self, spec: &EnvSpec) -> usize {
         match (spec.shown, self.input) {
             (Shown::Dense(values), InputCoding::Split) => values.saturating_mul(2),
-            (Shown::Dense(values), InputCoding::Offset) => values,
+            (Shown::Dense(values), InputCoding::Offset | InputCoding::Signed) => values,
             (Shown::Sparse { lines, .. }, _) => lines,
         }
     }
@@ -109,9 +113,14 @@ impl PolicyExperiment {
     pub fn facing(mut self, spec: &EnvSpec) -> Self {
         self.environment = spec.id.to_string();
         let (rows, outputs) = (self.rows(spec), Self::outputs(spec));
+        // lines that are on have no sign
+        let driven_by = match (self.input, spec.shown) {
+            (InputCoding::Signed, Shown::Dense(_)) => DrivenBy::Signed,
+            _ => DrivenBy::Shared,
+        };
         for (network, units) in [(&mut self.actor, outputs), (&mut self.critic, 1)] {
             if let Some(first) = network.layers.first_mut() {
-                first.inputs = rows;
+                (first.inputs, first.driven_by) = (rows, driven_by);
             }
             if let Some(last) = network.layers.last_mut() {
                 last.units = units;
@@ -155,6 +164,16 @@ impl PolicyExperiment {
                 let found = format!("has {} inputs and {} outputs", first.inputs, last.units);
                 let allowed = format!("{} takes {} and {outputs}", spec.id, self.rows(spec));
                 return Err(NetworkError::misfit("network.hidden", found, allowed));
+            }
+            // lines that are on have no sign
+            let signed = self.input == InputCoding::Signed && matches!(spec.shown, Shown::Dense(_));
+            if (first.driven_by == DrivenBy::Signed) != signed {
+                let (has, wanted) = if signed { ("no", "one") } else { ("a", "none") };
+                let found = format!("gives {} {has} sign in the first layer", spec.id);
+                let allowed = format!(
+                    "drives of numbers with input = \"signed\" have one, and no others: give them {wanted}"
+                );
+                return Err(NetworkError::misfit("network.input", found, allowed));
             }
             if last.activation != Activation::Accumulator {
                 let allowed = "a policy reads the accumulators of both streams: use \"p-n\"";

@@ -4,6 +4,7 @@
 //! x        = clamp(standard(observation), -8, 8)             by input, with 11 bits behind the point
 //! split    : row 2i, row 2i + 1 = code(x), code(-x),         code(x) = min(floor(max(x, 0) M / 8 + 1/2), M)
 //! offset   : row i = clamp(floor((x + 8) M / 16 + 1/2), 0, M)
+//! signed   : row i = code(x), then code(-x)                   the codes of all x first
 //! sparse   : row of a line = M where it is on, else 0        M = 2^drive_bits - 1, the full code
 //! ```
 //!
@@ -108,6 +109,17 @@ pub fn split(observed: &[Observed], drive_bits: DriveBits, codes: &mut Vec<u8>) 
         let x = i32::from(x.to_bits());
         [x, -x].map(|x| rsh(x.max(0) * code_max, 14).min(code_max) as u8)
     }));
+}
+
+/// Appends what all numbers are above 0, then what they are below: the codes of [`split`] in the order of two phases.
+pub fn signed(observed: &[Observed], drive_bits: DriveBits, codes: &mut Vec<u8>) {
+    let code_max = i32::from(drive_bits.code_max());
+    for sign in [1, -1] {
+        codes.extend(observed.iter().map(|x| {
+            let x = sign * i32::from(x.to_bits());
+            rsh(x.max(0) * code_max, 14).min(code_max) as u8
+        }));
+    }
 }
 
 /// Appends one code a number: 0 at -8, the full code at 8.
@@ -235,6 +247,9 @@ pub(super) mod tests {
             split(&observed, bits, &mut codes);
             assert_eq!(codes, [77, 0, full, 0, full, 0, 0, full, 0, full, 0]);
             codes.clear();
+            signed(&observed, bits, &mut codes);
+            assert_eq!(codes, [0, 0, 0, full, full, full, full, 0, 0, 0]);
+            codes.clear();
             offset(&observed, bits, &mut codes);
             assert_eq!(codes, [0, 0, full / 2 + 1, full, full]);
             sparse(&[0, 2], 4, bits, &mut codes);
@@ -250,6 +265,9 @@ pub(super) mod tests {
             // (numerator + 1/2) / 2^11 / 8, floored
             let code = |x: i64| (2 * x.max(0) * full + (1 << 14)).div_euclid(1 << 15).min(full);
             let mut codes = Vec::new();
+            signed(&observed, drive_bits, &mut codes);
+            prop_assert_eq!(codes.iter().map(|&c| i64::from(c)).collect::<Vec<_>>(), [code(x), code(-x)]);
+            codes.clear();
             split(&observed, drive_bits, &mut codes);
             offset(&observed, drive_bits, &mut codes);
             let middle = (2 * (x + (8 << 11)) * full + (1 << 15)).div_euclid(1 << 16).clamp(0, full);

@@ -28,10 +28,10 @@ impl Coding {
         Self { input, bits, lines, values, observed: vec![] }
     }
 
-    /// Drives of a sample.
+    /// Codes of a sample: one a row, or two where drives have a sign.
     pub(super) const fn rows(&self) -> usize {
         match self.input {
-            InputCoding::Split => 2 * self.values + self.lines,
+            InputCoding::Split | InputCoding::Signed => 2 * self.values + self.lines,
             InputCoding::Offset => self.values + self.lines,
         }
     }
@@ -57,6 +57,7 @@ impl Coding {
             match self.input {
                 InputCoding::Split => observe::split(&self.observed, self.bits, codes),
                 InputCoding::Offset => observe::offset(&self.observed, self.bits, codes),
+                InputCoding::Signed => observe::signed(&self.observed, self.bits, codes),
             }
         }
     }
@@ -65,7 +66,7 @@ impl Coding {
 /// Steps that were made with one policy.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Rollout {
-    /// Drives, `[step][environment][row]`.
+    /// Codes, `[step][environment]`, as many each as [`Coding::rows`] says.
     pub(super) codes: Vec<u8>,
     /// Discrete actions.
     pub(super) choices: Vec<u16>,

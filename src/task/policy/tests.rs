@@ -210,6 +210,75 @@ fn what_is_continued_is_what_never_stopped() {
     }
 }
 
+/// The same, its observations driven with their sign.
+fn signed(mut experiment: PolicyExperiment) -> PolicyExperiment {
+    experiment.input = InputCoding::Signed;
+    let rows = experiment.rows(environment::make(&experiment.environment, 1, 1).unwrap().spec());
+    for network in [&mut experiment.actor, &mut experiment.critic] {
+        network.layers[0].driven_by = DrivenBy::Signed;
+        network.layers[0].inputs = rows;
+    }
+    experiment
+}
+
+#[test]
+fn numbers_with_a_sign_take_half_of_the_rows_and_twice_the_reads() {
+    for (id, rule) in [(IDS[0], Rule::Ed), (IDS[1], Rule::Ed), (IDS[1], Rule::Bp)] {
+        let split = experiment(id, rule, None);
+        let experiment = signed(split.clone());
+        assert_eq!(2 * experiment.actor.layers[0].inputs, split.actor.layers[0].inputs);
+        let mut wanted = trainer(&experiment);
+        let told = train(&mut wanted, 2);
+        let mut other =
+            PolicyTrainer::new(experiment.clone(), Backend::Scalar, EnvSource::Native).unwrap();
+        assert_eq!(train(&mut other, 2), told);
+        assert_eq!(book(&mut other).lines, book(&mut wanted).lines);
+
+        let mut two = trainer(&split);
+        let _ = train(&mut two, 2);
+        let reads = |trainer: &mut PolicyTrainer| {
+            let engine = trainer.networks_mut().remove(0).engine_mut();
+            let (ledger, layer) = (engine.ledger(Phase::Training), &engine.layers()[0]);
+            let codes = layer.spec.wiring.pathways().iter().map(|pathway| pathway.code);
+            let of = |event| codes.clone().map(|code| ledger.of_pathway(0, code, event)).sum();
+            (layer.layout.rows as u64, [Event::DacSlices, Event::Accumulates].map(of))
+        };
+        let ((rows, [driven, added]), (rows_split, [driven_split, added_split])): (
+            (u64, [u64; 2]),
+            (u64, [u64; 2]),
+        ) = (reads(&mut wanted), reads(&mut two));
+        assert_eq!(driven * rows_split, 2 * driven_split * rows);
+        assert_eq!(added * rows_split, 2 * added_split * rows);
+    }
+}
+
+#[test]
+fn a_sign_stands_where_numbers_have_one_and_nowhere_else() {
+    let refused = |experiment: &PolicyExperiment, words: &str| {
+        let source = EnvSource::Native;
+        let error = PolicyTrainer::new(experiment.clone(), Backend::best(), source).err();
+        let error = error.expect("it is refused").to_string();
+        assert!(error.contains(words), "{error}");
+    };
+    let good = signed(experiment(IDS[1], Rule::Ed, None));
+    let mut unsigned = good.clone();
+    unsigned.actor.layers[0].driven_by = DrivenBy::Shared;
+    refused(&unsigned, "`network.input` gives Pendulum-v1 no sign");
+    let mut split = experiment(IDS[1], Rule::Ed, None);
+    split.critic.layers[0].driven_by = DrivenBy::Signed;
+    refused(&split, "`network.input` gives Pendulum-v1 a sign");
+    let mut large = good.clone();
+    for network in [&mut large.actor, &mut large.critic] {
+        network.batch = Batch::new(2049).unwrap();
+    }
+    refused(&large, "use a batch of 2048 or fewer");
+    let mut above = good.clone();
+    above.actor.layers[1].driven_by = DrivenBy::Signed;
+    refused(&above, "gives layer");
+    let gridworld = environment::make("Foray-v0", 1, 1).unwrap().spec().clone();
+    let _ = trainer(&good.facing(&gridworld));
+}
+
 #[test]
 fn a_record_gives_the_same_state_without_the_environment() {
     for (id, method) in [(IDS[0], None), (IDS[1], None), (IDS[0], Some(EVOLUTION))] {

@@ -208,6 +208,7 @@ fn network(c: &mut Choices<'_>, inputs: usize, outputs: usize) -> NetworkSpec {
             (false, _) => Wiring::Single,
         },
         driven_by: match (at == 0) != c.one_in(64) {
+            true if c.one_in(64) => DrivenBy::Signed,
             true => DrivenBy::Shared,
             false => DrivenBy::Streams,
         },

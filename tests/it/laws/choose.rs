@@ -222,14 +222,17 @@ pub(crate) fn net(sides: impl Strategy<Value = Vec<usize>>) -> impl Strategy<Val
             let (mut specs, mut deliveries) = (vec![], vec![]);
             for (at, (activation, weight_max_log2, constant_row)) in layers.into_iter().enumerate()
             {
+                // trains, and rules that only potentiate, take drives of one sign
+                let rounded = hardware.write.scheme == WriteScheme::Rounded;
+                let signed = at == 0 && rounded && !potentiation_only && seed % 5 == 0;
                 specs.push(LayerSpec {
                     inputs: sides[at],
                     units: sides[at + 1],
                     wiring: if at + 1 == count { last } else { hidden },
-                    driven_by: if at == 0 || shared[at] {
-                        DrivenBy::Shared
-                    } else {
-                        DrivenBy::Streams
+                    driven_by: match at == 0 || shared[at] {
+                        _ if signed => DrivenBy::Signed,
+                        true => DrivenBy::Shared,
+                        false => DrivenBy::Streams,
                     },
                     activation,
                     weight_max_log2,
@@ -361,6 +364,10 @@ pub(crate) fn timed_net() -> impl Strategy<Value = Net> {
             }
             h.timing = Some(timing);
         });
+        if trains.is_some() {
+            // trains are of drives of one sign
+            net.specs[0].driven_by = DrivenBy::Shared;
+        }
         net
     })
 }

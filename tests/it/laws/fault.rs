@@ -59,6 +59,10 @@ pub(crate) enum Fault {
     RailCounts,
     /// The excitatory bank is subtracted from the inhibitory one.
     SubtractSwapped,
+    /// What is read below 0 is added.
+    BelowAdds,
+    /// What lies below 0 moves cells as what lies above.
+    BelowMovesAlike,
     /// Slices are added without their weight.
     SliceShiftMissing,
     /// The last row of a tile is not read.
@@ -97,7 +101,7 @@ pub(crate) enum Fault {
 
 impl Fault {
     /// All of them.
-    pub(crate) const ALL: [Self; 45] = [
+    pub(crate) const ALL: [Self; 47] = [
         Self::WrapAtCeiling,
         Self::FloorOffByOne,
         Self::CeilingOffByOne,
@@ -126,6 +130,8 @@ impl Fault {
         Self::RailOffByOne,
         Self::RailCounts,
         Self::SubtractSwapped,
+        Self::BelowAdds,
+        Self::BelowMovesAlike,
         Self::SliceShiftMissing,
         Self::TileEdgeLost,
         Self::HeadroomForgotten,

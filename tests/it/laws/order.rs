@@ -3,7 +3,7 @@
 use dalean::chip::crossbar::kernel::Backend;
 use dalean::chip::engine::{Engine, Operation, Side, Write};
 use dalean::chip::hardware::Adc;
-use dalean::chip::layer::WordSource;
+use dalean::chip::layer::{DrivenBy, WordSource};
 use proptest::prelude::*;
 use proptest::strategy::ValueTree;
 use proptest::test_runner::TestRunner;
@@ -16,6 +16,7 @@ fn waiting() -> Engine {
     let mut runner = TestRunner::deterministic();
     let mut net = net(Just(vec![3, 2, 2])).new_tree(&mut runner).unwrap().current();
     net.change(|h| h.adc = Adc::Ideal);
+    net.specs[0].driven_by = DrivenBy::Shared;
     net.deliveries.iter_mut().for_each(|delivery| delivery.source = WordSource::Output);
     let mut engine = engine(&net, Backend::Scalar);
     engine.execute(&Operation::LoadDrives { codes: &[0; 6] });

@@ -5,7 +5,7 @@ use std::ops::Range;
 use dalean::chip::crossbar::kernel::Backend;
 use dalean::chip::engine::{Calibration, Engine, Operation, Phase, Side, Write, WritesDone};
 use dalean::chip::hardware::{Adc, AdcRange, WriteScheme};
-use dalean::chip::layer::{Layer, WordSource};
+use dalean::chip::layer::{DrivenBy, Layer, WordSource};
 use dalean::chip::ledger::Ledger;
 use dalean::chip::population::Stream;
 use dalean::learn::error::ErrorUnit;
@@ -140,7 +140,19 @@ impl Script<'_> {
             3 if numbers.within(0, 9) > 0 => 0,
             _ => numbers.within(0, greatest),
         };
-        (0..self.samples * inputs).map(code).map(|code| code as u8).collect()
+        let codes: Vec<_> = (0..self.samples * inputs).map(code).map(|code| code as u8).collect();
+        if self.net.specs[0].driven_by != DrivenBy::Signed {
+            return codes;
+        }
+        let mut both = Vec::with_capacity(2 * codes.len());
+        for row in codes.chunks_exact(inputs) {
+            let below: Vec<_> = row.iter().map(|_| numbers.within(0, 1) == 1).collect();
+            for side in [false, true] {
+                let of = row.iter().zip(&below);
+                both.extend(of.map(|(&code, &below)| if below == side { code } else { 0 }));
+            }
+        }
+        both
     }
 
     fn loaded(&mut self) {
@@ -399,9 +411,12 @@ fn shadow_execute(shadow: &mut Shadow, pending: &mut [usize], op: &Op) -> Found 
         Op::Backward(layer) => shadow.forward_columns(*layer),
         Op::Error { layer, samples, words, .. } => shadow.error(*layer, samples.clone(), words),
         Op::Update { layer, write, samples, shift } => {
+            let phases = shadow.phases(*layer);
             match write {
-                Write::Add => shadow.move_bits(*layer, samples.len() as u64, 0),
+                Write::Add => shadow.move_bits(*layer, phases * samples.len() as u64, 0),
                 Write::Program => shadow.move_bits(*layer, 1, 1),
+                // two products are added up before they are written
+                Write::Now if phases > 1 => shadow.move_bits(*layer, phases + 1, 1),
                 Write::Now => shadow.move_bits(*layer, 0, 1),
             }
             if *write != Write::Program {

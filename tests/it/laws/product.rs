@@ -3,7 +3,7 @@
 use dalean::chip::crossbar::kernel::Backend;
 use dalean::chip::engine::{Operation, Phase, Side};
 use dalean::chip::hardware::{Adc, AdcRange, Subtract};
-use dalean::chip::layer::WordSource;
+use dalean::chip::layer::{DrivenBy, WordSource};
 use dalean::chip::ledger::Event;
 use dalean::chip::population::{Stream, Wiring};
 use dalean::num::fixed::AdcBits;
@@ -27,6 +27,7 @@ fn transposed(w: &[Vec<i64>]) -> Vec<Vec<i64>> {
 fn ideal(mut net: Net) -> Net {
     net.change(|h| (h.adc, h.tile.transposed_read) = (Adc::Ideal, true));
     net.specs[0].activation = Activation::Identity;
+    net.specs[0].driven_by = DrivenBy::Shared;
     net.specs[0].constant_row = false;
     if net.specs[0].wiring.pairs(Stream::P).len() > 1 {
         // rows that several pairs share are not read backwards

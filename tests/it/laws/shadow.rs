@@ -188,9 +188,19 @@ impl Shadow {
         row
     }
 
+    /// Times that rows are driven for a read: numbers with a sign are told above 0, then below.
+    pub(crate) fn phases(&self, layer: usize) -> u64 {
+        if self.layers[layer].spec.driven_by == DrivenBy::Signed { 2 } else { 1 }
+    }
+
     pub(crate) fn load_drives(&mut self, codes: &[u8]) {
-        let rows = codes.chunks_exact(self.layers[0].spec.inputs);
-        let rows: Table = rows.map(|row| row.iter().map(|&x| i64::from(x)).collect()).collect();
+        let inputs = self.layers[0].spec.inputs;
+        let number = |row: &[u8], at: usize| match row.get(inputs + at) {
+            Some(&below) => i64::from(row[at]) - i64::from(below),
+            None => i64::from(row[at]),
+        };
+        let rows = codes.chunks_exact(inputs * self.phases(0) as usize);
+        let rows: Table = rows.map(|row| (0..inputs).map(|at| number(row, at)).collect()).collect();
         self.samples = rows.len();
         self.loaded[self.phase as usize] += rows.len() as u64;
         let rows: Table = rows.into_iter().map(|row| self.with_constant(0, row)).collect();
@@ -219,7 +229,7 @@ impl Shadow {
         bank: usize,
         at: [usize; 2],
         rows: Range<usize>,
-        s: u32,
+        (phase, s): (u64, u32),
     ) -> i64 {
         let this = &self.layers[layer];
         let [sample, column] = at;
@@ -232,8 +242,9 @@ impl Shadow {
             rows.end -= 1;
         }
         rows.map(|row| {
-            let slice = (drives[row] >> (s * self.net.hardware.drive.dac_bits)) & mask;
-            this.arrays[bank].level[row][column] * if whole { drives[row] } else { slice }
+            let code = if phase == 0 { drives[row].max(0) } else { (-drives[row]).max(0) };
+            let slice = (code >> (s * self.net.hardware.drive.dac_bits)) & mask;
+            this.arrays[bank].level[row][column] * if whole { code } else { slice }
         })
         .sum()
     }
@@ -244,7 +255,7 @@ impl Shadow {
         let hw = self.net.hardware.clone();
         let (units, t) = (self.layers[layer].spec.units, target.index());
         let pairs = self.layers[layer].spec.wiring.pairs(target);
-        let tiles = self.row_tiles(layer);
+        let (tiles, phases) = (self.row_tiles(layer), self.phases(layer));
         let slices =
             if hw.adc == Adc::Ideal { 1 } else { hw.drive.bits.get().div_ceil(hw.drive.dac_bits) };
         let mut seen = vec![vec![]; slices as usize];
@@ -257,10 +268,13 @@ impl Shadow {
                 let mut acc = 0;
                 let reads = tiles.iter().flat_map(|tile| (0..slices).map(move |s| (tile, s)));
                 let reads = reads.flat_map(|read| (0..pairs.len()).map(move |pair| (read, pair)));
-                for ((tile, s), pair) in reads {
+                let reads = reads.flat_map(|read| (0..phases).map(move |phase| (read, phase)));
+                for (((tile, s), pair), phase) in reads {
                     let (at, banks, saturated) =
                         ([sample, column], pairs[pair], &mut saturated[pair]);
-                    let [e, i] = banks.map(|bank| self.current(layer, bank, at, tile.clone(), s));
+                    let driven = (phase, s);
+                    let [e, i] =
+                        banks.map(|bank| self.current(layer, bank, at, tile.clone(), driven));
                     let weight =
                         if self.is(Fault::SliceShiftMissing) { 0 } else { s * hw.drive.dac_bits };
                     let d = match hw.adc {
@@ -299,6 +313,8 @@ impl Shadow {
                             e - i
                         }
                     };
+                    let adds = phase == 0 || self.is(Fault::BelowAdds);
+                    let d = if adds { d } else { -d };
                     acc += (if self.is(Fault::SubtractSwapped) { -d } else { d }) << weight;
                 }
                 row.push(acc);
@@ -368,7 +384,7 @@ impl Shadow {
         let (rows, columns) = (self.layers[layer].rows, self.layers[layer].spec.units);
         let slices = u64::from(hw.drive.bits.get().div_ceil(hw.drive.dac_bits));
         let current = matches!(hw.adc, Adc::Finite { subtract: Subtract::Current, .. });
-        let times = self.samples as u64 * slices;
+        let times = self.samples as u64 * slices * self.phases(layer);
         for &target in wiring.targets() {
             for (bank, &at) in wiring.banks(target).iter().enumerate() {
                 let code = self.code(layer, at);

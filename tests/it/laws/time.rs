@@ -13,7 +13,7 @@ use super::play::{self, Op};
 pub(crate) fn law(net: &Net, choices: &[Choice], seed: u64) -> Result<(), String> {
     let ops = play::script_of(net, choices, false);
     let samples = ops.iter().map(|op| match op {
-        Op::Drives(codes) => codes.len() / net.specs[0].inputs,
+        Op::Drives(codes) => codes.len() / net.specs[0].sample_inputs(),
         _ => 0,
     });
     let slots = samples.max().unwrap_or(0).max(1);

@@ -69,13 +69,21 @@ fn coding(s: &Value) -> Coding {
     }
 }
 
-fn layer(l: usize, last: bool, a: &Value) -> LayerSpec {
+fn rule(s: &Value) -> Rule {
+    if text(&s["rule"]) == "bp" { Rule::Bp } else { Rule::Ed }
+}
+
+fn layer(l: usize, last: bool, rule: Rule, a: &Value) -> LayerSpec {
     let size = |name: &str| int(&a[name]) as usize;
     let below = ints(&a["below"]);
     LayerSpec {
         inputs: size("fan_in"),
         units: size("units"),
-        wiring: if last { Wiring::DualReadout } else { Wiring::Dual },
+        wiring: match rule {
+            Rule::Bp => Wiring::Single,
+            _ if last => Wiring::DualReadout,
+            _ => Wiring::Dual,
+        },
         driven_by: if l == 0 { DrivenBy::Shared } else { DrivenBy::Streams },
         activation: match text(&a["act"]) {
             "ramp" => Activation::Ramp,
@@ -83,7 +91,9 @@ fn layer(l: usize, last: bool, a: &Value) -> LayerSpec {
             _ => activation(&a["act"], &a["alpha"]),
         },
         weight_max_log2: int(&a["weight_max"]).ilog2() as i32,
-        initial: InitialLevels::Uniform { gain_64ths: if last { [64, 64] } else { [96, 32] } },
+        initial: InitialLevels::Uniform {
+            gain_64ths: if last || rule == Rule::Bp { [64, 64] } else { [96, 32] },
+        },
         constant_row: false,
         convolution: a["side"].is_i64().then(|| ConvShape {
             height: below[0] as usize,
@@ -123,16 +133,18 @@ fn experiment(s: &Value) -> Experiment {
     let taps = int(&s["taps"]) as usize;
     let shift = (taps > 1).then(|| int(&s["tap_shift"]) as u32);
     let last = layers.len() - 1;
+    let rule = rule(s);
+    let back = rule == Rule::Bp;
     let network = NetworkSpec {
-        layers: layers.iter().enumerate().map(|(l, a)| layer(l, l == last, a)).collect(),
-        rule: Rule::Ed,
+        layers: layers.iter().enumerate().map(|(l, a)| layer(l, l == last, rule, a)).collect(),
+        rule,
         mode: mode(s),
         error: match text(&s["error"]) {
             "softmax" => OutputError::Softmax { temperature: positive(&s["temperature"]) },
             _ => OutputError::OneVsAll,
         },
         centre: centre(s),
-        route: Some(Route::Modulo { taps, shift }),
+        route: (!back).then_some(Route::Modulo { taps, shift }),
         batch: Batch::new(int(&s["batch"])).unwrap(),
         mantissas: layers.iter().map(|a| RateMantissa::new(int(&a["mantissa"])).unwrap()).collect(),
         rates: layers.iter().map(|a| positive(&a["rate"])).collect(),
@@ -147,7 +159,7 @@ fn experiment(s: &Value) -> Experiment {
     };
     Experiment {
         seed: text(&s["seed_decimal"]).parse().unwrap(),
-        hardware: hardware(s),
+        hardware: hardware(s).with(|h| h.tile.transposed_read = back).unwrap(),
         network,
         epochs: int(&s["epochs"]) as u32,
         coding: coding(s),
@@ -238,7 +250,7 @@ fn convolutions_equal_the_oracle_on_every_back_end() {
     let golden: Value =
         serde_json::from_str(include_str!("../../golden/golden_conv.json")).unwrap();
     let cases = golden["cases"].as_array().unwrap();
-    assert!(cases.len() >= 19);
+    assert!(cases.len() >= 23);
     let mut failures = Vec::new();
     for backend in Backend::available() {
         for case in cases {

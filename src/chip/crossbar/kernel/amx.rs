@@ -189,6 +189,8 @@ pub(super) const OPS: Ops = Ops {
     read_columns,
     accumulate,
     accumulate_drawn: Some(accumulate_drawn),
+    accumulate_reads: None,
+    drive_sums: None,
     peak: peak::amx,
     ..avx512::OPS
 };

@@ -64,7 +64,7 @@ pub(super) const OPS: Ops = Ops {
     levels,
     offset,
     index_squares,
-    centre,
+    centre: normalise::centre,
     gate_totals,
     drive_totals,
     squares: normalise::squares,

@@ -29,6 +29,7 @@ mod fused;
 mod normalise;
 mod one_sample;
 mod peaks;
+mod reads;
 mod turn;
 mod units;
 
@@ -56,15 +57,19 @@ impl Avx512 {
 /// Handed out by the token: functions compiled for its features.
 pub(super) const OPS: Ops = Ops {
     read,
+    drive_sums: Some(drive_sums),
     read_conv: conv::read,
     convert: units::convert,
     look_up: units::look_up,
     difference: units::difference,
     latch: units::latch,
     gate: units::gate,
+    gate_shared: Some(units::gate_shared),
+    put_out: Some(units::put_out),
     turn: turn::turn,
     read_columns: columns::read_columns,
     accumulate,
+    accumulate_reads: Some(reads::accumulate),
     dither: dither::dither,
     dither_words: dither::dither_words,
     may_move: fused::may_move,
@@ -74,7 +79,7 @@ pub(super) const OPS: Ops = Ops {
     index_squares,
     stream_squares: normalise::stream_squares,
     scale: normalise::scale,
-    centre,
+    centre: normalise::centre,
     gate_totals,
     drive_totals,
     squares: normalise::squares,
@@ -89,12 +94,19 @@ pub(super) const OPS: Ops = Ops {
 
 twins!("avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi,popcnt");
 
-/// Levels against drives.
+/// Levels against drives, from the sums of drives on.
 const READ: u8 = 0;
+/// The same, added to what is there.
+const MORE: u8 = 3;
 /// Gates against drives.
 const GATES: u8 = 1;
 /// Turned levels against gates.
 const TURNED: u8 = 2;
+
+/// Streams that lie as far from one another as a walk says. Where that is known beforehand, their places need no arithmetic.
+const ANY: usize = 0;
+/// Bytes by which cells are asked for before they are met: two blocks.
+const AHEAD: usize = 2 * BLOCK_CELLS;
 
 /// Where the bytes of [`dots`] lie: streams of words, and vectors in runs.
 #[derive(Clone, Copy)]
@@ -103,6 +115,8 @@ struct Walk {
     runs: usize,
     /// Vectors of a run, and words of a stream it meets.
     quads: usize,
+    /// Those of the last run.
+    last: usize,
     /// Bytes from a run of vectors to the next.
     run: usize,
     /// Bytes from a vector to the one beside it.
@@ -143,26 +157,36 @@ fn store_sums(sums: &mut [i32; 16], v: __m512i) {
     unsafe { _mm512_storeu_si512(sums.as_mut_ptr().cast(), v) }
 }
 
-/// `out[i][h] = sum over runs and quads of dot4(stream i, vector h)`, added to what is there by `READ`.
+/// `out[i][h] = sum over runs and quads of dot4(stream i, vector h)`, from `128 * sums[i]` on by `READ`, and added to what is
+/// there by `MORE`.
 ///
 /// `CHAINS` sums a lane hide the latency of the instruction where there are few streams; the quads
 /// must divide by it.
 #[inline]
 #[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi,popcnt")]
-fn dots<const KIND: u8, const N: usize, const H: usize, const CHAINS: usize>(
+fn dots<
+    const KIND: u8,
+    const N: usize,
+    const H: usize,
+    const CHAINS: usize,
+    const STRIDE: usize,
+>(
     walk: Walk,
     streams: &[u8],
     vectors: &[u8],
+    sums: &[i32],
     out: &mut [i32],
 ) {
-    let Walk { runs, quads, run, half, words, stride, out: out_stride } = walk;
+    let Walk { runs, quads, last, run, half, words, stride, out: out_stride } = walk;
+    let stride = if STRIDE == ANY { stride } else { STRIDE };
     if runs * quads == 0 {
-        if KIND != READ {
+        if KIND != MORE {
             out.fill(0);
         }
         return;
     }
-    assert!(quads.is_multiple_of(CHAINS), "no vector is left over");
+    assert!(quads.is_multiple_of(CHAINS) && last.is_multiple_of(CHAINS), "no vector is left over");
+    assert!(last <= quads, "the last run is no longer than others");
     assert!(
         streams.len() >= (runs - 1) * words + (N - 1) * stride + quads * 4,
         "every stream has its words"
@@ -171,28 +195,35 @@ fn dots<const KIND: u8, const N: usize, const H: usize, const CHAINS: usize>(
     assert!(out.len() >= (N - 1) * out_stride + H * 16, "every sum has its place");
     let flip = _mm512_set1_epi8(i8::MIN);
     let mut acc = [[[_mm512_setzero_si512(); H]; N]; CHAINS];
+    if KIND == READ {
+        for (acc, &sum) in acc[0].iter_mut().zip(&sums[..N]) {
+            *acc = [_mm512_set1_epi32(128 * sum); H];
+        }
+    }
     for r in 0..runs {
+        let quads = if r + 1 == runs { last } else { quads };
         for step in 0..quads / CHAINS {
             for (chain, acc) in acc.iter_mut().enumerate() {
                 let quad = step * CHAINS + chain;
                 let mut w = [flip; H];
                 for (h, w) in w.iter_mut().enumerate() {
-                    // SAFETY: r < runs, h < H and quad < quads, so the second assertion above bounds the
+                    // SAFETY: r < runs, h < H and quad < quads, so the third assertion above bounds the
                     // last of these 64 bytes.
-                    *w = unsafe {
-                        _mm512_loadu_si512(
-                            vectors.as_ptr().add(r * run + h * half + quad * 64).cast(),
-                        )
-                    };
-                    if KIND == READ {
+                    let at = unsafe { vectors.as_ptr().add(r * run + h * half + quad * 64) };
+                    // SAFETY: the 64 bytes at `at` lie inside `vectors`, as above.
+                    *w = unsafe { _mm512_loadu_si512(at.cast()) };
+                    if KIND == READ || KIND == MORE {
                         *w = _mm512_xor_si512(*w, flip);
+                        // cells of large arrays come from far away, and are met in the order in which they lie
+                        _mm_prefetch::<_MM_HINT_T0>(at.wrapping_add(AHEAD).cast());
                     }
                 }
+                // SAFETY: r < runs and quad < quads, so the second assertion above says that bytes lie there.
+                let first = unsafe { streams.as_ptr().add(r * words + quad * 4) };
                 for (i, acc) in acc.iter_mut().enumerate() {
-                    let at = r * words + i * stride + quad * 4;
-                    // SAFETY: r < runs, i < N and quad < quads, so the first assertion above bounds the last of
-                    // these 4 bytes; the read asks for no alignment.
-                    let word = unsafe { streams.as_ptr().add(at).cast::<i32>().read_unaligned() };
+                    // SAFETY: i < N, so the second assertion above bounds the last of these 4 bytes; the read asks for
+                    // no alignment.
+                    let word = unsafe { first.add(i * stride).cast::<i32>().read_unaligned() };
                     let x = _mm512_set1_epi32(word);
                     for (acc, w) in acc.iter_mut().zip(w) {
                         *acc = if KIND == TURNED {
@@ -211,9 +242,9 @@ fn dots<const KIND: u8, const N: usize, const H: usize, const CHAINS: usize>(
             for acc in &acc[1..] {
                 sum = _mm512_add_epi32(sum, acc[i][h]);
             }
-            // SAFETY: i < N and h < H, so the third assertion above bounds these 16 sums.
+            // SAFETY: i < N and h < H, so the fourth assertion above bounds these 16 sums.
             let at = unsafe { out.as_mut_ptr().add(i * out_stride + h * 16) };
-            if KIND == READ {
+            if KIND == MORE {
                 // SAFETY: the 16 sums at `at` lie inside `out`, as above.
                 sum = _mm512_add_epi32(sum, unsafe { _mm512_loadu_si512(at.cast()) });
             }
@@ -223,33 +254,36 @@ fn dots<const KIND: u8, const N: usize, const H: usize, const CHAINS: usize>(
     }
 }
 
-/// [`dots`] with two vectors side by side for any number of samples, in even groups of at most 12.
+/// [`dots`] with two vectors side by side for any number of samples, in even groups of at most 12. `sums` are those of all
+/// samples by `READ`, and nothing otherwise.
 #[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi,popcnt")]
-fn dots_batch<const KIND: u8>(
+fn dots_batch<const KIND: u8, const STRIDE: usize>(
     walk: Walk,
     samples: usize,
     streams: &[u8],
     vectors: &[u8],
+    sums: &[i32],
     out: &mut [i32],
 ) {
     let groups = samples.div_ceil(12);
     for group in 0..groups {
         let (from, to) = (samples * group / groups, samples * (group + 1) / groups);
         let x = &streams[from * walk.stride..];
+        let sums = sums.get(from..to).unwrap_or_default();
         let out = &mut out[from * walk.out..];
         match to - from {
-            1 => dots::<KIND, 1, 2, 4>(walk, x, vectors, out),
-            2 => dots::<KIND, 2, 2, 4>(walk, x, vectors, out),
-            3 => dots::<KIND, 3, 2, 2>(walk, x, vectors, out),
-            4 => dots::<KIND, 4, 2, 2>(walk, x, vectors, out),
-            5 => dots::<KIND, 5, 2, 1>(walk, x, vectors, out),
-            6 => dots::<KIND, 6, 2, 1>(walk, x, vectors, out),
-            7 => dots::<KIND, 7, 2, 1>(walk, x, vectors, out),
-            8 => dots::<KIND, 8, 2, 1>(walk, x, vectors, out),
-            9 => dots::<KIND, 9, 2, 1>(walk, x, vectors, out),
-            10 => dots::<KIND, 10, 2, 1>(walk, x, vectors, out),
-            11 => dots::<KIND, 11, 2, 1>(walk, x, vectors, out),
-            12 => dots::<KIND, 12, 2, 1>(walk, x, vectors, out),
+            1 => dots::<KIND, 1, 2, 4, STRIDE>(walk, x, vectors, sums, out),
+            2 => dots::<KIND, 2, 2, 4, STRIDE>(walk, x, vectors, sums, out),
+            3 => dots::<KIND, 3, 2, 2, STRIDE>(walk, x, vectors, sums, out),
+            4 => dots::<KIND, 4, 2, 2, STRIDE>(walk, x, vectors, sums, out),
+            5 => dots::<KIND, 5, 2, 1, STRIDE>(walk, x, vectors, sums, out),
+            6 => dots::<KIND, 6, 2, 1, STRIDE>(walk, x, vectors, sums, out),
+            7 => dots::<KIND, 7, 2, 1, STRIDE>(walk, x, vectors, sums, out),
+            8 => dots::<KIND, 8, 2, 1, STRIDE>(walk, x, vectors, sums, out),
+            9 => dots::<KIND, 9, 2, 1, STRIDE>(walk, x, vectors, sums, out),
+            10 => dots::<KIND, 10, 2, 1, STRIDE>(walk, x, vectors, sums, out),
+            11 => dots::<KIND, 11, 2, 1, STRIDE>(walk, x, vectors, sums, out),
+            12 => dots::<KIND, 12, 2, 1, STRIDE>(walk, x, vectors, sums, out),
             _ => unreachable!("a group has 1 to 12 samples"),
         }
     }
@@ -268,16 +302,20 @@ fn drive_sum(drives: Drives<'_>, sample: usize) -> i32 {
 }
 
 #[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi,popcnt")]
+fn drive_sums(drives: Drives<'_>, sums: &mut [i32]) {
+    sums.iter_mut().enumerate().for_each(|(sample, sum)| *sum = drive_sum(drives, sample));
+}
+
+#[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi,popcnt")]
 pub(super) fn read(cells: &[u8], drives: Drives<'_>, samples: Range<usize>, out: &mut [i32]) {
     if samples.len() <= 4 {
         return few_samples::read(cells, drives, samples, out);
     }
-    for (sample, out) in samples.clone().zip(out.as_chunks_mut::<32>().0) {
-        out.fill(128 * drive_sum(drives, sample));
-    }
     let walk = Walk {
         runs: drives.blocks(),
         quads: 16,
+        // what no row of the last block drives is passed over
+        last: drives.last_quads(),
         run: BLOCK_CELLS,
         half: HALF_CELLS,
         words: drives.samples() * BLOCK_ROWS,
@@ -285,7 +323,22 @@ pub(super) fn read(cells: &[u8], drives: Drives<'_>, samples: Range<usize>, out:
         out: 32,
     };
     let streams = &drives.codes()[samples.start * BLOCK_ROWS..];
-    dots_batch::<READ>(walk, samples.len(), streams, cells, out);
+    if let Some(sums) = drives.sums() {
+        let sums = &sums[samples.clone()];
+        return dots_batch::<READ, BLOCK_ROWS>(walk, samples.len(), streams, cells, sums, out);
+    }
+    let (mut few, mut many) = ([0; 32], Vec::new());
+    let sums = match few.get_mut(..samples.len()) {
+        Some(few) => few,
+        None => {
+            many.resize(samples.len(), 0);
+            &mut many[..]
+        }
+    };
+    for (sum, sample) in sums.iter_mut().zip(samples.clone()) {
+        *sum = drive_sum(drives, sample);
+    }
+    dots_batch::<READ, BLOCK_ROWS>(walk, samples.len(), streams, cells, sums, out);
 }
 
 #[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi,popcnt")]
@@ -293,6 +346,7 @@ pub(super) fn accumulate(turned: &[u8], stride: usize, gates: &[i8], sums: &mut 
     let walk = Walk {
         runs: 1,
         quads: gates.len() / 64,
+        last: gates.len() / 64,
         run: 0,
         half: 0,
         words: 0,
@@ -302,7 +356,7 @@ pub(super) fn accumulate(turned: &[u8], stride: usize, gates: &[i8], sums: &mut 
     let gates = as_bytes(gates);
     for row in (0..BLOCK_ROWS).step_by(16) {
         let sums = &mut sums[row * HALF_COLUMNS..][..16 * HALF_COLUMNS];
-        dots::<GATES, 16, 1, 1>(walk, &turned[row * stride..], gates, sums);
+        dots::<GATES, 16, 1, 1, ANY>(walk, &turned[row * stride..], gates, &[], sums);
     }
 }
 

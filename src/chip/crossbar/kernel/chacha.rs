@@ -21,10 +21,9 @@ const CONSTANTS: [i32; 4] = [0x6170_7865, 0x3320_646e, 0x7962_2d32, 0x6b20_6574]
 pub struct Draws {
     place: Place,
     rows: usize,
-    start: [i32; 16],
-    /// After the quarter rounds of columns 1, 2 and 3; words 0, 4, 8 and 12 as they start.
-    #[cfg(target_arch = "x86_64")]
-    mixed: [i32; 16],
+    /// As it starts, then after the quarter rounds of columns 1, 2 and 3, with words 0, 4, 8 and 12 as they start: side by
+    /// side, so that assembly takes one address.
+    states: [[i32; 16]; 2],
 }
 
 /// Word 12 of 16 columns: the first, and what it grows by from a column to the next.
@@ -32,6 +31,14 @@ pub struct Draws {
 pub(super) struct Counter {
     pub(super) first: i32,
     pub(super) step: i32,
+}
+
+impl Counter {
+    /// Both in one word: the first in its low half.
+    #[cfg(target_arch = "x86_64")]
+    pub(super) const fn joined(self) -> u64 {
+        (self.first as u32 as u64) | (self.step as u32 as u64) << 32
+    }
 }
 
 impl Draws {
@@ -49,13 +56,7 @@ impl Draws {
         [start[4], start[5]] = seed;
         [start[12], start[13]] = count;
         [start[14], start[15]] = stream;
-        Self {
-            place,
-            rows,
-            start,
-            #[cfg(target_arch = "x86_64")]
-            mixed: mixed(start),
-        }
+        Self { place, rows, states: [start, mixed(start)] }
     }
 
     /// Address of the words.
@@ -72,13 +73,19 @@ impl Draws {
 
     /// What ChaCha starts from, but for the block number in word 12.
     pub(super) const fn start(&self) -> &[i32; 16] {
-        &self.start
+        &self.states[0]
     }
 
     /// The state before the first round's quarter round of column 0, but for word 12.
     #[cfg(target_arch = "x86_64")]
     pub(super) const fn mixed(&self) -> &[i32; 16] {
-        &self.mixed
+        &self.states[1]
+    }
+
+    /// [`Draws::start`], then [`Draws::mixed`].
+    #[cfg(target_arch = "x86_64")]
+    pub(super) const fn states(&self) -> &[[i32; 16]; 2] {
+        &self.states
     }
 
     /// Word 12 of the blocks that hold `rows_per_block` rows each.
@@ -90,12 +97,11 @@ impl Draws {
         let first = column as u64 * step + block as u64;
         let last = first + (HALF_COLUMNS as u64 - 1) * step;
         assert!(last < 1 << 28, "an array has fewer than 2^28 blocks of random words");
-        Counter { first: self.start[12] | first as u32 as i32, step: step as u32 as i32 }
+        Counter { first: self.states[0][12] | first as u32 as i32, step: step as u32 as i32 }
     }
 }
 
 /// The state after the quarter rounds of columns 1, 2 and 3.
-#[cfg(target_arch = "x86_64")]
 const fn mixed(mut state: [i32; 16]) -> [i32; 16] {
     quarter(&mut state, 1);
     quarter(&mut state, 2);
@@ -104,7 +110,6 @@ const fn mixed(mut state: [i32; 16]) -> [i32; 16] {
 }
 
 /// The quarter round of a column.
-#[cfg(target_arch = "x86_64")]
 const fn quarter(s: &mut [i32; 16], column: usize) {
     let [a, b, c, d] = [column, column + 4, column + 8, column + 12];
     let mut turn = 0;

@@ -34,7 +34,7 @@ mod image;
 #[cfg(test)]
 mod tests;
 
-pub use assemble::assemble;
+pub use assemble::Windows;
 #[cfg(target_arch = "x86_64")]
 pub(super) use image::Steps;
 pub use image::{ConvPlan, ConvShape, Image, Pixels};

@@ -15,6 +15,10 @@ pub struct Drives<'a> {
     codes: &'a [u8],
     samples: usize,
     greatest: Greatest,
+    /// What the drives of each sample add up to, where that is known.
+    sums: Option<&'a [i32]>,
+    /// Words of four rows of the last block beyond which nothing is driven.
+    last_quads: usize,
 }
 
 /// What a read meets at most: where both are small, sums of pairs fit narrower lanes.
@@ -37,7 +41,40 @@ impl<'a> Drives<'a> {
             samples > 0 && codes.len().is_multiple_of(samples * BLOCK_ROWS),
             "drives come in whole blocks"
         );
-        Self { codes, samples, greatest: Greatest { level: u8::MAX, code: u8::MAX } }
+        let greatest = Greatest { level: u8::MAX, code: u8::MAX };
+        Self { codes, samples, greatest, sums: None, last_quads: BLOCK_ROWS / 4 }
+    }
+
+    /// The same, of which the last block has so many rows. A back end may pass over all others.
+    ///
+    /// # Panics
+    /// When a block has no such rows.
+    #[must_use]
+    pub const fn with_last_rows(self, rows: usize) -> Self {
+        assert!(rows > 0 && rows <= BLOCK_ROWS, "a block has rows");
+        Self { last_quads: rows.div_ceil(4), ..self }
+    }
+
+    /// The same, with what [`Kernel::drive_sums`](super::Kernel::drive_sums) gave for them.
+    ///
+    /// # Panics
+    /// When there is not a sum a sample.
+    #[must_use]
+    pub const fn with_sums(self, sums: &'a [i32]) -> Self {
+        assert!(sums.len() == self.samples, "a sum a sample");
+        Self { sums: Some(sums), ..self }
+    }
+
+    /// What the drives of each sample add up to, where that is known.
+    #[must_use]
+    pub const fn sums(self) -> Option<&'a [i32]> {
+        self.sums
+    }
+
+    /// Words of four rows of the last block that may be driven.
+    #[must_use]
+    pub const fn last_quads(self) -> usize {
+        self.last_quads
     }
 
     /// The same, where levels and codes are known to stay within their greatest. A back end may rely on it.
@@ -73,8 +110,10 @@ impl<'a> Drives<'a> {
     /// The drives of some of the blocks.
     #[must_use]
     pub fn of_blocks(self, blocks: std::ops::Range<usize>) -> Self {
-        let size = self.samples * BLOCK_ROWS;
-        Self { codes: &self.codes[blocks.start * size..blocks.end * size], ..self }
+        let (size, all) = (self.samples * BLOCK_ROWS, blocks.len() == self.blocks());
+        let last_quads = if blocks.end == self.blocks() { self.last_quads } else { BLOCK_ROWS / 4 };
+        let codes = &self.codes[blocks.start * size..blocks.end * size];
+        Self { codes, last_quads, sums: self.sums.filter(|_| all), ..self }
     }
 
     /// The 64 codes of a block and sample.

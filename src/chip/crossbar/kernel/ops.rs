@@ -14,7 +14,7 @@ use std::ops::Range;
 
 use super::{
     Banks, Cells, Conversion, Dither, Draws, Drives, Ends, Extremes, Half, HandOn, Image, LookUp,
-    OneSample, Peaks, Rails, Scratch, SignLaw, Squares, Sums, WriteCounts, WriteLaw,
+    MiddleOf, OneSample, Peaks, Rails, Scratch, SignLaw, Squares, Sums, WriteCounts, WriteLaw,
 };
 use crate::chip::crossbar::layout::{BLOCK_ROWS, HALF_COLUMNS, Layout, PANEL_COLUMNS};
 use crate::num::fixed::ErrorBits;
@@ -27,6 +27,8 @@ use crate::num::fixed::ErrorBits;
 )]
 pub(super) struct Ops {
     pub(super) read: unsafe fn(&[u8], Drives<'_>, Range<usize>, &mut [i32]),
+    /// Where reads take what the drives of each sample add up to.
+    pub(super) drive_sums: Option<unsafe fn(Drives<'_>, &mut [i32])>,
     pub(super) read_conv:
         unsafe fn(&[u8], Image<'_>, (Range<usize>, Range<usize>), &mut [i32]) -> bool,
     /// Of whole groups of [`TOGETHER`](super::TOGETHER) samples.
@@ -36,11 +38,25 @@ pub(super) struct Ops {
     pub(super) look_up: unsafe fn(&[i32], &LookUp, usize, &mut [u8], &mut [u8]) -> u64,
     pub(super) offset: unsafe fn(&mut [i32], &[i32; PANEL_COLUMNS], u32, &mut [i64; PANEL_COLUMNS]),
     pub(super) index_squares: unsafe fn(&[i32], u32, i32, usize) -> u64,
+    /// All that a panel of units with a middle puts out, where a back end does that at once; squares of places, and saturated
+    /// ones.
+    pub(super) put_out: Option<
+        unsafe fn(
+            &[i32],
+            (MiddleOf<'_>, &LookUp),
+            usize,
+            &mut [i64; PANEL_COLUMNS],
+            (&mut [u8], &mut [u8]),
+        ) -> Option<[u64; 2]>,
+    >,
     pub(super) difference: unsafe fn([&[i32]; 2], &mut [i32]),
     pub(super) stream_squares: unsafe fn(&[i32], &mut [u64]),
     pub(super) scale: unsafe fn(&[i32], &[u64], HandOn, &mut [u8], &mut [u8]) -> u64,
     pub(super) latch: unsafe fn(&[i16], usize, &[u16], &mut [i16]),
     pub(super) gate: unsafe fn(&[i16], &[u8], bool, ErrorBits, usize, &mut [i8]) -> u64,
+    /// Of words that so many samples in a row share, where a back end does that.
+    pub(super) gate_shared:
+        Option<unsafe fn((&[i16], usize), &[u8], bool, ErrorBits, usize, &mut [i8]) -> u64>,
     pub(super) turn: unsafe fn(&[u8], usize, &mut [u8]),
     pub(super) read_columns: unsafe fn(&[u8], Layout, Drives<'_>, &mut [i32]),
     /// Of as many samples as gates say, of rows that lie a stride apart.
@@ -56,6 +72,10 @@ pub(super) struct Ops {
             &Half<u8>,
         ) -> bool,
     >,
+    /// Where a back end takes many reads at once, of codes as reads lie and rows that exist, and of gates and their stride;
+    /// otherwise they are turned some at a time.
+    pub(super) accumulate_reads:
+        Option<unsafe fn((&[u8], usize), (&[i8], usize, usize), &mut [Half<i32>])>,
     pub(super) dither: unsafe fn(&Draws, usize, usize, &mut Half<u8>),
     pub(super) dither_words: unsafe fn(&Draws, usize, usize, &mut Half<u16>),
     pub(super) may_move: unsafe fn(Sums<'_>, &WriteLaw, u32) -> u16,
@@ -121,11 +141,6 @@ macro_rules! twins {
         #[target_feature(enable = $features)]
         fn index_squares(sums: &[i32], shift: u32, half: i32, live: usize) -> u64 {
             crate::chip::crossbar::kernel::offsets::index_squares(sums, shift, half, live)
-        }
-
-        #[target_feature(enable = $features)]
-        fn centre(sums: &mut Half<i32>, means: &[i32; BLOCK_ROWS], totals: &[i32; HALF_COLUMNS]) {
-            crate::chip::crossbar::kernel::optimise::centre(sums, means, totals)
         }
 
         #[target_feature(enable = $features)]

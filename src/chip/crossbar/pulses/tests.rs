@@ -6,7 +6,7 @@ use proptest::prelude::*;
 use super::*;
 use crate::chip::crossbar::kernel::{Backend, WriteLaw};
 use crate::chip::crossbar::layout::PANEL_COLUMNS;
-use crate::chip::crossbar::{Crossbar, WriteRequest, Written};
+use crate::chip::crossbar::{Crossbar, Met, WriteRequest, Written};
 use crate::chip::hardware::{DitherBits, DitherPattern, FloorKind, Hardware, Window};
 use crate::num::draw::{Place, Site};
 use crate::num::fixed::{IncrementMax, LevelBits, ResidualBits};
@@ -88,7 +88,7 @@ fn written(backend: Backend, case: &Case, collect: Collect) -> (Crossbar, Vec<Wr
         array.load_row(row, &row_levels);
     }
     let request = WriteRequest {
-        turned: &turned,
+        met: Met::Turned(&turned),
         stride,
         write: WriteLaw {
             shift: case.shift,

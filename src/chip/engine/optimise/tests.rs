@@ -52,6 +52,8 @@ struct Case {
     absorbs: bool,
     mantissa: u32,
     residual: u32,
+    /// Whether data have a sign.
+    signed: bool,
     seed: u64,
 }
 
@@ -87,11 +89,12 @@ fn case(side: impl Strategy<Value = usize> + Clone) -> impl Strategy<Value = Cas
             any::<bool>(),
             1u32..=15,
             prop_oneof![Just(0), 1u32..=9],
+            any::<bool>(),
             any::<u64>(),
         ),
     )
         .prop_map(|(sides, wirings, optimisers, windows, shift, batches, dither, rest)| {
-            let (tile, absorbs, mantissa, residual, seed) = rest;
+            let (tile, absorbs, mantissa, residual, signed, seed) = rest;
             // pulses by chance leave none
             let rounds = optimisers.iter().all(|optimiser| !optimiser.is_sign());
             let residual = if rounds { residual } else { 0 };
@@ -107,6 +110,7 @@ fn case(side: impl Strategy<Value = usize> + Clone) -> impl Strategy<Value = Cas
                 absorbs,
                 mantissa,
                 residual,
+                signed,
                 seed,
             }
         })
@@ -137,7 +141,11 @@ impl Case {
             inputs: [inputs, hidden][at],
             units: [hidden, outputs][at],
             wiring: self.wirings[at],
-            driven_by: [DrivenBy::Shared, DrivenBy::Streams][at],
+            driven_by: match at {
+                0 if self.signed => DrivenBy::Signed,
+                0 => DrivenBy::Shared,
+                _ => DrivenBy::Streams,
+            },
             activation: Activation::Relu,
             weight_max_log2: 0,
             initial: InitialLevels::Uniform { gain_64ths: [64, 64] },
@@ -195,7 +203,18 @@ impl Case {
             1 => 255,
             _ => word as u8,
         };
-        let codes = (0..samples * self.sides[0]).map(|at| code(at, numbers.below(256))).collect();
+        let all = (0..samples * self.sides[0]).map(|at| code(at, numbers.below(256)));
+        let mut codes: Vec<u8> = all.collect();
+        if self.signed {
+            let mut side = |rows: &[u8]| {
+                let below: Vec<_> = rows.iter().map(|_| numbers.below(2) > 0).collect();
+                let of = |wanted| {
+                    rows.iter().zip(&below).map(move |(&x, &b)| if b == wanted { x } else { 0 })
+                };
+                of(false).chain(of(true)).collect::<Vec<_>>()
+            };
+            codes = codes.chunks(self.sides[0]).flat_map(|rows| side(rows)).collect();
+        }
         let words = (0..samples * self.sides[2]).map(|_| match kind {
             1 => 127,
             2 if numbers.below(3) > 0 => 0,

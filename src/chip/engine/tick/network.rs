@@ -269,9 +269,11 @@ impl Network {
                     let orders: Vec<_> = writes.iter().map(order).collect();
                     self.play(&orders, Interval::Program);
                     for order in orders {
+                        let bits = self.layers[order.layer].mean_bits();
                         let counts = self.layers[order.layer].mean_counts();
                         for (code, count) in counts {
-                            let charged = [(Event::RowMeans, count), (Event::SramBits, 12 * count)];
+                            let charged =
+                                [(Event::RowMeans, count), (Event::SramBits, bits * count)];
                             for (event, count) in charged {
                                 self.charge(order.layer, code, During::Update, event, count);
                             }
@@ -348,6 +350,9 @@ impl Network {
 
     fn play_in_round(&mut self, orders: &[(Order<'_>, Interval, bool)], sample: usize) {
         let interval = orders[0].1;
+        if let Command::Columns { .. } = orders[0].0.command {
+            return self.columns(orders[0].0.layer, sample);
+        }
         let formed: Vec<Vec<i16>> =
             orders.iter().map(|(order, ..)| self.layer_words(order, sample)).collect();
         let plain = orders.iter().zip(&formed);
@@ -358,11 +363,6 @@ impl Network {
             match order.command {
                 Command::Error { slot } => layer.share_gates(slot),
                 Command::Now { .. } => layer.written(),
-                Command::Columns { .. } => {
-                    layer.keep_backward(sample, self.samples);
-                    let (code, bits) = (layer.unit_code(Stream::P), 16 * layer.inputs as u64);
-                    self.charge(order.layer, code, order.during, Event::SramBits, bits);
-                }
                 _ => {}
             }
         }
@@ -451,7 +451,7 @@ impl Network {
         let hardware = self.layers[layer].memory;
         let updating = during == During::Update;
         // a product of its own is written as it is formed
-        let alone = now && self.layers[layer].positions() == 1;
+        let alone = now && self.layers[layer].products() == 1;
         let sums = if updating && !alone { 64 * (e.accumulates + e.delta_computations) } else { 0 };
         let rests = 2 * hardware.residual_bits * e.delta_computations;
         let words = 2 * hardware.word_bits * e.optimiser_steps;

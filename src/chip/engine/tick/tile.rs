@@ -5,7 +5,8 @@
 //! cycle before: lanes, tree, converters, front end; then error unit, update, and last the command that is accepted.
 //!
 //! Beyond the page, for networks of tiles (docs/MODEL.md, 4.5): an adder tree outside, more than one tap, remainders,
-//! verified, limited and amplitude-coded pulses, reads from the columns, and digital actions of more than one cycle.
+//! words pixel by pixel, verified, limited and amplitude-coded pulses, reads from the columns, drives with a sign, and digital
+//! actions of more than one cycle.
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
 mod balance;
@@ -22,7 +23,7 @@ mod write;
 pub use balance::TileBalance;
 use balance::TileReadings;
 pub use command::Command;
-pub use config::{More, TileAdc, TileConfig, TileSize, TileUnits};
+pub use config::{More, Squares, TileAdc, TileConfig, TileSize, TileUnits};
 pub use events::{BankEvents, TileEvents};
 use optimise::Kept;
 pub(super) use optimise::Said;
@@ -82,6 +83,17 @@ struct Err {
     beat: u64,
 }
 
+/// What the error unit of a tile does in a beat.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum ErrorStep {
+    /// The first word is on its way.
+    Wait,
+    /// A word arrives, of a pixel where words come so.
+    Hear { pixel: usize, word: usize },
+    /// Gates of a group of columns are formed: at turn `turn` of the positions that hear those words.
+    Multiply { pixel: usize, turn: usize, group: usize },
+}
+
 /// What an update does in a cycle.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 enum UpdPhase {
@@ -115,7 +127,7 @@ struct Upd {
     kind: UpdKind,
     row: usize,
     group: usize,
-    /// Read of the sample.
+    /// Product of the sample: a read, or a driving of the rows.
     position: usize,
     phase: UpdPhase,
     pulse: i64,
@@ -269,22 +281,27 @@ impl Tile {
     #[must_use]
     pub fn ready(&self, command: &Command<'_>) -> bool {
         match command {
-            Command::Forward { .. } => !self.front.busy && !self.err.busy && !self.upd.busy,
+            // networks read what follows in a pipeline, the same way
+            Command::Forward { .. } | Command::Columns { .. } => {
+                !self.front.busy && !self.err.busy && !self.upd.busy
+            }
             _ => self.idle(),
         }
     }
 
     /// Number of the error word that arrives in this cycle; 0 when none.
     #[must_use]
-    pub const fn bus_index(&self) -> usize {
-        if self.bus_wanted() { self.err.count - self.config.hops } else { 0 }
+    pub fn bus_index(&self) -> usize {
+        match self.error_step() {
+            Some(ErrorStep::Hear { pixel, word }) => pixel * self.config.words + word,
+            _ => 0,
+        }
     }
 
     /// Whether an error word arrives in this cycle.
     #[must_use]
-    pub const fn bus_wanted(&self) -> bool {
-        let hops = self.config.hops;
-        self.err.busy && self.err.count >= hops && self.err.count < hops + self.config.words
+    pub fn bus_wanted(&self) -> bool {
+        matches!(self.error_step(), Some(ErrorStep::Hear { .. }))
     }
 
     /// Row whose draws are wanted.
@@ -343,7 +360,7 @@ impl Tile {
                 self.upd = update(UpdKind::Now, slot, shift);
                 if self.config.more.train_slots.is_some() {
                     self.upd.phase = UpdPhase::Set;
-                } else if self.config.more.positions > 1 {
+                } else if self.products() > 1 {
                     self.upd.phase = UpdPhase::Gather;
                 }
             }

@@ -70,12 +70,13 @@ impl ImageInput {
 }
 
 /// `network.input`: nothing for what policies have.
-pub(super) const INPUTS: [(&str, Option<ImageInput>); 5] = [
+pub(super) const INPUTS: [(&str, Option<ImageInput>); 6] = [
     ("raw", Some(ImageInput::Raw)),
     ("on_off", Some(ImageInput::OnOff)),
     ("white", Some(ImageInput::White)),
     ("split", None),
     ("offset", None),
+    ("signed", None),
 ];
 
 /// What a square of a map hands on.

@@ -179,6 +179,7 @@ fn what_means_nothing_or_does_not_fit_is_refused_with_its_key() {
         (&["network.channels=[4]", "network.alpha=4"], "network.alpha", "no layer"),
         (&["network.channels=[4]", "network.input=white"], "network.input", "three colours"),
         (&["network.input=split"], "network.input", "policy"),
+        (&["network.input=signed"], "network.input", "policy"),
         (&["network.gain_spread=1"], "network.gain_spread", "fixed"),
         (&["network.homeostasis_window=512"], "network.homeostasis_window", "take it out"),
         (
@@ -191,7 +192,7 @@ fn what_means_nothing_or_does_not_fit_is_refused_with_its_key() {
         (&["data.shape=[8, 8, 1]"], "data.shape", "data.format"),
         (&["preset=papers"], "preset", "paper"),
         (&["task=policy", "network.channels=[4]"], "network.channels", "dense"),
-        (&["task=policy", "network.input=white"], "network.input", "split or offset"),
+        (&["task=policy", "network.input=white"], "network.input", "split, offset or signed"),
         (&["task=policy", "learning.flip=true"], "learning.flip", "no images"),
         (&["task=policy", "preset=paper"], "preset", "examples"),
     ] {

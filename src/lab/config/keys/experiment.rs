@@ -246,6 +246,11 @@ const NETWORK: &[KeyEntry] = &[
             ("white", "what a fixed filter leaves that takes from a pixel what its neighbours tell, above 0 and below, of images with three channels"),
             ("split", "two rows a number: what is above 0, and what is below, of policies"),
             ("offset", "one row a number, half the scale added, of policies; needs a constant row"),
+            (
+                "signed",
+                "one row a number, driven with what is above 0 and then with what is below, of policies; reads of the first \
+                 layer and products of its updates cost twice as much",
+            ),
         ],
     )
     .default("\"raw\"")

@@ -206,7 +206,7 @@ fn words_are_taken_and_others_are_refused_with_the_whole_list() {
                 ("learning.rule", "es") | ("network.readout", "p-n") => &["task=policy"],
                 ("learning.select", "best_validation") | ("learning.rule", _) => &[],
                 ("learning.mode", "online") => &["learning.centre=none"],
-                ("network.input", "split" | "offset") => &["task=policy"],
+                ("network.input", "split" | "offset" | "signed") => &["task=policy"],
                 _ => &[],
             };
             let mut settings: Vec<String> =

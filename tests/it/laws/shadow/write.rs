@@ -116,6 +116,7 @@ impl Shadow {
     /// `UPD(add)`: adds drive x gate to every cell's accumulator.
     pub(crate) fn add(&mut self, layer: usize, samples: Range<usize>) {
         let wiring = self.layers[layer].spec.wiring;
+        let alike = self.is(Fault::BelowMovesAlike);
         let only = self.net.potentiation_only && !self.is(Fault::DepressesAll);
         for (at, pathway) in wiring.pathways().iter().enumerate() {
             let wrong = self.is(Fault::WrongSource) && pathway.code == 1;
@@ -123,6 +124,7 @@ impl Shadow {
             let this = &mut self.layers[layer];
             for sample in samples.clone() {
                 for (row, &x) in this.drives[source.index()][sample].iter().enumerate() {
+                    let x = if alike { x.abs() } else { x };
                     let gates = &this.gates[pathway.target.index()][sample];
                     for (sum, &u) in this.arrays[at].sums[row].iter_mut().zip(gates) {
                         let u = match pathway.polarity {
@@ -135,7 +137,8 @@ impl Shadow {
                 }
             }
             let cells = (this.rows * this.spec.units * samples.len()) as u64;
-            self.count(layer, pathway.code, During::Update, Event::Accumulates, cells);
+            let products = cells * self.phases(layer);
+            self.count(layer, pathway.code, During::Update, Event::Accumulates, products);
         }
     }
 

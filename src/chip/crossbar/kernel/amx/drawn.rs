@@ -38,7 +38,7 @@ macro_rules! add_xor_turn {
 /// Starts ChaCha: word i of all lanes, where columns 1, 2 and 3 of the first round are done.
 macro_rules! start {
     ($([$word:literal $at:literal])*) => {
-        concat!($("vpbroadcastd zmm", $word, ", dword ptr [{mixed} + ", $at, "]\n",)*)
+        concat!($("vpbroadcastd zmm", $word, ", dword ptr [{states} + 64 + ", $at, "]\n",)*)
     };
 }
 
@@ -46,7 +46,7 @@ macro_rules! start {
 macro_rules! finish {
     ($([$word:literal $at:literal $to:literal])*) => {
         concat!($(
-            "vpaddd zmm", $word, ", zmm", $word, ", dword ptr [{start} + ", $at, "]{{1to16}}\n",
+            "vpaddd zmm", $word, ", zmm", $word, ", dword ptr [{states} + ", $at, "]{{1to16}}\n",
             "vmovdqu64 [{words} + ", $to, "], zmm", $word, "\n",
         )*)
     };
@@ -104,8 +104,8 @@ macro_rules! drawn {
             // AVX-512 F. Tile rows read at turned + step * 64 + row * stride (row < 64) and gates + step * 1024 +
             // 64 * row (row < 16), for the steps `before` and `$steps` more, lie inside the slices by the assertions
             // here and of the only caller; the 64 rows of 64 bytes written are all of `sums`, and 16 vectors of 64
-            // bytes all of `words`; 64 bytes are read of `LANES` and of each state of `draws`. Fetching reads nothing.
-            // All registers used are named.
+            // bytes all of `words`; 64 bytes are read of `LANES` and of each of the two states of `draws`. Fetching reads nothing.
+            // All registers used are named; a build with frame pointers has fourteen general ones.
             unsafe {
                 asm!(
                     zero_sums!(),
@@ -118,9 +118,10 @@ macro_rules! drawn {
                     "3:",
                     start!([0 0][1 4][2 8][3 12][4 16][5 20][6 24][7 28]),
                     start!([8 32][9 36][10 40][11 44][13 52][14 56][15 60]),
-                    "vpbroadcastd zmm16, {lane:e}",
+                    "vpbroadcastd zmm12, {counter:e}",
+                    "shr {counter}, 32",
+                    "vpbroadcastd zmm16, {counter:e}",
                     "vpmulld zmm16, zmm16, [rip + {lanes}]",
-                    "vpbroadcastd zmm12, {first:e}",
                     "vpaddd zmm16, zmm12, zmm16",
                     "vmovdqa64 zmm12, zmm16",
                     quarters!([0 4 8 12]; "" "" "" ""),
@@ -149,10 +150,8 @@ macro_rules! drawn {
                     c = in(reg) sums.as_mut_ptr(),
                     row = in(reg) 64usize,
                     stride = in(reg) stride,
-                    start = in(reg) draws.start().as_ptr(),
-                    mixed = in(reg) draws.mixed().as_ptr(),
-                    first = in(reg) counter.first,
-                    lane = in(reg) counter.step,
+                    states = in(reg) draws.states().as_ptr(),
+                    counter = inout(reg) counter.joined() => _,
                     lanes = sym LANES,
                     words = in(reg) words.as_mut_ptr(),
                     prefetch = in(reg) prefetch.as_ptr(),

@@ -94,10 +94,11 @@ macro_rules! converting {
             // four products a step: so many vectors behind each, until all are converted
             let mixed = steps.min(VECTORS / 4);
             let each = VECTORS / 4 / mixed;
+            assert!(steps >> 31 == 0, "steps with conversions and steps without share a word");
             // SAFETY: a `Tiles` says that tiles of this thread have 16 rows of 64 bytes and that the processor has
             // AVX-512 BW. Tile rows read at drives + i * step + 64 * row (row < 32) and cells + i * 2048 + 64 * row
             // (row < 32) for i < steps lie inside the slices by the assertion and the division: `mixed` and the rest
-            // make `steps`. `i` goes from 0 to 2048 in steps of 64, as 4 * mixed * each <= 32: 32 rows of 128 bytes
+            // make `steps`. They share a word, so that thirteen general registers are enough. `i` goes from 0 to 2048 in steps of 64, as 4 * mixed * each <= 32: 32 rows of 128 bytes
             // of `before` and of 64 bytes of codes are touched; 32 rows of 128 bytes of `now` are written. Codes and
             // counts lie in `packed` in this order, aligned to 64 bytes. Fetching ahead reads nothing. All registers
             // used are named.
@@ -125,9 +126,10 @@ macro_rules! converting {
                     convert_some!($combine, "33"),
                     "add {a}, {step}",
                     "add {b}, 2048",
-                    "dec {mixed}",
+                    "dec {steps}",
+                    "test {steps:e}, {steps:e}",
                     "jnz 2b",
-                    "test {rest}, {rest}",
+                    "shr {steps}, 32",
                     "jz 5f",
                     "4:",
                     "tileloadd tmm4, [{a} + {row}]",
@@ -140,7 +142,7 @@ macro_rules! converting {
                     "tdpbuud tmm3, tmm5, tmm7",
                     "add {a}, {step}",
                     "add {b}, 2048",
-                    "dec {rest}",
+                    "dec {steps}",
                     "jnz 4b",
                     "5:",
                     "cmp {i}, {codes}",
@@ -155,8 +157,7 @@ macro_rules! converting {
                     "tilestored [{c} + {row} * 2 + 64], tmm1",
                     "tilestored [{c} + {row} * 2 + 2048], tmm2",
                     "tilestored [{c} + {row} * 2 + 2112], tmm3",
-                    mixed = inout(reg) mixed => _,
-                    rest = inout(reg) steps - mixed => _,
+                    steps = inout(reg) (steps - mixed) << 32 | mixed => _,
                     each = in(reg) each,
                     count = inout(reg) settings.as_ptr() => _,
                     i = inout(reg) 0usize => _,

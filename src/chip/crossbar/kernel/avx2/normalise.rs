@@ -9,8 +9,8 @@
 use std::arch::x86_64::*;
 
 use super::{load_sums, store, total};
-use crate::chip::crossbar::kernel::{Half, HandOn, Squares};
-use crate::chip::crossbar::layout::{BLOCK_ROWS, PANEL_COLUMNS};
+use crate::chip::crossbar::kernel::{Half, HandOn, MEAN_BITS, Squares};
+use crate::chip::crossbar::layout::{BLOCK_ROWS, HALF_COLUMNS, PANEL_COLUMNS};
 
 #[target_feature(enable = "avx2,popcnt")]
 pub(super) fn stream_squares(sums: &[i32], squares: &mut [u64]) {
@@ -105,4 +105,23 @@ fn handed(codes: __m256i, hand_on: HandOn) -> __m256i {
     let codes = _mm256_min_epi16(codes, _mm256_set1_epi16(255));
     let rounded = _mm256_srl_epi16(_mm256_add_epi16(codes, half), shift);
     _mm256_min_epi16(rounded, _mm256_set1_epi16(hand_on.max as i16))
+}
+
+/// Rows one after the other: compilers gather means of several at once.
+#[target_feature(enable = "avx2,popcnt")]
+pub(super) fn centre(
+    sums: &mut Half<i32>,
+    means: &[i32; BLOCK_ROWS],
+    totals: &[i32; HALF_COLUMNS],
+) {
+    let totals = [0, 8].map(|at| load_sums(totals[at..].first_chunk().expect("16 columns")));
+    for (sums, &mean) in sums.as_chunks_mut::<HALF_COLUMNS>().0.iter_mut().zip(means) {
+        for (sums, totals) in sums.as_chunks_mut::<8>().0.iter_mut().zip(totals) {
+            let raised = _mm256_slli_epi32::<{ MEAN_BITS.cast_signed() }>(load_sums(sums));
+            let off = _mm256_mullo_epi32(_mm256_set1_epi32(mean), totals);
+            let centred = _mm256_sub_epi32(raised, off);
+            // SAFETY: the reference covers the 8 sums, 32 bytes, that an unaligned store writes.
+            unsafe { _mm256_storeu_si256(sums.as_mut_ptr().cast(), centred) }
+        }
+    }
 }

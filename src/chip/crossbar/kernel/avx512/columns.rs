@@ -4,7 +4,7 @@
 use std::arch::x86_64::*;
 use std::ops::Range;
 
-use super::{TURNED, Walk, dots_batch, load, store};
+use super::{ANY, TURNED, Walk, dots_batch, load, store};
 use crate::chip::crossbar::kernel::{Drives, Half};
 use crate::chip::crossbar::layout::{BLOCK_CELLS, BLOCK_ROWS, HALF_CELLS, Layout};
 
@@ -57,6 +57,7 @@ pub(in crate::chip::crossbar::kernel) fn pair(
     let walk = Walk {
         runs: gates.blocks(),
         quads: 16,
+        last: 16,
         run: 16 * 64,
         half: turned.group_bytes(),
         words: gates.samples() * BLOCK_ROWS,
@@ -64,7 +65,7 @@ pub(in crate::chip::crossbar::kernel) fn pair(
         out: rows,
     };
     let streams = &gates.codes()[samples.start * BLOCK_ROWS..];
-    dots_batch::<TURNED>(walk, samples.len(), streams, turned.groups(2 * pair), out);
+    dots_batch::<TURNED, ANY>(walk, samples.len(), streams, turned.groups(2 * pair), &[], out);
 }
 
 /// Turns one block of rows. Columns of a panel that does not exist become 0.

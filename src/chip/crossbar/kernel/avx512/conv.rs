@@ -9,7 +9,7 @@
 use std::arch::x86_64::*;
 use std::ops::Range;
 
-use super::{READ, Walk, dots_batch, load};
+use super::{ANY, MORE, Walk, dots_batch, load};
 use crate::chip::crossbar::kernel::conv::Image;
 use crate::chip::crossbar::layout::{BLOCK_CELLS, BLOCK_ROWS, HALF_CELLS, PANEL_COLUMNS};
 
@@ -29,6 +29,7 @@ pub(super) fn read(
     let walk = Walk {
         runs: shape.side,
         quads: 16,
+        last: 16,
         run: channels * BLOCK_CELLS,
         half: HALF_CELLS,
         words: BLOCK_ROWS,
@@ -49,7 +50,8 @@ pub(super) fn read(
             for block in 0..channels {
                 let block = ky * shape.side * channels + block;
                 let streams = &image.codes()[first + offsets[block]..];
-                dots_batch::<READ>(walk, count, streams, &cells[block * BLOCK_CELLS..], these);
+                let cells = &cells[block * BLOCK_CELLS..];
+                dots_batch::<MORE, ANY>(walk, count, streams, cells, &[], these);
             }
         }
         (at, out) = (at + count, rest);

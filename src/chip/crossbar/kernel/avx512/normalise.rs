@@ -3,10 +3,10 @@
 
 use std::arch::x86_64::*;
 
-use super::load_sums;
 use super::units::store_bytes;
-use crate::chip::crossbar::kernel::{Half, HandOn, Squares};
-use crate::chip::crossbar::layout::{BLOCK_ROWS, PANEL_COLUMNS};
+use super::{load_sums, store_sums};
+use crate::chip::crossbar::kernel::{Half, HandOn, MEAN_BITS, Squares};
+use crate::chip::crossbar::layout::{BLOCK_ROWS, HALF_COLUMNS, PANEL_COLUMNS};
 
 #[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi,popcnt")]
 pub(super) fn stream_squares(sums: &[i32], squares: &mut [u64]) {
@@ -85,4 +85,19 @@ pub(super) fn scale(
         }
     }
     saturated.into()
+}
+
+/// Rows one after the other: compilers gather means of several at once.
+#[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi,popcnt")]
+pub(super) fn centre(
+    sums: &mut Half<i32>,
+    means: &[i32; BLOCK_ROWS],
+    totals: &[i32; HALF_COLUMNS],
+) {
+    let totals = load_sums(totals);
+    for (sums, &mean) in sums.as_chunks_mut::<HALF_COLUMNS>().0.iter_mut().zip(means) {
+        let raised = _mm512_slli_epi32::<MEAN_BITS>(load_sums(sums));
+        let off = _mm512_mullo_epi32(_mm512_set1_epi32(mean), totals);
+        store_sums(sums, _mm512_sub_epi32(raised, off));
+    }
 }

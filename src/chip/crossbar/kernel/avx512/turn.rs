@@ -43,7 +43,7 @@ fn lanes([a, b, c, d]: [__m512i; 4]) -> [__m512i; 4] {
 /// A 16 x 16 transposition of dwords.
 #[inline]
 #[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi,popcnt")]
-fn dwords(v: &mut [__m512i; 16]) {
+pub(super) fn dwords(v: &mut [__m512i; 16]) {
     for four in v.as_chunks_mut::<4>().0 {
         let [a, b, c, d] = *four;
         let (ab_low, ab_high) = (_mm512_unpacklo_epi32(a, b), _mm512_unpackhi_epi32(a, b));

@@ -12,9 +12,9 @@
 
 use std::arch::x86_64::*;
 
-use super::load_sums;
 use super::turn::interleave;
-use crate::chip::crossbar::kernel::{Conversion, LookUp, Packed, Rails, Scratch, scalar};
+use super::{load_sums, store_sums};
+use crate::chip::crossbar::kernel::{Conversion, LookUp, MiddleOf, Packed, Rails, Scratch, scalar};
 use crate::chip::crossbar::layout::{BLOCK_ROWS, PANEL_COLUMNS};
 use crate::num::fixed::ErrorBits;
 
@@ -270,17 +270,33 @@ pub(super) fn gate(
     stride: usize,
     gates: &mut [i8],
 ) -> u64 {
+    gate_shared((errors, 1), derivatives, negate, bits, stride, gates)
+}
+
+#[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi,popcnt")]
+pub(super) fn gate_shared(
+    (errors, shared): (&[i16], usize),
+    derivatives: &[u8],
+    negate: bool,
+    bits: ErrorBits,
+    stride: usize,
+    gates: &mut [i8],
+) -> u64 {
     let up = _mm512_set1_epi16(15 - i16::try_from(bits.get()).expect("at most 9 bits"));
     let sign = _mm512_set1_epi16(if negate { -1 } else { 0 });
-    let (errors, slopes) = (errors.as_chunks::<64>().0, derivatives.as_chunks::<64>().0);
+    let mut errors = errors.as_chunks::<64>().0.iter();
+    let mut slopes = derivatives.as_chunks::<64>().0.iter();
+    let (mut error, mut left) = (&[0; 64], 0);
     for quad in 0..stride / 4 {
         let mut rows = [_mm512_setzero_si512(); 4];
-        for (s, row) in rows.iter_mut().enumerate() {
-            if let (Some(errors), Some(slopes)) =
-                (errors.get(quad * 4 + s), slopes.get(quad * 4 + s))
-            {
-                *row = gates_of(errors, slopes, up, sign);
+        for row in &mut rows {
+            let Some(slopes) = slopes.next() else { break };
+            if left == 0 {
+                error = errors.next().expect("checked: every unit has an error");
+                left = shared;
             }
+            left -= 1;
+            *row = gates_of(error, slopes, up, sign);
         }
         for (half, v) in interleave(rows).into_iter().enumerate() {
             let at = half * 16 * stride + quad * 64;
@@ -288,6 +304,76 @@ pub(super) fn gate(
         }
     }
     0
+}
+
+/// See [`super::super::Kernel::put_out`].
+#[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni,avx512vbmi,popcnt")]
+pub(super) fn put_out(
+    accumulators: &[i32],
+    (middle, table): (MiddleOf<'_>, &LookUp),
+    live: usize,
+    totals: &mut [i64; PANEL_COLUMNS],
+    (values, derivatives): (&mut [u8], &mut [u8]),
+) -> Option<[u64; 2]> {
+    // squares of indices of 32 samples fit 32 bits
+    if table.entries.len() > 1 << 13 || accumulators.len() > 32 * PANEL_COLUMNS {
+        return None;
+    }
+    let half = i32::try_from(table.entries.len() / 2).expect("at most 2^12");
+    let rounding = _mm512_set1_epi32(1 << table.shift >> 1);
+    let shift = _mm512_set1_epi32(table.shift.cast_signed());
+    let raise = _mm512_set1_epi32(middle.raise.cast_signed());
+    let (most, least) = (_mm512_set1_epi32(half - 1), _mm512_set1_epi32(-half));
+    let (entry, short) = (_mm512_set1_epi32(half), _mm512_set1_epi32(0xffff));
+    let zero = _mm512_setzero_si512();
+    let alive = u32::try_from((1u64 << live) - 1).expect("at most 32 columns");
+    let (mut saturated, mut all_squares) = (0, 0);
+    for column in 0..2 {
+        let alive = (alive >> (16 * column)) as u16;
+        let offsets = load_sums(&middle.offsets.as_chunks::<16>().0[column]);
+        // sums of 32 numbers, by their lower and upper 16 bits
+        let (mut lower, mut upper, mut squares) = (zero, zero, zero);
+        let rows = accumulators.as_chunks::<PANEL_COLUMNS>().0.iter();
+        let rows = rows.zip(values.chunks_mut(BLOCK_ROWS).zip(derivatives.chunks_mut(BLOCK_ROWS)));
+        for (accumulators, (values, derivatives)) in rows {
+            let v = load_sums(&accumulators.as_chunks::<16>().0[column]);
+            lower = _mm512_add_epi32(lower, _mm512_and_si512(v, short));
+            upper = _mm512_add_epi32(upper, _mm512_srai_epi32::<16>(v));
+            let v = _mm512_sllv_epi32(_mm512_sub_epi32(v, offsets), raise);
+            // as in `look_up`
+            let odd = _mm512_test_epi32_mask(v, rounding);
+            let steps = _mm512_srav_epi32(v, shift);
+            let steps = _mm512_mask_add_epi32(steps, odd, steps, _mm512_set1_epi32(1));
+            let i = _mm512_max_epi32(_mm512_min_epi32(steps, most), least);
+            saturated += _mm512_mask_cmpneq_epi32_mask(alive, i, steps).count_ones();
+            // the upper halves of lanes are 0, and lower ones numbers of 13 bits
+            let low = _mm512_and_si512(i, short);
+            squares = _mm512_add_epi32(squares, _mm512_madd_epi16(low, low));
+            // SAFETY: i lies in -half..half, so i + half indexes one of the 2 * half entries of the table.
+            let entries = unsafe {
+                _mm512_i32gather_epi32::<4>(
+                    _mm512_add_epi32(i, entry),
+                    table.entries.as_ptr().cast(),
+                )
+            };
+            let values = &mut values.as_chunks_mut::<16>().0[column];
+            store_bytes(values, _mm512_maskz_cvtepi32_epi8(alive, entries));
+            let slopes = _mm512_srli_epi32::<8>(entries);
+            let derivatives = &mut derivatives.as_chunks_mut::<16>().0[column];
+            store_bytes(derivatives, _mm512_maskz_cvtepi32_epi8(alive, slopes));
+        }
+        let (mut low, mut high) = ([0; 16], [0; 16]);
+        store_sums(&mut low, lower);
+        store_sums(&mut high, upper);
+        for (total, (low, high)) in totals[16 * column..].iter_mut().zip(low.into_iter().zip(high))
+        {
+            *total += i64::from(low) + (i64::from(high) << 16);
+        }
+        let mut by_lane = [0; 16];
+        store_sums(&mut by_lane, _mm512_maskz_mov_epi32(alive, squares));
+        all_squares += by_lane.iter().map(|&sum| u64::from(sum.cast_unsigned())).sum::<u64>();
+    }
+    Some([all_squares, saturated.into()])
 }
 
 #[inline]

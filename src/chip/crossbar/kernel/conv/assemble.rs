@@ -44,9 +44,64 @@ impl ConvScratch {
     }
 }
 
+/// What the windows of a convolution meet, put together where it is wanted: read by read, as the drives of a dense layer lie.
+#[derive(Debug, Clone, Copy)]
+pub struct Windows<'a> {
+    image: Image<'a>,
+    constant: Option<(usize, u8)>,
+}
+
+impl<'a> Windows<'a> {
+    /// Those over an image, and beside them a row that is driven with a constant.
+    #[must_use]
+    pub const fn new(image: Image<'a>, constant: Option<(usize, u8)>) -> Self {
+        Self { image, constant }
+    }
+
+    /// What they move over.
+    #[must_use]
+    pub const fn image(&self) -> Image<'a> {
+        self.image
+    }
+
+    /// Reads of all samples.
+    #[must_use]
+    pub const fn reads(&self) -> usize {
+        self.image.plan().positions()
+    }
+
+    /// Puts together some blocks of rows of some reads, `[block][read][64]`. `line` is kept from one call to the next.
+    ///
+    /// # Panics
+    /// When there are no such reads or the size is another.
+    pub fn assemble(
+        &self,
+        blocks: Range<usize>,
+        reads: Range<usize>,
+        line: &mut Vec<u8>,
+        codes: &mut [u8],
+    ) {
+        let (plan, count) = (self.image.plan(), reads.len());
+        assert!(count > 0 && reads.end <= plan.positions(), "reads are there");
+        assert_eq!(codes.len(), blocks.len() * count * BLOCK_ROWS, "64 rows a block and read");
+        let mut rows: Vec<_> = codes.chunks_exact_mut(count * BLOCK_ROWS).collect();
+        // a constant row may begin a block of its own
+        let windows = blocks.start..blocks.end.min(plan.blocks());
+        rows.iter_mut().skip(windows.len()).for_each(|rows| rows.fill(0));
+        assemble(self.image, windows, reads, line, &mut rows);
+        if let Some((row, code)) = self.constant
+            && blocks.contains(&(row / BLOCK_ROWS))
+        {
+            let rows = &mut rows[row / BLOCK_ROWS - blocks.start];
+            let drives = rows.as_chunks_mut::<BLOCK_ROWS>().0.iter_mut();
+            drives.for_each(|drives| drives[row % BLOCK_ROWS] = code);
+        }
+    }
+}
+
 /// Puts together the drives of some blocks of rows at some positions, `[position][64]` of each block. `line` is kept from
 /// one call to the next.
-pub fn assemble(
+fn assemble(
     image: Image<'_>,
     blocks: Range<usize>,
     positions: Range<usize>,
@@ -54,6 +109,12 @@ pub fn assemble(
     rows: &mut [&mut [u8]],
 ) {
     let plan = image.plan();
+    if plan.form() == Pixels::Packed {
+        for (block, codes) in blocks.zip(rows) {
+            packed(image, block, positions.start, codes);
+        }
+        return;
+    }
     if let Some(offsets) = plan.offsets() {
         for (offset, codes) in offsets[blocks].iter().zip(rows) {
             let (codes, _) = codes.as_chunks_mut::<BLOCK_ROWS>();
@@ -71,6 +132,39 @@ pub fn assemble(
             codes[i * BLOCK_ROWS..][..BLOCK_ROWS]
                 .copy_from_slice(&line[block * BLOCK_ROWS..][..BLOCK_ROWS]);
         }
+    }
+}
+
+/// The drives of a block of rows at some positions, of packed pixels: those of a row of taps lie together.
+fn packed(image: Image<'_>, block: usize, first: usize, codes: &mut [u8]) {
+    let shape = image.plan().shape();
+    let ([_, width], line) = (shape.padded(), shape.side * shape.channels);
+    let (start, end) = (block * BLOCK_ROWS, ((block + 1) * BLOCK_ROWS).min(shape.rows()));
+    // where a run begins, from the first tap on and in the block, and how long it is
+    let mut runs = Vec::new();
+    let mut row = start;
+    while row < end {
+        let (ky, along) = (row / line, row % line);
+        let run = (line - along).min(end - row);
+        runs.push((ky * width * shape.channels + along, row - start, run));
+        row += run;
+    }
+    let live = end - start;
+    for (i, pixel) in shape.steps(first).take(codes.len() / BLOCK_ROWS).enumerate() {
+        let (from, to) = (&image.codes()[pixel * shape.channels..], &mut codes[i * BLOCK_ROWS..]);
+        for &(at, row, run) in &runs {
+            copy_block(&from[at..], &mut to[row..], run);
+        }
+        to[live..BLOCK_ROWS].fill(0);
+    }
+}
+
+/// Copies at least `run` bytes of a block, and at most 64 where there are so many: what lies behind is written afterwards.
+#[inline]
+fn copy_block(from: &[u8], to: &mut [u8], run: usize) {
+    match (from.first_chunk::<BLOCK_ROWS>(), to.first_chunk_mut::<BLOCK_ROWS>()) {
+        (Some(from), Some(to)) => *to = *from,
+        _ => to[..run].copy_from_slice(&from[..run]),
     }
 }
 

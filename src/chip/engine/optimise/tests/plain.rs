@@ -28,7 +28,15 @@ impl Plain {
         };
         for (array, pathway) in this.arrays.iter().zip(this.spec.wiring.pathways()) {
             let drives = engine.drives(layer, pathway.source);
-            let drive = |row, sample| i64::from(drives[engine.register_at(sample, row)]);
+            let phases = this.spec.driven_by.phases();
+            let driven = |row: usize, sample: usize, phase: usize| {
+                let at = row / 64 * phases * samples + phases * sample + phase;
+                i64::from(drives[at * 64 + row % 64])
+            };
+            let drive = |row, sample| match phases {
+                1 => driven(row, sample, 0),
+                _ => driven(row, sample, 0) - driven(row, sample, 1),
+            };
             let gates = &engine.registers[layer].gates[pathway.target.index()];
             let gate =
                 |column, sample| i64::from(gates[packed_at(stride_of(samples), sample, column)]);

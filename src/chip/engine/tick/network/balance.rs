@@ -17,6 +17,7 @@ pub(super) struct Balancing {
     /// Units of all target streams.
     units: i128,
     threshold: bool,
+    gain: bool,
     /// `V`, where the gain tracks.
     variance: Option<i64>,
 }
@@ -30,6 +31,7 @@ impl Balancing {
             lut_bits,
             units: lanes as i128,
             threshold: law.threshold,
+            gain: law.gain != Gain::Table,
             variance: (law.gain == Gain::Tracking).then_some(layer.balance.variance()),
         })
     }
@@ -67,6 +69,11 @@ impl TickLayer {
     fn tiles_with(&self, group: usize) -> Vec<usize> {
         let heads = self.targets().into_iter().flat_map(|target| self.head_tiles(target));
         heads.filter(|&tile| self.tiles[tile].has_group(group)).collect()
+    }
+
+    /// Whether its units look up in steps that follow what they read.
+    pub(super) fn has_gain(&self) -> bool {
+        self.balancing.as_ref().is_some_and(|balancing| balancing.gain)
     }
 
     /// The reads that come are added up, or are not.

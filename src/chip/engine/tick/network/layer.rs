@@ -46,6 +46,8 @@ pub(super) struct TickLayer {
     pub(super) columns: usize,
     pub(super) delivery: Delivery,
     pub(super) weight_max_log2: i32,
+    /// What words that come back through its rows are multiplied by where it has a gain, as a power of two.
+    pub(super) evened: i64,
     pub(super) memory: Memory,
     /// Accumulator and activity by target stream and sample, of what was read last.
     pub(super) outputs: [Vec<(i64, u8)>; 2],
@@ -101,6 +103,7 @@ impl TickLayer {
             columns,
             delivery: layer.delivery.clone(),
             weight_max_log2: layer.spec.weight_max_log2,
+            evened: window::evened(&layer.spec),
             memory: Memory {
                 dac_bits: hardware.drive.dac_bits.into(),
                 residual_bits: hardware.write.residual_bits.get().into(),
@@ -142,7 +145,7 @@ impl TickLayer {
             delay: added.map(|tiles| timing.beat * tree_levels(tiles as u64)),
             batch: optimise::Batch::new(timing, layer, grid),
         };
-        let slots = slots * this.positions();
+        let slots = slots * this.products();
         let lut = layer.lut.activity.iter().zip(&layer.lut.derivative);
         let table: Vec<[u8; 2]> = lut.map(|(&a, &slope)| [a, slope]).collect();
         for (target, _) in wiring.planes() {
@@ -327,7 +330,7 @@ impl TickLayer {
     /// Puts a drive code on a row of every bank that `stream` drives: of all of them where they share their drives,
     /// or where no stream is named.
     fn load_drive(&mut self, stream: Option<Stream>, slot: usize, row: usize, code: u8) {
-        let shared = self.driven_by == DrivenBy::Shared;
+        let shared = self.driven_by.is_shared();
         for plane in 0..self.planes.len() {
             for bank in 0..2 {
                 if stream.is_some_and(|stream| !shared && stream != self.source(plane, bank)) {
@@ -372,6 +375,11 @@ impl TickLayer {
         self.pooler.as_mut().map(|pooler| pooler.take(codes)).is_some()
     }
 
+    /// Bits that a pool of the greatest remembers of a code that leaves it, where errors come back through it.
+    pub(super) fn place_bits(&self) -> u64 {
+        self.pooler.as_ref().map_or(0, Pooler::place_bits)
+    }
+
     /// What stages behind take for the cycle to come.
     pub(super) fn start_stages(&mut self) {
         if let Some(stage) = &mut self.normaliser {
@@ -401,13 +409,13 @@ impl TickLayer {
         }
     }
 
-    /// Keeps what the last transposed read of a sample, of so many, gave.
-    pub(super) fn keep_backward(&mut self, sample: usize, samples: usize) {
-        self.backward.resize(samples * self.inputs, 0);
-        for row in 0..self.inputs {
+    /// What the last transposed read gave, by row.
+    pub(super) fn backward_sums(&self) -> Vec<i64> {
+        let sum = |row: usize| {
             let head = &self.tiles[self.at(self.heads(Stream::P), row / self.tile[0], 0)];
-            self.backward[sample * self.inputs + row] = head.backward_sum(row % self.tile[0]);
-        }
+            head.backward_sum(row % self.tile[0])
+        };
+        (0..self.inputs).map(sum).collect()
     }
 
     /// Gates of a sample go down from the heads of the columns.
@@ -448,7 +456,8 @@ impl TickLayer {
     }
 
     pub(super) fn ready(&self, command: &Command<'_>) -> bool {
-        let waits = !matches!(command, Command::Forward { .. }) && !self.tree.is_empty();
+        let reads = matches!(command, Command::Forward { .. } | Command::Columns { .. });
+        let waits = !reads && !self.tree.is_empty();
         !waits && self.tiles.iter().all(|tile| tile.ready(command))
     }
 
@@ -523,7 +532,7 @@ impl TickLayer {
         heads
     }
 
-    /// Whether the widest head has looked up the last group of a sample in this cycle.
+    /// Whether the lanes of the largest tile have seen the last group of a read in this cycle.
     pub(super) fn looked_up(&self) -> bool {
         self.tiles[0].looked_up()
     }

@@ -10,6 +10,7 @@ use super::pool::Pooler;
 use super::{Command, Network, Span, TickLayer};
 use crate::chip::engine::Phase;
 use crate::chip::ledger::{During, Event, Interval};
+use crate::chip::population::Stream;
 
 impl Network {
     /// `FWD(rows)` of layers in a pipeline.
@@ -67,6 +68,47 @@ impl Network {
             self.take_events(layer, During::ForwardRows, false);
             self.layers[layer].take_rails(training);
         }
+    }
+
+    /// `FWD(columns)` of a sample: read after read of its positions, in a pipeline.
+    pub(super) fn columns(&mut self, layer: usize, sample: usize) {
+        let start = self.clock;
+        let (positions, beat) = (self.layers[layer].positions(), self.timing.beat);
+        let during = During::ForwardColumns;
+        let (mut issued, mut seen, mut offered, mut added) = (0, 0, 0, 0);
+        while seen < positions {
+            self.begin(Interval::Columns);
+            let command = Command::Columns { slot: sample * positions + issued };
+            let offer = issued < positions && self.layers[layer].ready(&command);
+            offered = if offer { offered + 1 } else { 0 };
+            let given = (offered == beat).then_some(command);
+            self.account(layer, during, offer);
+            self.layers[layer].cycle(given.as_ref(), &[]);
+            if given.is_some() {
+                issued += 1;
+                offered = 0;
+            }
+            self.end();
+            if self.layers[layer].looked_up() {
+                added += self.layers[layer].keep_backward((sample, self.samples), seen);
+                seen += 1;
+            }
+        }
+        let span = Span {
+            layer: Some(layer),
+            name: "FWD(columns)",
+            sample: Some(sample),
+            start,
+            end: self.clock,
+        };
+        self.watch.span(span);
+        self.take_events(layer, during, false);
+        let this = &self.layers[layer];
+        let code = this.unit_code(Stream::P);
+        // a sum of a pixel is read and stored; what is handed down is kept as words
+        let bits = 64 * added + 16 * this.sample_inputs() as u64;
+        self.charge(layer, code, during, Event::ShiftAdds, added);
+        self.charge(layer, code, during, Event::SramBits, bits);
     }
 
     /// Lanes have seen all of a sample; true when it needs no stage behind them and is handed on.

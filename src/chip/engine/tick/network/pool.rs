@@ -55,6 +55,13 @@ impl Pooler {
         })
     }
 
+    /// Bits that say which code of a square was the greatest, stored and fetched; 0 where that is not asked.
+    pub(super) fn place_bits(&self) -> u64 {
+        let places = self.pool.side() * self.pool.side();
+        let bits = (0..).find(|&bits| 1 << bits >= places).expect("there is a power of two");
+        if let Pool::Max { .. } = self.pool { 2 * bits } else { 0 }
+    }
+
     /// The codes of a sample are there, by target stream.
     pub(super) fn take(&mut self, streams: Vec<(Stream, Vec<u8>)>) {
         let size = self.positions * self.units;

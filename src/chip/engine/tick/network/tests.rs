@@ -39,6 +39,8 @@ struct Net {
     optimiser: Optimiser,
     centred: bool,
     taps: usize,
+    /// Whether errors come back through the layers.
+    back: bool,
     batches: Vec<usize>,
     chip: Hardware,
 }
@@ -171,12 +173,13 @@ fn net() -> impl Strategy<Value = Net> {
         prop::collection::vec((wish(), law()), 1..=2),
         prop::sample::select(wirings),
         (modes, prop::sample::select(optimisers), any::<bool>()),
-        (1usize..=2, prop::collection::vec(1usize..=3, 1..=2), any::<bool>()),
+        (1usize..=2, prop::collection::vec(1usize..=3, 1..=2), any::<bool>(), any::<bool>()),
         chip(),
     )
         .prop_map(|(seed, (channels, image), wishes, wirings, learning, rest, chip)| {
             let (mode, optimiser, centred) = learning;
-            let (taps, batches, rows) = rest;
+            let (taps, batches, rows, back) = rest;
+            let back = back && wirings[0] == Wiring::Single;
             let mut convolutions: Vec<LayerSpec> = vec![];
             for wish in wishes {
                 let (channels, image) =
@@ -194,7 +197,11 @@ fn net() -> impl Strategy<Value = Net> {
                 h.write.residual_bits = ResidualBits::new(0).unwrap();
             };
             let chip = if sign { chip.with(whole).unwrap() } else { chip };
-            Net { seed, convolutions, wirings, mode, optimiser, centred, taps, batches, chip }
+            let ideal = |h: &mut crate::chip::hardware::HardwareSpec| {
+                (h.adc, h.tile.transposed_read) = (Adc::Ideal, true);
+            };
+            let chip = if back { chip.with(ideal).unwrap() } else { chip };
+            Net { seed, convolutions, wirings, mode, optimiser, centred, taps, back, batches, chip }
         })
 }
 
@@ -216,6 +223,8 @@ impl Net {
         let layers = specs.enumerate().map(|(at, spec)| {
             let delivery = if at == self.convolutions.len() {
                 Delivery::output(WORDS)
+            } else if self.back {
+                Delivery::above(spec.units)
             } else {
                 let tap = |at: usize| number(self.seed, at, WORDS) as u16;
                 let words = (0..spec.units * self.taps).map(tap).collect();
@@ -263,11 +272,22 @@ impl Net {
             engine.execute(&Operation::Forward { layer, side: Side::Rows });
         }
         let shift = self.shift();
-        if self.mode == Mode::Accumulate {
+        if self.back {
+            for layer in (0..layers).rev() {
+                let words = if layer + 1 == layers { words } else { &[] };
+                let samples = all.clone();
+                engine.execute(&Operation::Error { layer, samples, words, shared: false });
+                if layer > 0 {
+                    engine.execute(&Operation::Forward { layer, side: Side::Columns });
+                }
+            }
+        } else {
             for layer in 0..layers {
                 let (samples, shared) = (all.clone(), layer > 0);
                 engine.execute(&Operation::Error { layer, samples, words, shared });
             }
+        }
+        if self.mode == Mode::Accumulate {
             for (write, samples) in [(Write::Add, all), (Write::Program, 0..0)] {
                 for layer in 0..layers {
                     let samples = samples.clone();
@@ -276,10 +296,6 @@ impl Net {
             }
             engine.written(WritesDone::Batch);
             return;
-        }
-        for layer in 0..layers {
-            let samples = all.clone();
-            engine.execute(&Operation::Error { layer, samples, words, shared: layer > 0 });
         }
         for sample in all {
             for layer in 0..layers {
@@ -335,6 +351,7 @@ proptest! {
                     prop_assert!(left.is_empty() || left == tick.residuals(at, array));
                 }
                 prop_assert_eq!(&layer.adc_shifts[..], tick.adc_shifts(at));
+                prop_assert_eq!(engine.backward(at), tick.backward(at), "sums of {}", at);
                 let balance = &layer.balance;
                 for &target in layer.spec.wiring.targets() {
                     prop_assert_eq!(balance.thresholds(target), tick.thresholds(at, target));

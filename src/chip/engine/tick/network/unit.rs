@@ -19,6 +19,8 @@ pub(super) struct Unit {
     means: Vec<i64>,
     error_bits: u32,
     level_bits: u32,
+    lut_bits: u32,
+    drive_bits: u32,
     softmax: Option<SoftmaxTables>,
 }
 
@@ -30,6 +32,8 @@ impl Unit {
             means: vec![],
             error_bits: hardware.digital.error_bits.get(),
             level_bits: hardware.cell.level_bits.get(),
+            lut_bits: hardware.digital.lut_bits.get(),
+            drive_bits: hardware.drive.bits.get(),
             softmax: None,
         }
     }
@@ -167,15 +171,28 @@ impl Network {
                 (0..width).map(|word| rsh(sum_of(word), shift)).collect()
             }
             WordSource::Above => {
-                let above = &self.layers[layer + 1];
-                let sums = &above.backward[sample * above.inputs..][..above.inputs];
-                let worth = i64::from(self.unit.level_bits) - i64::from(above.weight_max_log2);
+                let (own, above) = (&self.layers[layer], &self.layers[layer + 1]);
+                let inputs = above.sample_inputs();
+                let sums = &above.backward[sample * inputs..][..inputs];
+                let asked = own.place_bits() * inputs as u64;
+                let code = own.unit_code(Stream::P);
+                let worth = if above.has_gain() {
+                    // of the ramp: 85 codes are 2^(lut_bits - 3) of its steps, and 85 is 2^6 or so
+                    let code = i64::from(self.unit.drive_bits) - 2;
+                    i64::from(self.unit.lut_bits) - 3 + i64::from(above.step().0)
+                        - code
+                        - above.evened
+                } else {
+                    i64::from(self.unit.level_bits) - i64::from(above.weight_max_log2)
+                };
                 let shift = worth + 8 - i64::from(self.unit.error_bits);
                 let scaled = |&d: &i64| match u32::try_from(shift) {
                     Ok(right) => rsh(d, right),
                     Err(_) => d << shift.unsigned_abs(),
                 };
-                sums.iter().map(scaled).collect()
+                let exact = sums.iter().map(scaled).collect();
+                self.charge(layer, code, During::Error, Event::SramBits, asked);
+                exact
             }
         };
         exact.into_iter().map(|exact| self.bounded(layer, exact)).collect()

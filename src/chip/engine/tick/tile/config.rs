@@ -3,6 +3,7 @@
 
 use super::TileBalance;
 use crate::chip::hardware::{PulseCode, SliceTime};
+use crate::num::fixed::DriveBits;
 
 /// Sizes a tile is built with.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -153,6 +154,36 @@ pub struct More {
     pub train_slots: Option<u64>,
     /// Reads of a sample, one after the other in the slots: positions of a window.
     pub positions: usize,
+    /// Times that rows are driven for a read: 2 where drives have a sign. Their slots lie one behind the other, what is below
+    /// 0 behind what is above.
+    pub phases: usize,
+    /// How words come pixel by pixel; `None`: a sample has one set of words, which all its positions hear.
+    pub squares: Option<Squares>,
+}
+
+/// Squares of positions, each of which hears the words of the pixel that a pool makes of it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Squares {
+    /// Positions of a square, down and across.
+    pub side: usize,
+    /// Pixels down and across.
+    pub pixels: [usize; 2],
+    /// Whether only the position with the greatest code hears it, the first of several; codes have so many bits.
+    pub greatest: Option<DriveBits>,
+}
+
+impl Squares {
+    /// The position that stands at place `at` of the square of a pixel.
+    pub(super) const fn position(&self, pixel: usize, at: usize) -> usize {
+        let across = self.pixels[1] * self.side;
+        let (y, x) = (pixel / self.pixels[1] * self.side, pixel % self.pixels[1] * self.side);
+        (y + at / self.side) * across + x + at % self.side
+    }
+
+    /// Positions of a square.
+    pub(super) const fn size(&self) -> usize {
+        self.side * self.side
+    }
 }
 
 impl Default for More {
@@ -180,6 +211,8 @@ impl Default for More {
             centred: None,
             train_slots: None,
             positions: 1,
+            phases: 1,
+            squares: None,
         }
     }
 }
@@ -190,7 +223,7 @@ impl TileConfig {
         self.share as u64 * self.convert
     }
 
-    /// `T_A` of a slice; reads from the columns go through all of them twice.
+    /// `T_A` of a slice; reads from the columns, and of drives with a sign, go through all of them twice.
     pub(super) fn settle_of(&self, slice: u32) -> u64 {
         let own = self.more.slice_times.get((slice % self.slices) as usize);
         own.map_or(self.settle, |own| own.settle)

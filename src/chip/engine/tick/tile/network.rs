@@ -1,7 +1,7 @@
 //! What a network of tiles asks of one: state from outside, state to compare, parts at work, counts.
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
-use super::{BankEvents, Tile, TileEvents, UpdKind, UpdPhase, Way};
+use super::{BankEvents, ErrorStep, Tile, TileEvents, UpdKind, UpdPhase, Way};
 
 impl Tile {
     const fn place(&self, row: usize, column: usize) -> usize {
@@ -120,13 +120,12 @@ impl Tile {
     pub(in super::super) fn at_work(&self) -> [bool; 6] {
         let front = &self.front;
         let in_slice = front.slice < self.read_slices(front.way);
-        let words = self.config.hops + self.config.words;
         [
             front.busy && in_slice && front.phase < self.config.settle_of(front.slice),
             self.conv.busy,
             self.lane.busy,
             self.bus_wanted(),
-            self.err.busy && self.err.count >= words,
+            matches!(self.error_step(), Some(ErrorStep::Multiply { .. })),
             self.is_adding(),
         ]
     }

@@ -58,15 +58,17 @@ impl Tile {
     /// Adds a sample's lines of the group and row in progress.
     pub(super) fn add_lines(&mut self) {
         let (row, group) = (self.upd.row, self.upd.group);
+        let (driving, below) = self.learnt_drive();
         for bank in 0..2 {
-            if row == 0 {
+            // a gate is added once, with what is above 0
+            if row == 0 && !below {
                 for column in self.group(group, self.config.columns) {
                     self.kept.gates[bank][column] += self.signed_gate(bank, column);
                 }
             }
             if group == 0 {
-                let code = self.drive[bank][self.learnt() * self.size.rows + row];
-                self.kept.codes[bank][row] += i64::from(code);
+                let code = i64::from(self.drive[bank][driving * self.size.rows + row]);
+                self.kept.codes[bank][row] += if below { -code } else { code };
             }
         }
     }

@@ -17,10 +17,10 @@ impl Tile {
         }
     }
 
-    /// Slices of a read: both phases, from the columns.
+    /// Slices of a read: both phases, from the columns and of drives with a sign.
     pub(super) const fn read_slices(&self, way: Way) -> u32 {
         match way {
-            Way::Rows => self.config.slices,
+            Way::Rows => self.config.more.phases as u32 * self.config.slices,
             Way::Columns => 2 * self.config.slices,
         }
     }
@@ -104,10 +104,13 @@ impl Tile {
         i64::from(self.level[bank][row * self.size.columns + column]) * part
     }
 
-    /// The slice of a row's drive code.
+    /// The slice of a row's drive code: of what is above 0 first, then of what is below.
     fn row_part(&self, bank: usize, row: usize) -> i64 {
-        let code = self.drive[bank][self.front.slot * self.size.rows + row];
-        i64::from(periphery::slice(code, self.front.slice, self.config.dac_bits))
+        let (phase, slice) =
+            (self.front.slice / self.config.slices, self.front.slice % self.config.slices);
+        let driving = self.front.slot * self.config.more.phases + phase as usize;
+        let code = self.drive[bank][driving * self.size.rows + row];
+        i64::from(periphery::slice(code, slice, self.config.dac_bits))
     }
 
     /// The slice of a gate that its phase drives: positive gates first, then negative ones. The last slice of a
@@ -194,7 +197,8 @@ impl Tile {
         let counted = self.rails[slice as usize].iter_mut().zip(rails);
         counted.for_each(|(count, more)| *count += more);
         let before = if self.conv.slice == 0 { 0 } else { lines.acc[line] };
-        let negative = way == Way::Columns && self.conv.slice >= self.config.slices;
+        // the second phase
+        let negative = self.conv.slice >= self.config.slices;
         let d = if negative { -d } else { d };
         lines.acc[line] = before + (d << shift);
         for (bank, events) in self.bank_events.iter_mut().enumerate() {

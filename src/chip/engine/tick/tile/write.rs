@@ -1,9 +1,10 @@
 //! Errors and updates: taps, gates, sums, pulses. See docs/TILE.md, 4.
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
-use super::{Tile, Upd, UpdKind, UpdPhase};
+use super::{ErrorStep, Squares, Tile, Upd, UpdKind, UpdPhase};
 use crate::chip::hardware::PulseCode;
-use crate::num::fixed::{rsh, sat};
+use crate::chip::periphery;
+use crate::num::fixed::{DriveBits, rsh, sat};
 
 impl Tile {
     pub(super) fn errors(&mut self, word: i64) {
@@ -15,22 +16,48 @@ impl Tile {
             return;
         }
         self.err.beat = 0;
-        let (hops, words) = (self.config.hops, self.config.words);
-        let (groups, positions) = (self.groups(self.config.columns), self.config.more.positions);
-        let count = self.err.count;
-        if (hops..hops + words).contains(&count) {
-            self.hear(count - hops, word);
-        } else if count >= hops + words {
-            let turn = count - hops - words;
-            for column in self.group(turn % groups, self.config.columns) {
-                self.multiply(turn / groups, column);
+        match self.error_step().expect("it is busy") {
+            ErrorStep::Wait => {}
+            ErrorStep::Hear { word: k, .. } => self.hear(k, word),
+            ErrorStep::Multiply { pixel, turn, group } => {
+                for column in self.group(group, self.config.columns) {
+                    self.multiply(pixel, turn, column);
+                }
             }
         }
         self.err.count += 1;
-        if self.err.count == hops + words + positions * groups {
+        let [pixels, each] = self.error_turns();
+        if self.err.count == self.config.hops + pixels * each {
             self.err.busy = false;
             self.err.count = 0;
         }
+    }
+
+    /// Sets of words of a sample, and the beats of each: its words, then the gates of the positions that hear them.
+    fn error_turns(&self) -> [usize; 2] {
+        let more = &self.config.more;
+        let (pixels, positions) = match more.squares {
+            Some(squares) => (squares.pixels.into_iter().product(), squares.size()),
+            None => (1, more.positions),
+        };
+        [pixels, self.config.words + positions * self.groups(self.config.columns)]
+    }
+
+    /// What the error unit does in the beat that its count stands for; `None` rests.
+    pub(super) fn error_step(&self) -> Option<ErrorStep> {
+        if !self.err.busy {
+            return None;
+        }
+        let Some(count) = self.err.count.checked_sub(self.config.hops) else {
+            return Some(ErrorStep::Wait);
+        };
+        let [_, each] = self.error_turns();
+        let (pixel, count) = (count / each, count % each);
+        let Some(turn) = count.checked_sub(self.config.words) else {
+            return Some(ErrorStep::Hear { pixel, word: count });
+        };
+        let groups = self.groups(self.config.columns);
+        Some(ErrorStep::Multiply { pixel, turn: turn / groups, group: turn % groups })
     }
 
     /// Columns whose tap is word `k` latch it.
@@ -46,11 +73,11 @@ impl Tile {
         }
     }
 
-    /// The gate of a column at a position; its word is latched at the first.
-    fn multiply(&mut self, position: usize, column: usize) {
+    /// The gate of a column at one of the positions that hear its word, which is latched at the first.
+    fn multiply(&mut self, pixel: usize, turn: usize, column: usize) {
         let bits = self.config.error_bits;
         let taps = self.config.more.taps.get(column);
-        if let (Some(taps), 0) = (taps, position) {
+        if let (Some(taps), 0) = (taps, turn) {
             let mut word = self.heard[column];
             if taps.len() > 1 {
                 let (bounded, changed) = sat(rsh(word, self.config.more.tap_shift), bits);
@@ -58,14 +85,47 @@ impl Tile {
                 word = bounded;
             }
             self.error[column] = if self.config.negate { -word } else { word };
+            // the next pixel has words of its own
+            self.heard[column] = 0;
         }
-        let read = self.err.slot * self.config.more.positions + position;
-        let at = read * self.size.columns + column;
+        let first = self.err.slot * self.config.more.positions;
+        let (position, hears) = match self.config.more.squares {
+            Some(squares) => {
+                let hears = squares.greatest.is_none_or(|bits| {
+                    self.greatest(squares, bits, (first, pixel), column) == turn
+                });
+                (squares.position(pixel, turn), hears)
+            }
+            None => (turn, true),
+        };
+        let at = (first + position) * self.size.columns + column;
         let slope = self.slope[at];
-        let (u, saturated) = sat(rsh(self.error[column] * i64::from(slope), bits), 8);
+        let word = if hears { self.error[column] } else { 0 };
+        let (u, saturated) = sat(rsh(word * i64::from(slope), bits), 8);
         self.gate[at] = u;
         self.events.multiplies += 1;
         self.events.saturated_gates += u64::from(saturated);
+    }
+
+    /// The place in the square of a pixel whose code was the greatest: the first of several.
+    fn greatest(
+        &self,
+        squares: Squares,
+        bits: DriveBits,
+        (first, pixel): (usize, usize),
+        column: usize,
+    ) -> usize {
+        let code = |at: usize| {
+            let read = first + squares.position(pixel, at);
+            periphery::drive(self.value[read * self.size.columns + column], bits)
+        };
+        let mut best = 0;
+        for at in 1..squares.size() {
+            if code(at) > code(best) {
+                best = at;
+            }
+        }
+        best
     }
 
     pub(super) fn updates(&mut self, dither: [&[u16]; 2]) {
@@ -110,15 +170,31 @@ impl Tile {
         over
     }
 
-    /// The read whose products are formed.
-    pub(super) const fn learnt(&self) -> usize {
-        self.upd.slot * self.config.more.positions + self.upd.position
+    /// Products of a cell for a sample.
+    pub(super) const fn products(&self) -> usize {
+        self.config.more.positions * self.config.more.phases
+    }
+
+    /// The driving of the rows whose products are formed, and whether it lies below 0.
+    pub(super) const fn learnt_drive(&self) -> (usize, bool) {
+        let below = self.upd.position % self.config.more.phases > 0;
+        (self.upd.slot * self.products() + self.upd.position, below)
+    }
+
+    /// The read whose gates they are formed with.
+    const fn learnt(&self) -> usize {
+        self.upd.slot * self.config.more.positions + self.upd.position / self.config.more.phases
     }
 
     /// The product of a row's drive and a column's gate as a bank takes it.
     pub(super) fn outer(&self, bank: usize, column: usize) -> i64 {
-        let drive = i64::from(self.drive[bank][self.learnt() * self.size.rows + self.upd.row]);
-        drive * self.signed_gate(bank, column)
+        let (driving, below) = self.learnt_drive();
+        let drive = i64::from(self.drive[bank][driving * self.size.rows + self.upd.row]);
+        if below {
+            -drive * self.signed_gate(bank, column)
+        } else {
+            drive * self.signed_gate(bank, column)
+        }
     }
 
     /// A column's gate as a bank takes it.
@@ -153,7 +229,7 @@ impl Tile {
         }
         self.upd.row = 0;
         self.upd.position += 1;
-        if self.upd.position < self.config.more.positions {
+        if self.upd.position < self.products() {
             return;
         }
         let Upd { kind, slot, shift, .. } = self.upd;
@@ -179,7 +255,7 @@ impl Tile {
             for column in 0..self.config.columns {
                 let at = self.upd.row * self.size.columns + column;
                 let sum = match self.upd.kind {
-                    UpdKind::Now if self.config.more.positions == 1 => {
+                    UpdKind::Now if self.products() == 1 => {
                         self.bank_events[bank].accumulates += 1;
                         self.outer(bank, column)
                     }

@@ -12,9 +12,10 @@ use crate::task::environment::{EnvSpec, Shown};
 use crate::task::policy::InputCoding;
 
 /// `network.input`: nothing for what images have.
-const INPUTS: [(&str, Option<InputCoding>); 5] = [
+const INPUTS: [(&str, Option<InputCoding>); 6] = [
     ("split", Some(InputCoding::Split)),
     ("offset", Some(InputCoding::Offset)),
+    ("signed", Some(InputCoding::Signed)),
     ("raw", None),
     ("on_off", None),
     ("white", None),
@@ -79,7 +80,11 @@ fn input(file: &mut NetworkFile, spec: &EnvSpec, bias: Bias) -> Result<InputCodi
         Some(coding) => coding,
         None => {
             let found = format!("is \"{}\"", file.input.as_deref().unwrap_or_default());
-            return Err(wrong("network.input", found, "it is of images: use split or offset"));
+            return Err(wrong(
+                "network.input",
+                found,
+                "it is of images: use split, offset or signed",
+            ));
         }
     };
     if coding == InputCoding::Offset && bias == Bias::None {

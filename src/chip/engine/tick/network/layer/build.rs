@@ -3,11 +3,11 @@
 
 use std::ops::Range;
 
-use super::super::super::tile::{More, TileAdc, TileConfig, TileUnits};
+use super::super::super::tile::{More, Squares, TileAdc, TileConfig, TileUnits};
 use super::super::balance;
 use crate::chip::crossbar::kernel::MEAN_BITS;
 use crate::chip::hardware::{Adc, FloorKind, Hardware, Subtract, Timing, WriteScheme};
-use crate::chip::layer::{Layer, Optimiser};
+use crate::chip::layer::{Layer, Optimiser, Pool, WordSource};
 use crate::chip::population::Stream;
 use crate::num::tables::Activation;
 
@@ -103,6 +103,13 @@ pub(super) fn config(
                 WriteScheme::Trains { slots_log2 } => Some(1 << slots_log2),
             },
             positions: layer.spec.positions(),
+            phases: layer.spec.driven_by.phases(),
+            squares: (layer.delivery.source == WordSource::Above).then(|| Squares {
+                side: layer.spec.pool.side(),
+                pixels: layer.spec.pooled(),
+                greatest: matches!(layer.spec.pool, Pool::Max { .. })
+                    .then_some(hardware.drive.bits),
+            }),
         },
     }
 }

@@ -61,7 +61,7 @@ impl TickLayer {
     /// The set of drives that a bank of a plane takes.
     fn set(&self, plane: usize, bank: usize) -> usize {
         match self.driven_by {
-            DrivenBy::Shared => Stream::P.index(),
+            DrivenBy::Shared | DrivenBy::Signed => Stream::P.index(),
             DrivenBy::Streams | DrivenBy::Normalised => self.source(plane, bank).index(),
         }
     }
@@ -203,6 +203,11 @@ impl TickLayer {
         }
     }
 
+    /// Bits of a mean of a row.
+    pub(in super::super) const fn mean_bits(&self) -> u64 {
+        if self.driven_by.phases() > 1 { 13 } else { 12 }
+    }
+
     /// How often means were used and kept at a write, by pathway.
     pub(in super::super) fn mean_counts(&self) -> Vec<(u8, u64)> {
         if self.batch.window_log2.is_none() {
@@ -212,7 +217,7 @@ impl TickLayer {
         let kept = self.batch.means[Stream::P.index()].len() as u64;
         let mut seen = vec![];
         let count = |pathway: &Pathway| {
-            let set = if self.driven_by == DrivenBy::Shared { Stream::P } else { pathway.source };
+            let set = if self.driven_by.is_shared() { Stream::P } else { pathway.source };
             let first = !seen.contains(&set);
             seen.push(set);
             let looks = match self.batch.optimiser {

@@ -9,7 +9,7 @@
 
 use super::TickLayer;
 use crate::chip::crossbar::kernel::ConvShape;
-use crate::chip::layer::{DrivenBy, LayerSpec};
+use crate::chip::layer::LayerSpec;
 use crate::chip::periphery;
 use crate::chip::population::Stream;
 
@@ -29,15 +29,36 @@ impl Window {
     }
 }
 
+/// Half the logarithm of the rows that share a column, rounded up: rows of a dense layer or, in a window, channels times
+/// the square of the stride.
+pub(super) fn evened(spec: &LayerSpec) -> i64 {
+    let rows = match spec.convolution {
+        Some(shape) => shape.channels * shape.stride * shape.stride,
+        None => spec.inputs,
+    };
+    let (mut columns, mut power) = (spec.units, 0);
+    while columns < rows {
+        columns *= 4;
+        power += 1;
+    }
+    power
+}
+
 impl TickLayer {
     /// Reads of a sample.
     pub(in super::super) fn positions(&self) -> usize {
         self.window.shape.map_or(1, |shape| shape.output().iter().product())
     }
 
+    /// Products of a cell for a sample: drivings of its row.
+    pub(in super::super) fn products(&self) -> usize {
+        self.positions() * self.driven_by.phases()
+    }
+
     /// Codes of a sample below it.
     pub(in super::super) fn sample_inputs(&self) -> usize {
-        self.window.shape.map_or(self.inputs, |shape| shape.height * shape.width * shape.channels)
+        let inputs = self.inputs * self.driven_by.phases();
+        self.window.shape.map_or(inputs, |shape| shape.height * shape.width * shape.channels)
     }
 
     /// Puts codes of data on the rows of all banks.
@@ -55,15 +76,19 @@ impl TickLayer {
         sample: usize,
         codes: &[u8],
     ) {
-        let shared = self.driven_by == DrivenBy::Shared;
+        let shared = self.driven_by.is_shared();
         if shared && stream.is_some_and(|stream| stream != Stream::P) {
             return;
         }
         let Some(shape) = self.window.shape else {
-            for (row, &code) in codes.iter().enumerate() {
-                self.load_drive(stream, sample, row, code);
+            let phases = self.driven_by.phases();
+            for (phase, codes) in codes.chunks_exact(self.inputs).enumerate() {
+                for (row, &code) in codes.iter().enumerate() {
+                    self.load_drive(stream, sample * phases + phase, row, code);
+                }
             }
-            return self.load_constant(sample);
+            // above 0: below it nothing was ever put on this row
+            return self.load_constant(sample * phases);
         };
         self.window.images[stream.map_or(0, Stream::index)][sample] = codes.to_vec();
         let ConvShape { channels, height, width, side, stride, pad } = shape;
@@ -84,6 +109,38 @@ impl TickLayer {
             }
             self.load_constant(slot);
         }
+    }
+
+    /// Adds what the last transposed read gave, of a sample of so many at a position, to the sums of the pixels that drove its
+    /// rows; how many rows had one. Without a window a row is its own pixel, and its sum is kept.
+    pub(in super::super) fn keep_backward(
+        &mut self,
+        (sample, samples): (usize, usize),
+        position: usize,
+    ) -> u64 {
+        let (size, sums) = (self.sample_inputs(), self.backward_sums());
+        self.backward.resize(samples * size, 0);
+        let kept = &mut self.backward[sample * size..(sample + 1) * size];
+        let Some(shape) = self.window.shape else {
+            kept.copy_from_slice(&sums);
+            return 0;
+        };
+        if position == 0 {
+            kept.fill(0);
+        }
+        let ConvShape { channels, height, width, side, stride, pad } = shape;
+        let (y, x) = (position / shape.output()[1], position % shape.output()[1]);
+        let mut added = 0;
+        for (row, sum) in sums.into_iter().enumerate() {
+            let (tap, channel) = (row / channels, row % channels);
+            // from the corner of the border
+            let (py, px) = (y * stride + tap / side, x * stride + tap % side);
+            if (pad..pad + height).contains(&py) && (pad..pad + width).contains(&px) {
+                kept[((py - pad) * width + px - pad) * channels + channel] += sum;
+                added += 1;
+            }
+        }
+        added
     }
 
     fn load_constant(&mut self, slot: usize) {
