@@ -128,8 +128,8 @@ pub use crate::lab::{
     config::{Config, ConfigError, Sources},
     data::{Data, DataError, DataRoot, ImageShape},
     run::{
-        Keeping, Machine, Progress, ReportMade, RunError, RunEvent, Session, Trained, Verdict,
-        evaluate, priced, report, resume, train, train_keeping, verify,
+        Keeping, Machine, Memory, Progress, ReportMade, RunError, RunEvent, Session, Trained,
+        Verdict, evaluate, priced, report, resume, train, train_keeping, verify, weighed,
     },
     store::{
         ARITHMETIC,

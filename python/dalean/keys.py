@@ -97,7 +97,7 @@ Keys = TypedDict(
         # Output units. [units]
         "network.outputs": int,
         # How values become drives, which have no sign. Default: "raw".
-        "network.input": Literal["raw", "on_off", "white", "split", "offset"],
+        "network.input": Literal["raw", "on_off", "white", "split", "offset", "signed"],
         # Function of hidden units, convolutions among them; outputs are sigmoid, sums with `softmax` and of policies. Default: "sigmoid".
         "network.activation": Literal["sigmoid", "relu", "identity", "rms", "ramp"],
         # Sigmoid width of each layer. Default: 4.0.

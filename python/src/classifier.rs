@@ -17,6 +17,7 @@ struct Made {
 
 impl Made {
     fn build(&self, train: &Examples, threads: usize) -> Result<dalean::Classifier, Raised> {
+        dalean::weighed(&[&self.experiment.network], &self.experiment.hardware)?;
         let backend = backend(self.kernel.as_deref())?;
         let mut made = dalean::Classifier::new(self.experiment.clone(), train, backend)?;
         made.set_threads(threads)?;

@@ -25,6 +25,7 @@ impl Made {
         let Experiment { seed, network, hardware, .. } = &self.experiment;
         let place = NetworkPlace { seed: *seed, first_layer: 0, updates: self.updates };
         let words = if self.own { HiddenWords::Own } else { HiddenWords::Routed };
+        dalean::weighed(&[network], hardware)?;
         let backend = backend(self.kernel.as_deref())?;
         let mut made = DrivenNetwork::new(network, hardware, backend, place, words)?;
         made.set_threads(threads)?;

@@ -22,6 +22,8 @@ struct Made {
 
 impl Made {
     fn build(&self, threads: usize) -> Result<dalean::policy::PolicyLearner, Raised> {
+        let PolicyExperiment { actor, critic, hardware, .. } = &self.experiment;
+        dalean::weighed(&[actor, critic], hardware)?;
         let backend = backend(self.kernel.as_deref())?;
         let (experiment, spec) = (self.experiment.clone(), self.spec.clone());
         let mut made = dalean::policy::PolicyLearner::new(experiment, spec, backend)?;

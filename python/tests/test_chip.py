@@ -167,6 +167,10 @@ def test_errors_move_nothing():
         assert wanted in str(caught.value), caught.value
         assert caught.value.where and caught.value.found and caught.value.allowed
     assert net.state_hash == hash_
+    with pytest.raises(dalean.RunError, match="of memory"):
+        dalean.Network([65_535] * 50)
+    with pytest.raises(dalean.ArrayError, match="whole numbers"):
+        dalean.Network([5, 3 + 1j])
     for keys in [{"learning.rule": "bp"}, {"network.channels": [4]}]:
         with pytest.raises(dalean.ConfigError):
             dalean.Network([5, 7, 3], "reram", overrides=keys)

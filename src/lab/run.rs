@@ -29,8 +29,8 @@ pub use task::Progress;
 pub use train::{Keeping, RunEvent, Trained, carry_on, resume, train, train_keeping};
 pub use verify::{Verdict, replay, verify};
 pub use watch::{Watched, watch};
-pub use weigh::Memory;
 pub(crate) use weigh::weigh;
+pub use weigh::{Memory, weighed};
 
 use crate::chip::crossbar::kernel::Backend;
 use crate::lab::config::ConfigError;

@@ -18,6 +18,7 @@ use super::RunError;
 use crate::chip::crossbar::layout::Layout;
 use crate::chip::hardware::{FloorKind, Hardware};
 use crate::chip::layer::LayerSpec;
+use crate::learn::network::NetworkSpec;
 use crate::num::fixed::Batch;
 
 /// Bytes that every system has: runs below are not weighed.
@@ -118,6 +119,35 @@ pub(crate) fn weigh(
     match left {
         Some(left) if wanted.0 > SMALL && wanted > left => Err(RunError::Memory { wanted, left }),
         _ => Ok(()),
+    }
+}
+
+/// Whether networks that are about to be built side by side fit into the memory that this system has left. Runs are weighed by
+/// themselves.
+///
+/// ```
+/// use dalean::{Config, RunError, Sources};
+///
+/// let settings = ["network.hidden=[65535, 65535]".to_owned()];
+/// let config = Config::load(&Sources { settings: &settings, ..Sources::default() })?;
+/// let experiment = config.experiment(64, 10, None)?;
+/// match dalean::weighed(&[&experiment.network], &experiment.hardware) {
+///     Err(RunError::Memory { wanted, .. }) => assert!(wanted.bytes() > 1 << 34),
+///     Err(error) => panic!("{error}"),
+///     Ok(()) => {} // a system that has it, or does not say
+/// }
+/// # Ok::<(), dalean::ConfigError>(())
+/// ```
+///
+/// # Errors
+/// When they do not, with both amounts.
+pub fn weighed(networks: &[&NetworkSpec], hardware: &Hardware) -> Result<(), RunError> {
+    let layers: Vec<LayerSpec> =
+        networks.iter().flat_map(|network| network.layers.iter().cloned()).collect();
+    let batch = networks.iter().map(|network| network.batch).max_by_key(|batch| batch.get());
+    match batch {
+        Some(batch) => weigh(&layers, hardware, batch, Memory::left()),
+        None => Ok(()),
     }
 }
 
