@@ -3,9 +3,9 @@
 
 use std::path::Path;
 
+use super::axis::Value;
 use super::filter::Filter;
 use super::row::RESULTS;
-use super::axis::Value;
 use super::{Axis, SweepError};
 use crate::lab::config::sweep::{PublishedFile, ReportFile, SampleFile, SeedsFile, SweepFile};
 use crate::lab::config::{ConfigError, anchor};
@@ -273,15 +273,23 @@ fn figures(file: ReportFile, axes: &[Axis], result: &str) -> Result<Figures, Swe
     if let Some(value) = &figures.baseline {
         has_value("baseline", axes, Some(&figures.x), value)?;
     }
-    let published = file.published.unwrap_or_default().into_iter().map(|one| told(one, axes, &figures));
+    let published =
+        file.published.unwrap_or_default().into_iter().map(|one| told(one, axes, &figures));
     figures.published = published.collect::<Result<_, _>>()?;
     Ok(figures)
 }
 
 /// Whether an axis has a value; what a key of the report names has to be there.
-fn has_value(key: &str, axes: &[Axis], name: Option<&String>, value: &str) -> Result<(), SweepError> {
+fn has_value(
+    key: &str,
+    axes: &[Axis],
+    name: Option<&String>,
+    value: &str,
+) -> Result<(), SweepError> {
     let axis = name.and_then(|name| axes.iter().find(|axis| axis.name == *name));
-    let wrong = |allowed: &str| SweepError::key(&format!("report.{key}"), &format!("is {value:?}"), allowed);
+    let wrong = |allowed: &str| {
+        SweepError::key(&format!("report.{key}"), &format!("is {value:?}"), allowed)
+    };
     let Some(axis) = axis else { return Err(wrong("the report has no such axis: name it first")) };
     let all: Vec<String> = axis.list().iter().map(|choice| choice.value.to_string()).collect();
     if all.iter().any(|one| one == value) {
@@ -292,7 +300,9 @@ fn has_value(key: &str, axes: &[Axis], name: Option<&String>, value: &str) -> Re
 
 /// A figure of others, checked.
 fn told(file: PublishedFile, axes: &[Axis], figures: &Figures) -> Result<Published, SweepError> {
-    let missing = |key: &str, allowed: &str| SweepError::key(&format!("report.published.{key}"), "is missing", allowed);
+    let missing = |key: &str, allowed: &str| {
+        SweepError::key(&format!("report.published.{key}"), "is missing", allowed)
+    };
     let x = file.x.ok_or_else(|| missing("x", "name the value of the abscissa"))?;
     let mean = file.mean.ok_or_else(|| missing("mean", "give the mean of the ordinate"))?;
     let names = [Some(&figures.x), figures.series.as_ref(), figures.panel.as_ref()];

@@ -4,9 +4,7 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use super::{Results, SweepError, results};
-use crate::lab::report::sweep::{
-    Learning, SweepView, compared, figures, html, png, text, wanted,
-};
+use crate::lab::report::sweep::{Learning, SweepView, compared, figures, html, png, text, wanted};
 use crate::lab::store::folder::{names, read_text};
 use crate::lab::store::index::{Store, StoreError, SweepRecord};
 use crate::lab::store::place::{clear_parts, make_folder, write_whole};

@@ -17,6 +17,7 @@ fn refused(table: &KeyTable) -> String {
     let text = match (table.file, table.path) {
         (KeyFileKind::Sweep, "axis") => "[[axis]]\nunheard = 1".into(),
         (KeyFileKind::Sweep, "axis.case") => "[[axis]]\n[[axis.case]]\nunheard = 1".into(),
+        (KeyFileKind::Sweep, "report.published") => "[[report.published]]\nunheard = 1".into(),
         (_, "energy.*") => "[hw.energy]\nhold_fj = { unheard = 1 }".into(),
         (KeyFileKind::Hardware, "") => "[hw]\nunheard = 1".into(),
         (KeyFileKind::Hardware, path) => format!("[hw.{path}]\nunheard = 1"),

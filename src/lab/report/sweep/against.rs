@@ -136,7 +136,9 @@ impl<'a> Tests<'_, 'a> {
     fn published(&self, found: &Summary, place: &Place<'_, 'a>) -> [String; 3] {
         let fits = |one: &&Published| {
             one.at.iter().zip(place).all(|(wanted, (axis, at))| {
-                wanted.as_ref().is_none_or(|wanted| axis.is_some_and(|axis| axis.texts[*at] == *wanted))
+                wanted
+                    .as_ref()
+                    .is_none_or(|wanted| axis.is_some_and(|axis| axis.texts[*at] == *wanted))
             })
         };
         let Some(one) = self.settings.view.figures.published.iter().find(fits) else {
@@ -224,8 +226,11 @@ pub(super) fn card(settings: &Settings<'_>, number: usize) -> String {
     };
     let lines: String =
         table.lines.iter().map(|line| format!("<tr>{}</tr>", cells("td", line))).collect();
-    let notes: String =
-        table.notes.iter().map(|note| format!("<p class=\"caption\">{}</p>", escape(note))).collect();
+    let notes: String = table
+        .notes
+        .iter()
+        .map(|note| format!("<p class=\"caption\">{}</p>", escape(note)))
+        .collect();
     format!(
         "<section class=\"card wide\" id=\"against\"><div class=\"top\"><h2><span>{number}</span>Compared</h2></div>\
          <p>{}</p><div class=\"scroll\"><table><thead><tr>{}</tr></thead><tbody>{lines}</tbody></table></div>{notes}\
