@@ -206,14 +206,14 @@ impl Case {
         let all = (0..samples * self.sides[0]).map(|at| code(at, numbers.below(256)));
         let mut codes: Vec<u8> = all.collect();
         if self.signed {
-            let mut side = |rows: &[u8]| {
+            let side = |rows: &[u8]| {
                 let below: Vec<_> = rows.iter().map(|_| numbers.below(2) > 0).collect();
                 let of = |wanted| {
                     rows.iter().zip(&below).map(move |(&x, &b)| if b == wanted { x } else { 0 })
                 };
                 of(false).chain(of(true)).collect::<Vec<_>>()
             };
-            codes = codes.chunks(self.sides[0]).flat_map(|rows| side(rows)).collect();
+            codes = codes.chunks(self.sides[0]).flat_map(side).collect();
         }
         let words = (0..samples * self.sides[2]).map(|_| match kind {
             1 => 127,

@@ -177,7 +177,7 @@ impl Tile {
 
     /// The driving of the rows whose products are formed, and whether it lies below 0.
     pub(super) const fn learnt_drive(&self) -> (usize, bool) {
-        let below = self.upd.position % self.config.more.phases > 0;
+        let below = !self.upd.position.is_multiple_of(self.config.more.phases);
         (self.upd.slot * self.products() + self.upd.position, below)
     }
 
