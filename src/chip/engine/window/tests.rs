@@ -332,46 +332,68 @@ fn learn(engine: &mut Engine, layer: usize, words: &[i16], now: bool, optimiser:
     }
 }
 
+/// What a convolution hands on and what it learns, against a dense layer that is shown every window.
+fn equals_its_twin(net: &Net) -> Result<(), TestCaseError> {
+    for backend in Backend::available() {
+        let mut engine = net.engine(backend);
+        engine.set_phase(Phase::Training);
+        engine.execute(&Operation::LoadDrives { codes: &net.codes() });
+        for layer in 0..3 {
+            engine.execute(&Operation::Forward { layer, side: Side::Rows });
+        }
+        let mut maps = [net.codes(), net.codes()];
+        for layer in 0..2 {
+            let windows = maps.each_ref().map(|map| net.windows(layer, map));
+            let reads = windows[0].len();
+            let mut twin = net.twin(layer, [&windows[0], &windows[1]], backend);
+            let words = net.words();
+            let positions = net.shapes[layer].positions();
+            let repeated: Vec<i16> =
+                words.chunks(OUTPUTS).flat_map(|words| words.repeat(positions)).collect();
+            let said = codes_of(&twin, 1, net.units[layer], reads);
+            learn(&mut engine, layer, &words, false, net.optimiser);
+            learn(&mut twin, 1, &repeated, false, net.optimiser);
+            prop_assert_eq!(levels(&engine, layer), levels(&twin, 1), "layer {}", layer);
+            maps = said.each_ref().map(|reads| net.pooled(layer, reads));
+        }
+        // what the last layer is driven with
+        let inputs = net.spec(2).inputs;
+        for (drives, map) in engine.registers[2].drives.iter().zip(&maps) {
+            for (sample, codes) in map.chunks(inputs).enumerate() {
+                for (row, &code) in codes.iter().enumerate() {
+                    let at = (row / BLOCK_ROWS * net.samples + sample) * BLOCK_ROWS;
+                    prop_assert_eq!(drives[at + row % BLOCK_ROWS], code);
+                }
+            }
+        }
+    }
+    Ok(())
+}
+
+#[test]
+fn a_window_that_covers_its_map_has_one_position() {
+    let optimisers = [Optimiser::Plain, Optimiser::Sign { dead_zone: true }, Optimiser::Rms];
+    for (at, optimiser) in (0..).zip(optimisers) {
+        let net = Net {
+            seed: at,
+            shapes: [shape(7, [3, 3], 3, 1, 0), shape(20, [1, 1], 1, 1, 0)],
+            pools: [Pool::None, Pool::None],
+            units: [20, 5],
+            constant_row: at == 1,
+            samples: 2,
+            optimiser,
+            chip: Hardware::reference(),
+        };
+        equals_its_twin(&net).unwrap();
+    }
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(48))]
 
     #[test]
     fn a_convolution_is_its_unrolled_dense_twin(net in net()) {
-        for backend in Backend::available() {
-            let mut engine = net.engine(backend);
-            engine.set_phase(Phase::Training);
-            engine.execute(&Operation::LoadDrives { codes: &net.codes() });
-            for layer in 0..3 {
-                engine.execute(&Operation::Forward { layer, side: Side::Rows });
-            }
-            let mut maps = [net.codes(), net.codes()];
-            for layer in 0..2 {
-                let windows = maps.each_ref().map(|map| net.windows(layer, map));
-                let reads = windows[0].len();
-                let mut twin = net.twin(layer, [&windows[0], &windows[1]], backend);
-                let words = net.words();
-                let positions = net.shapes[layer].positions();
-                let repeated: Vec<i16> = words
-                    .chunks(OUTPUTS)
-                    .flat_map(|words| words.repeat(positions))
-                    .collect();
-                let said = codes_of(&twin, 1, net.units[layer], reads);
-                learn(&mut engine, layer, &words, false, net.optimiser);
-                learn(&mut twin, 1, &repeated, false, net.optimiser);
-                prop_assert_eq!(levels(&engine, layer), levels(&twin, 1), "layer {}", layer);
-                maps = said.each_ref().map(|reads| net.pooled(layer, reads));
-            }
-            // what the last layer is driven with
-            let inputs = net.spec(2).inputs;
-            for (drives, map) in engine.registers[2].drives.iter().zip(&maps) {
-                for (sample, codes) in map.chunks(inputs).enumerate() {
-                    for (row, &code) in codes.iter().enumerate() {
-                        let at = (row / BLOCK_ROWS * net.samples + sample) * BLOCK_ROWS;
-                        prop_assert_eq!(drives[at + row % BLOCK_ROWS], code);
-                    }
-                }
-            }
-        }
+        equals_its_twin(&net)?;
     }
 
     #[test]
