@@ -219,8 +219,12 @@ pub(super) fn card(settings: &Settings<'_>, number: usize) -> String {
     let Some(table) = against(settings) else { return String::new() };
     let cells = |tag: &str, cells: &[String]| -> String {
         let one = |(at, cell): (usize, &String)| {
-            let tag = if at < table.words { "th" } else { tag };
-            format!("<{tag}>{}</{tag}>", escape(cell))
+            let cell = escape(cell);
+            if at < table.words {
+                format!("<th style=\"text-align:left\">{cell}</th>")
+            } else {
+                format!("<{tag}>{cell}</{tag}>")
+            }
         };
         cells.iter().enumerate().map(one).collect()
     };
