@@ -107,7 +107,9 @@ LONG = {"network.hidden": [512], "learning.epochs": 10_000}
 
 
 def test_an_interrupt_ends_a_run_within_a_batch(tmp_path):
-    code = f"import dalean; dalean.train({LONG!r}, out={str(tmp_path)!r}, progress=False, threads=1)"
+    # what was started in the background may have been told to hear no interrupt
+    heard = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)"
+    code = f"{heard}; import dalean; dalean.train({LONG!r}, out={str(tmp_path)!r}, progress=False, threads=1)"
     # an interrupt before Python hears it would end it as any program
     child = subprocess.Popen([sys.executable, "-c", code], stderr=subprocess.PIPE, text=True)
     wait_for(lambda: list(tmp_path.glob("*/metrics.jsonl")), child)

@@ -39,7 +39,7 @@ impl Engine {
         };
         let arrays = pair.map(|at| &this.arrays[at]);
         let (samples, reads) = (self.samples, self.reads(layer));
-        let (positions, inputs) = (spec.positions(), spec.sample_inputs());
+        let (positions, inputs) = (spec.positions(), spec.sample_sums());
         let mut backward = std::mem::take(&mut self.registers[layer].backward);
         backward.clear();
         backward.resize(samples * inputs, 0);
@@ -85,7 +85,7 @@ impl Engine {
         let [down, across] = this.tiles(&self.hardware).map(|n| n as u64);
         let (rows, columns) = (this.layout.rows as u64, this.layout.columns as u64);
         let reads = 2 * u64::from(self.hardware.slices()) * self.reads(layer) as u64;
-        let (wiring, inputs) = (this.spec.wiring, this.spec.sample_inputs() as u64);
+        let (wiring, inputs) = (this.spec.wiring, this.spec.sample_sums() as u64);
         let folded = (self.samples * window::folded(&this.spec)) as u64;
         let dac_bits = u64::from(self.hardware.drive.dac_bits);
         let during = During::ForwardColumns;

@@ -56,7 +56,7 @@ impl Engine {
     /// What the layer above read from its columns, as words.
     fn words_above(&self, layer: usize, samples: &Range<usize>) -> (Vec<i16>, u64) {
         let above = &self.layers[layer + 1];
-        let (sums, inputs) = (&self.registers[layer + 1].backward, above.spec.sample_inputs());
+        let (sums, inputs) = (&self.registers[layer + 1].backward, above.spec.sample_sums());
         assert_eq!(sums.len(), self.samples * inputs, "the layer above was read backwards");
         backward_words(
             &sums[samples.start * inputs..samples.end * inputs],

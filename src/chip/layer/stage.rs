@@ -107,6 +107,13 @@ impl super::LayerSpec {
         self.convolution.map_or(inputs, |shape| shape.height * shape.width * shape.channels)
     }
 
+    /// Sums of a sample that a transposed read gives: one a pixel below a window, else one a row that data drive. What is
+    /// driven in two phases, for its sign, is one row still.
+    #[must_use]
+    pub fn sample_sums(&self) -> usize {
+        self.sample_inputs() / self.driven_by.phases()
+    }
+
     /// Rows and columns of what its units hand on, behind the pool.
     #[must_use]
     pub fn pooled(&self) -> [usize; 2] {

@@ -106,7 +106,7 @@ impl Network {
         let this = &self.layers[layer];
         let code = this.unit_code(Stream::P);
         // a sum of a pixel is read and stored; what is handed down is kept as words
-        let bits = 64 * added + 16 * this.sample_inputs() as u64;
+        let bits = 64 * added + 16 * this.sample_sums() as u64;
         self.charge(layer, code, during, Event::ShiftAdds, added);
         self.charge(layer, code, during, Event::SramBits, bits);
     }

@@ -172,7 +172,7 @@ impl Network {
             }
             WordSource::Above => {
                 let (own, above) = (&self.layers[layer], &self.layers[layer + 1]);
-                let inputs = above.sample_inputs();
+                let inputs = above.sample_sums();
                 let sums = &above.backward[sample * inputs..][..inputs];
                 let asked = own.place_bits() * inputs as u64;
                 let code = own.unit_code(Stream::P);

@@ -61,6 +61,11 @@ impl TickLayer {
         self.window.shape.map_or(inputs, |shape| shape.height * shape.width * shape.channels)
     }
 
+    /// Sums of a sample that transposed reads give.
+    pub(in super::super) fn sample_sums(&self) -> usize {
+        self.sample_inputs() / self.driven_by.phases()
+    }
+
     /// Puts codes of data on the rows of all banks.
     pub(in super::super) fn load_inputs(&mut self, codes: &[u8]) {
         for (sample, codes) in codes.chunks_exact(self.sample_inputs()).enumerate() {
@@ -118,7 +123,7 @@ impl TickLayer {
         (sample, samples): (usize, usize),
         position: usize,
     ) -> u64 {
-        let (size, sums) = (self.sample_inputs(), self.backward_sums());
+        let (size, sums) = (self.sample_sums(), self.backward_sums());
         self.backward.resize(samples * size, 0);
         let kept = &mut self.backward[sample * size..(sample + 1) * size];
         let Some(shape) = self.window.shape else {
