@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# All tests, as continuous integration runs them: from nothing to green in about a quarter of an hour on two quiet cores.
+# All tests, as continuous integration runs them: from nothing to green in some twenty minutes on two quiet cores.
 #
 #   bash tests/all.sh                 sets up what is missing, and says so; needs rustup and a C compiler by hand
 #   bash tests/all.sh --no-install    installs nothing: what needs a missing tool is SKIPPED
