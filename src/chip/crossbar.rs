@@ -10,6 +10,7 @@ use std::ops::Range;
 use aligned_vec::{AVec, avec};
 use bitvec::prelude::*;
 
+use super::device::StuckCell;
 use super::hardware::{FloorKind, Hardware, Window};
 
 use kernel::{Cells, Drives, Kernel};
@@ -22,6 +23,7 @@ pub mod layout;
 mod optimise;
 mod pulses;
 mod state;
+mod stuck;
 mod trains;
 mod words;
 mod write;
@@ -42,8 +44,12 @@ pub struct Crossbar {
     low: AVec<u8>,
     high: Option<AVec<u8>>,
     residual: Option<Vec<u16>>,
-    /// Which cells are gone for good, of absorbing floors: [`Cells::GONE`], or 0.
+    /// Which cells do not move: of absorbing floors those that are gone for good, and the stuck ones. [`Cells::GONE`], or 0.
     pruned: Option<Vec<u8>>,
+    /// Whether the floor absorbs.
+    absorbs: bool,
+    /// Cells that hold their level, row by row.
+    stuck: Vec<StuckCell>,
 }
 
 /// The parts of some panels side by side that a write may change.
@@ -79,13 +85,16 @@ impl Crossbar {
         let cells = layout.cells_padded();
         let [low, high] = hardware.cell.window.floor().to_le_bytes();
         let wide = hardware.cell.level_bits.get() > 8;
+        let absorbs = hardware.cell.floor_kind == FloorKind::Absorbing;
         Self {
             layout,
             window: hardware.cell.window,
             low: avec![low; cells],
             high: wide.then(|| avec![high; cells]),
             residual: (hardware.write.residual_bits.get() > 0).then(|| vec![0; cells]),
-            pruned: (hardware.cell.floor_kind == FloorKind::Absorbing).then(|| vec![0; cells]),
+            pruned: absorbs.then(|| vec![0; cells]),
+            absorbs,
+            stuck: vec![],
         }
     }
 
@@ -103,7 +112,7 @@ impl Crossbar {
         u16::from_le_bytes([self.low[at], self.high.as_ref().map_or(0, |high| high[at])])
     }
 
-    /// Loads a row of levels.
+    /// Loads a row of levels; stuck cells keep theirs.
     ///
     /// # Panics
     /// When a level lies outside the window: levels are checked at the door.
@@ -114,12 +123,18 @@ impl Crossbar {
                 (self.window.floor()..=self.window.ceiling()).contains(&level),
                 "level {level} lies outside the window"
             );
-            let at = self.layout.index(row, column);
-            let [low, high] = level.to_le_bytes();
-            self.low[at] = low;
-            if let Some(plane) = &mut self.high {
-                plane[at] = high;
-            }
+            self.put(row, column, level);
+        }
+        self.hold_row(row);
+    }
+
+    /// Puts a level into a cell.
+    fn put(&mut self, row: usize, column: usize, level: u16) {
+        let at = self.layout.index(row, column);
+        let [low, high] = level.to_le_bytes();
+        self.low[at] = low;
+        if let Some(plane) = &mut self.high {
+            plane[at] = high;
         }
     }
 
@@ -181,13 +196,18 @@ impl Crossbar {
             .map(|residual| cells.map(|(r, c)| residual[self.layout.index(r, c)]).collect())
     }
 
-    /// Which cells are gone for good, row-major; `None` unless the floor absorbs.
+    /// Which cells are gone for good, row-major; `None` unless the floor absorbs. A stuck cell is none of them.
     #[must_use]
     pub fn pruned(&self) -> Option<BitVec<u8, Lsb0>> {
         let Layout { rows, columns } = self.layout;
         let cells = (0..rows).flat_map(|row| (0..columns).map(move |column| (row, column)));
-        let pruned = self.pruned.as_ref()?;
-        Some(cells.map(|(r, c)| pruned[self.layout.index(r, c)] != 0).collect())
+        let pruned = self.pruned.as_ref().filter(|_| self.absorbs)?;
+        let mut gone: BitVec<u8, Lsb0> =
+            cells.map(|(r, c)| pruned[self.layout.index(r, c)] != 0).collect();
+        for cell in &self.stuck {
+            gone.set(cell.row as usize * columns + cell.column as usize, false);
+        }
+        Some(gone)
     }
 
     /// Restores the remainders, row-major.
@@ -209,12 +229,14 @@ impl Crossbar {
     /// When the floor does not absorb or the number differs.
     pub fn load_pruned(&mut self, values: &BitSlice<u8, Lsb0>) {
         let layout = self.layout;
-        let pruned = self.pruned.as_mut().expect("only absorbing floors load pruned cells");
+        assert!(self.absorbs, "only absorbing floors load pruned cells");
+        let pruned = self.pruned.as_mut().expect("made with the array");
         assert_eq!(values.len(), layout.cells(), "one bit a cell");
         for (i, gone) in values.iter().by_vals().enumerate() {
             let at = layout.index(i / layout.columns, i % layout.columns);
             pruned[at] = if gone { Cells::GONE } else { 0 };
         }
+        self.mark_stuck();
     }
 
     /// Low bytes of the levels of some blocks of a panel.

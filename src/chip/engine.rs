@@ -14,6 +14,7 @@
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
 use std::ops::Range;
+use std::sync::Arc;
 
 use aligned_vec::{AVec, CACHELINE_ALIGN};
 
@@ -24,7 +25,7 @@ use super::hardware::Hardware;
 use super::layer::{DrivenBy, Layer, Readings};
 use super::ledger::{Cycles, During, Event, Ledger, coded};
 use super::population::{Stream, Wiring};
-use crate::num::tables::Scales;
+use crate::num::tables::{Gaussian, Scales};
 
 mod calibrate;
 mod columns;
@@ -35,6 +36,7 @@ mod forward;
 mod homeostasis;
 mod look;
 mod mute;
+mod noise;
 mod normalise;
 mod optimise;
 #[cfg(test)]
@@ -237,6 +239,8 @@ pub struct Engine {
     /// Threads that share large operations.
     team: Team,
     seed: u64,
+    /// Of what makes this chip another than its like: stuck cells, noise.
+    chip_seed: u64,
     /// Only potentiating pulses: excitatory arrays take positive gates, inhibitory ones negative gates.
     potentiation_only: bool,
     /// What is told of the pulses of a write.
@@ -258,6 +262,10 @@ pub struct Engine {
     samples: usize,
     /// Samples that `LOADX` has brought since the start, by phase: state.
     loaded: [u64; 3],
+    /// Phase of the loaded samples, and how many came in it before them.
+    came: (Phase, u64),
+    /// Gaussian numbers, where conversions are noisy.
+    gaussian: Option<Arc<Gaussian>>,
     /// Samples written one by one since ranges of converters were last looked at: state where they track.
     unlooked: u64,
     phase: Phase,
@@ -290,10 +298,11 @@ impl Engine {
         let codes = |layer: usize| (layer < last).then_some(hardware.drive.bits);
         let units = layers.iter().zip(0..).map(|(l, at)| Units::new(l, codes(at))).collect();
         let collect = passes::collect(&hardware);
-        Self {
+        let mut engine = Self {
             backend,
             team: Team::of_one(backend),
             seed,
+            chip_seed: seed,
             potentiation_only: false,
             collect,
             mantissas: vec![1; count],
@@ -311,6 +320,8 @@ impl Engine {
             layers,
             samples: 0,
             loaded: [0; 3],
+            came: (Phase::Training, 0),
+            gaussian: hardware.read_noise.map(|_| Arc::new(Gaussian::new())),
             unlooked: 0,
             phase: Phase::Training,
             ledgers: [ledger.clone(), ledger.clone(), ledger],
@@ -318,7 +329,9 @@ impl Engine {
             tape: None,
             began: None,
             hardware,
-        }
+        };
+        engine.draw_faults();
+        engine
     }
 
     /// Shares large operations among so many threads from now on; no bit depends on it. An engine starts with one.
@@ -387,8 +400,8 @@ impl Engine {
         if let Some(tape) = &mut self.tape {
             tape.clear();
             let layers = self.layers.clone();
-            let (unit, unlooked) = (self.unit.clone(), self.unlooked);
-            self.began = Some(Box::new(UpdateStart { layers, unit, unlooked }));
+            let (unit, unlooked, loaded) = (self.unit.clone(), self.unlooked, self.loaded);
+            self.began = Some(Box::new(UpdateStart { layers, unit, unlooked, loaded }));
         }
     }
 
@@ -516,6 +529,7 @@ impl Engine {
         assert!(greatest <= self.hardware.drive.bits.code_max(), "codes have `drive_bits` bits");
         self.samples = codes.len() / inputs;
         let samples = self.samples;
+        self.came = (self.phase, self.loaded[self.phase as usize]);
         self.loaded[self.phase as usize] += samples as u64;
         if let Some(shape) = layer.spec.convolution {
             self.load_image(shape, codes);

@@ -1,6 +1,7 @@
 //! What a chip is, as checked numbers. A hardware model file becomes one of these at the door.
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
+use super::device::{Faults, ReadNoise};
 use crate::num::fixed::{
     AdcBits, DriveBits, ErrorBits, IncrementMax, LevelBits, LutBits, OutOfRange, ResidualBits,
 };
@@ -267,6 +268,10 @@ pub struct HardwareSpec {
     pub write: WriteSpec,
     /// Cycles of what a tile does; `None`: no cycles are counted.
     pub timing: Option<Timing>,
+    /// Cells that are stuck.
+    pub faults: Faults,
+    /// What conversions are off by; `None`: nothing.
+    pub read_noise: Option<ReadNoise>,
 }
 
 /// Parts that make no chip.
@@ -327,7 +332,8 @@ impl Hardware {
     /// When a number lies outside what a chip of this kind can have, or parts contradict one another.
     pub fn new(spec: HardwareSpec) -> Result<Self, HardwareError> {
         // without `..`: a new part is checked here or does not compile
-        let HardwareSpec { cell, tile, drive, adc, digital, write, timing } = &spec;
+        let HardwareSpec { cell, tile, drive, adc, digital, write, timing, faults, read_noise } =
+            &spec;
         let CellSpec { level_bits, window, floor_kind: _ } = cell;
         let TileSpec { rows, columns, count_max, transposed_read: _ } = tile;
         let DriveSpec { bits: drive_bits, dac_bits } = drive;
@@ -364,6 +370,15 @@ impl Hardware {
         }
         if let WriteScheme::Trains { slots_log2 } = *scheme {
             check_trains(slots_log2, *increment_max, *residual_bits, *timing)?;
+        }
+        if faults.total() > 1 << 32 {
+            let found = "make more than all cells".to_owned();
+            let allowed = "the shares of stuck cells add up to at most 1".to_owned();
+            return Err(HardwareError { key: "device.faults", found, allowed });
+        }
+        if let Some(ReadNoise { sigma }) = read_noise {
+            let most = u64::from(ReadNoise::SIGMA_MAX);
+            between("device.read_noise.sigma_cells", (*sigma).into(), [1, most])?;
         }
         Ok(Self(spec))
     }
@@ -412,6 +427,8 @@ impl Hardware {
                 scheme: WriteScheme::Rounded,
             },
             timing: None,
+            faults: Faults::NONE,
+            read_noise: None,
         };
         Self::new(spec).expect("the reference is a chip")
     }

@@ -75,6 +75,7 @@ pub fn record(
     network.set_learning(engine.mantissas(), engine.potentiation_only());
     network.set_error_unit(&start.unit);
     network.set_unlooked(start.unlooked);
+    network.set_loaded(start.loaded);
     let place = TileAt { layer: look.tile.layer - first_layer, ..look.tile };
     let grid = (place.layer < engine.layers().len()).then(|| network.grid(place.layer));
     let inside = |[targets, downs, acrosses]: [usize; 3]| {

@@ -13,6 +13,8 @@
 //! Words are little endian. See docs/MODEL.md, 3.4.
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
+use std::ops::Range;
+
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 
@@ -26,6 +28,8 @@ pub enum Site {
     InitialLevels = 1,
     /// Order of the samples in an epoch.
     Shuffle = 2,
+    /// What a conversion reads beside the current.
+    ReadNoise = 5,
     /// Actions that a policy tries.
     Exploration = 7,
     /// How episodes of an environment begin and go on.
@@ -40,6 +44,8 @@ pub enum Site {
     RowTrain = 12,
     /// Pulse trains of columns.
     ColumnTrain = 13,
+    /// Which cells are stuck, and where.
+    StuckCell = 16,
 }
 
 /// Bytes of one block.
@@ -128,6 +134,30 @@ impl Place {
     #[must_use]
     pub fn half(&self, rows: usize, row: usize, column: usize) -> u16 {
         self.halves(rows, column, row / 32)[row % 32]
+    }
+
+    /// The 32-bit word of one cell.
+    #[must_use]
+    pub fn whole(&self, rows: usize, row: usize, column: usize) -> u32 {
+        let mut bytes = [0; BLOCK_BYTES];
+        self.fill(block(rows, column, row / 16, BLOCK_BYTES / 4), &mut bytes);
+        let at = 4 * (row % 16);
+        u32::from_le_bytes([bytes[at], bytes[at + 1], bytes[at + 2], bytes[at + 3]])
+    }
+
+    /// The words of some whole columns, `width` bytes each: whole blocks, so that the words of a column lie one after the other
+    /// and what lies behind them is unused. `bytes` holds as many blocks as the columns have.
+    ///
+    /// # Panics
+    /// When `bytes` is not that long.
+    pub fn columns(&self, rows: usize, columns: Range<usize>, width: usize, bytes: &mut [u8]) {
+        let blocks = rows.div_ceil(BLOCK_BYTES / width);
+        assert_eq!(
+            bytes.len(),
+            blocks * columns.len() * BLOCK_BYTES,
+            "whole blocks of the columns"
+        );
+        self.fill((columns.start * blocks) as u64, bytes);
     }
 
     /// 32-bit words one after the other, from block 0.
@@ -239,6 +269,15 @@ mod tests {
         assert_eq!(bytes, all[5 * 64..5 * 64 + 6]);
         let at = 64 * (3 + 2) + 2 * 5;
         assert_eq!(PLACE.half(70, 69, 1), u16::from_le_bytes([all[at], all[at + 1]]));
+        // five blocks of whole words: row 37 is word 5 of the third of column 1
+        let mut wide = vec![0; 64 * 10];
+        PLACE.columns(70, 0..2, 4, &mut wide);
+        let at = 64 * (5 + 2) + 4 * 5;
+        let word = u32::from_le_bytes([wide[at], wide[at + 1], wide[at + 2], wide[at + 3]]);
+        assert_eq!(PLACE.whole(70, 37, 1), word);
+        let mut second = vec![0; 64 * 5];
+        PLACE.columns(70, 1..2, 4, &mut second);
+        assert_eq!(second, wide[64 * 5..]);
     }
 
     #[test]

@@ -24,7 +24,7 @@ mod scales;
 mod softmax;
 mod unit;
 
-pub use gaussian::half_gaussian;
+pub use gaussian::{Gaussian, half_gaussian};
 pub use policy::PolicyTables;
 pub use rate::{Decay, LEVELS_SHIFT_MAX, Rate, RateOf, SHIFT_MAX};
 pub use scales::{Factor, Scales};

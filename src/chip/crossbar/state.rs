@@ -31,7 +31,7 @@ impl Crossbar {
         for (row, levels) in seen.iter().flat_map(|all| all.chunks(shape[1]).enumerate()) {
             self.load_row(row, levels);
         }
-        if self.pruned.is_some() {
+        if self.absorbs {
             let pruned = format!("{name}.pruned");
             let bits = || self.pruned().expect("just seen");
             if let Some(bits) = visitor.bits(&piece(&pruned, 0..=1), shape, &bits)? {

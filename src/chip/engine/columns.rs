@@ -5,17 +5,20 @@
 //! d[row] = (E - I) u+  -  (E - I) u-  =  (E - I) u           sums are exact: two phases are one signed product
 //! ```
 //!
-//! Row sums of all positions are added to the pixels that drove the rows. See docs/MODEL.md, 3.8.
+//! Its conversions lose nothing; where reads are noisy, what they are off by is added to the sums. Row sums of all positions
+//! are added to the pixels that drove the rows. See docs/MODEL.md, 3.8.
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
 use std::ops::Range;
 
 use super::each::each;
 use super::error::{packed_at, stride_of};
+use super::noise::disturb_rows;
 use super::update::SUM_BITS;
 use super::{Engine, window};
 use crate::chip::crossbar::kernel::Drives;
 use crate::chip::crossbar::layout::{BLOCK_ROWS, HALF_COLUMNS};
+use crate::chip::device::Direction;
 use crate::chip::ledger::{During, Event};
 use crate::chip::population::Stream;
 
@@ -40,6 +43,9 @@ impl Engine {
         let arrays = pair.map(|at| &this.arrays[at]);
         let (samples, reads) = (self.samples, self.reads(layer));
         let (positions, inputs) = (spec.positions(), spec.sample_sums());
+        let noise = self.noise(layer, Direction::Rows);
+        let codes = pair.map(|at| spec.wiring.pathways()[at].code);
+        let ([_, across], hardware) = (this.tiles(&self.hardware), &self.hardware);
         let mut backward = std::mem::take(&mut self.registers[layer].backward);
         backward.clear();
         backward.resize(samples * inputs, 0);
@@ -71,6 +77,12 @@ impl Engine {
                                 window::fold(spec, rows, read % positions, (shift, negate), pixels);
                             }
                         });
+                    }
+                    for read in group.filter(|_| noise.is_some()) {
+                        let at = (read - first) / positions * inputs;
+                        let (noise, pixels) = (noise.as_ref(), &mut sums[at..at + inputs]);
+                        let of = (hardware, spec, layout.rows);
+                        disturb_rows(noise.expect("looked"), codes, of, (read, across), pixels);
                     }
                 }
             },

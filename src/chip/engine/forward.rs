@@ -22,6 +22,7 @@ use super::read::{Histogram, Mode, PanelPart, Reader, Seen};
 use super::window::windows_of;
 use crate::chip::crossbar::kernel::{HandOn, Image, Kernel, LookUp, Scratch, TOGETHER, Windows};
 use crate::chip::crossbar::layout::{BLOCK_ROWS, PANEL_COLUMNS};
+use crate::chip::device::Direction;
 use crate::chip::hardware::{Adc, Hardware, Subtract};
 use crate::chip::layer::Layer;
 use crate::chip::ledger::{During, Event};
@@ -147,6 +148,7 @@ impl Engine {
         }
         let samples = self.reads(layer);
         let notes = self.notes(layer, mode);
+        let noise = self.noise(layer, Direction::Columns);
         let direct = self.hands_on_directly(layer);
         let (head, tail) = self.registers.split_at_mut(layer + 1);
         let own = &mut head[layer];
@@ -156,7 +158,10 @@ impl Engine {
         let readers: Vec<_> = wiring
             .targets()
             .iter()
-            .map(|&target| Reader::new(this, &self.hardware, target, samples, mode, drives))
+            .map(|&target| {
+                let mode = (mode, noise.clone());
+                Reader::new(this, &self.hardware, target, samples, mode, drives)
+            })
             .collect();
         let mut values: [&mut [u8]; 2] = match tail.first_mut() {
             Some(next) if direct => next.drives.each_mut().map(|drives| &mut drives[..]),
@@ -204,6 +209,7 @@ impl Engine {
     fn put_out_near(&mut self, layer: usize, mode: Mode) -> Vec<Seen> {
         let reads = self.reads(layer);
         let notes = self.notes(layer, mode);
+        let noise = self.noise(layer, Direction::Columns);
         let direct = self.hands_on_directly(layer);
         let (head, tail) = self.registers.split_at_mut(layer + 1);
         let own = &mut head[layer];
@@ -250,6 +256,8 @@ impl Engine {
                 let drives = |source: Stream| &near[this.spec.drives_of(source).index()][..];
                 let samples = some.len();
                 let reader = |&target| {
+                    let noise = noise.as_ref().map(|noise| noise.from_read(some.start));
+                    let mode = (mode, noise);
                     let mut reader = Reader::new(this, hardware, target, samples, mode, drives);
                     reader.prepare(kernel);
                     let middle = Middle::of(this, target, &reader, notes);

@@ -20,6 +20,7 @@ use super::each::each;
 use super::read::{Mode, PanelPart, Reader, Seen};
 use crate::chip::crossbar::kernel::{HandOn, Kernel, SQUARED_MAX, Scratch, TOGETHER};
 use crate::chip::crossbar::layout::{BLOCK_ROWS, PANEL_COLUMNS};
+use crate::chip::device::Direction;
 use crate::chip::ledger::Event;
 use crate::chip::periphery::normalise;
 use crate::chip::population::Stream;
@@ -49,6 +50,7 @@ impl Engine {
     /// Reads a layer and normalises its streams. What was seen, by target.
     pub(super) fn normalised(&mut self, layer: usize, mode: Mode, hand_on: HandOn) -> Vec<Seen> {
         let samples = self.samples;
+        let noise = self.noise(layer, Direction::Columns);
         let (head, tail) = self.registers.split_at_mut(layer + 1);
         let (own, next) = (&mut head[layer], tail.first_mut().expect("a layer is driven"));
         let this = &self.layers[layer];
@@ -57,7 +59,10 @@ impl Engine {
         let readers: Vec<_> = wiring
             .targets()
             .iter()
-            .map(|&target| Reader::new(this, &self.hardware, target, samples, mode, drives))
+            .map(|&target| {
+                let mode = (mode, noise.clone());
+                Reader::new(this, &self.hardware, target, samples, mode, drives)
+            })
             .collect();
         let blocks = this.layout.columns.div_ceil(BLOCK_ROWS);
         let mut parts: Vec<(usize, Near<'_>)> = Vec::new();

@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! narrow   every sum fits 31 bits by the plan, and nobody has to see a current: kernels convert and look up
-//! wide     anything else: 64 bits, one conversion after the other
+//! wide     anything else: 64 bits, one conversion after the other; all reads whose conversions are noisy
 //! ```
 //!
 //! Both give the same numbers. On the wide way currents exist as numbers in one place, [`Reader::currents`], between
@@ -14,16 +14,20 @@ use std::borrow::Cow;
 use std::ops::Range;
 
 use super::homeostasis::{Noted, Notes};
+use super::noise::Noisy;
 use crate::chip::crossbar::Crossbar;
 use crate::chip::crossbar::kernel::{Banks, Conversion, Drives, Greatest, Kernel, Scratch};
 use crate::chip::crossbar::layout::{BLOCK_ROWS, PANEL_COLUMNS};
+use crate::chip::device::Noise;
 use crate::chip::hardware::{Adc, Hardware, Subtract};
 use crate::chip::layer::{CHUNK_BLOCKS, Layer};
-use crate::chip::periphery::{self, Converter};
+use crate::chip::periphery::Converter;
 use crate::chip::population::{BANKS_MAX, Stream, Wiring};
 use signed::{below_from_above, both_phases};
+use tiles::{Tiles, tile_reads};
 
 mod signed;
+mod tiles;
 
 /// Histogram of the least shifts at which conversions stay off the rail, and the greatest current, by slice.
 pub(super) type Histogram = Vec<([u64; 64], i64)>;
@@ -49,6 +53,8 @@ impl Mode {
 /// Rows that are read together with one slice of their drives.
 struct TileRead<'a> {
     slice: usize,
+    /// Physical tile, from the top; the first of several.
+    tile: usize,
     blocks: Range<usize>,
     /// Blocks of a physical tile among them.
     tile_blocks: usize,
@@ -130,6 +136,8 @@ pub(super) struct Reader<'a> {
     dac_bits: u32,
     slices: usize,
     greatest: Greatest,
+    /// What conversions are off by.
+    noisy: Option<Noisy>,
     narrow: bool,
     /// Sums lie below this.
     bound: u128,
@@ -143,7 +151,7 @@ impl<'a> Reader<'a> {
         hardware: &Hardware,
         target: Stream,
         samples: usize,
-        mode: Mode,
+        (mode, noise): (Mode, Option<Noise>),
         drives: impl Fn(Stream) -> &'a [u8],
     ) -> Self {
         let wiring = layer.spec.wiring;
@@ -164,11 +172,12 @@ impl<'a> Reader<'a> {
         };
         let pairs = wiring.pairs(target);
         let bound = bound(layer, hardware, pairs.len(), converters.as_ref());
-        let narrow = bound.is_some() && !mode.shows_currents();
+        let narrow = bound.is_some() && !mode.shows_currents() && noise.is_none();
         let tiles = match (&converters, narrow) {
-            (None, _) => Tiles::Whole,
+            // a lossless conversion is off all the same
+            (None, _) if noise.is_none() => Tiles::Whole,
             (Some(_), true) => Tiles::Together,
-            (Some(_), false) => Tiles::Apart,
+            _ => Tiles::Apart,
         };
         let code_max = hardware.drive.bits.code_max();
         let phases = layer.spec.driven_by.phases();
@@ -197,6 +206,7 @@ impl<'a> Reader<'a> {
                     code_max.min(slice_max(hardware))
                 },
             },
+            noisy: noise.map(|noise| Noisy::new(noise, wiring, pairs, (phases, hardware))),
             narrow,
             bound: bound.unwrap_or(u128::MAX),
             columns: layer.layout.columns,
@@ -374,8 +384,13 @@ impl<'a> Reader<'a> {
             for read in 0..pair.reads[0].len() {
                 let [e, i] = &mut currents;
                 let (e, i) = (&mut e[..sums.len()], &mut i[..sums.len()]);
-                self.currents(kernel, pair, read, part, [e, i]);
-                let slice = pair.reads[0][read].slice;
+                self.currents(kernel, pair, read, part, [&mut *e, &mut *i]);
+                let TileRead { slice, tile, .. } = pair.reads[0][read];
+                if let Some(noisy) = &self.noisy {
+                    let lines = (part.panel, part.live);
+                    let both = [&mut *e, &mut *i];
+                    noisy.disturb(at, (slice, tile), lines, &part.samples, both);
+                }
                 self.convert([e, i], at, slice, part.live, sums, seen);
             }
         }
@@ -502,89 +517,6 @@ fn bound(
             let slices = || (0..).zip(converters).map(fits);
             let most = narrow.then(|| slices().sum::<Option<u128>>()).flatten()?;
             Some(most + 1)
-        }
-    }
-}
-
-/// How rows are taken together.
-#[derive(Clone, Copy, PartialEq, Eq)]
-enum Tiles {
-    /// All rows, in chunks whose sums fit 32 bits; the full code.
-    Whole,
-    /// Tiles one after the other in one read, where their edges allow it.
-    Together,
-    /// A read a tile.
-    Apart,
-}
-
-/// Slices and tiles of a batch of drives.
-fn tile_reads<'a>(
-    layer: &Layer,
-    hardware: &Hardware,
-    drives: &'a [u8],
-    samples: usize,
-    tiles: Tiles,
-) -> Vec<TileRead<'a>> {
-    let blocks = layer.layout.blocks();
-    let size = samples * BLOCK_ROWS;
-    let drives = &drives[..blocks * size];
-    if tiles == Tiles::Whole {
-        let starts = (0..blocks).step_by(CHUNK_BLOCKS);
-        let chunk = |start: usize| start..(start + CHUNK_BLOCKS).min(blocks);
-        return starts
-            .map(chunk)
-            .map(|blocks| TileRead {
-                slice: 0,
-                tile_blocks: blocks.len(),
-                codes: Cow::Borrowed(&drives[blocks.start * size..blocks.end * size]),
-                blocks,
-                sums: vec![],
-            })
-            .collect();
-    }
-    let (dac_bits, slices) = (hardware.drive.dac_bits, hardware.slices());
-    let aligned =
-        hardware.tile.rows.is_multiple_of(BLOCK_ROWS) || layer.layout.rows <= hardware.tile.rows;
-    let mut reads = Vec::new();
-    for slice in 0..slices {
-        let sliced = |codes: &'a [u8]| -> Cow<'a, [u8]> {
-            if slices == 1 {
-                Cow::Borrowed(codes)
-            } else {
-                codes.iter().map(|&x| periphery::slice(x, slice, dac_bits)).collect()
-            }
-        };
-        if tiles == Tiles::Together && aligned {
-            let tile_blocks = hardware.tile.rows.div_ceil(BLOCK_ROWS);
-            let codes = sliced(drives);
-            let (slice, sums) = (slice as usize, vec![]);
-            reads.push(TileRead { slice, blocks: 0..blocks, tile_blocks, codes, sums });
-            continue;
-        }
-        for rows in layer.row_tiles(hardware) {
-            let blocks = rows.start / BLOCK_ROWS..rows.end.div_ceil(BLOCK_ROWS);
-            let mut codes = sliced(&drives[blocks.start * size..blocks.end * size]);
-            if !aligned {
-                silence(codes.to_mut(), blocks.clone(), &rows, size);
-            }
-            debug_assert!(blocks.len() <= CHUNK_BLOCKS, "a converted tile is one chunk");
-            let tile_blocks = blocks.len();
-            let (slice, sums) = (slice as usize, vec![]);
-            reads.push(TileRead { slice, blocks, tile_blocks, codes, sums });
-        }
-    }
-    reads
-}
-
-/// A tile's edge lies inside a block: drives of its neighbours' rows become 0.
-fn silence(codes: &mut [u8], blocks: Range<usize>, rows: &Range<usize>, size: usize) {
-    for (block, codes) in blocks.zip(codes.chunks_exact_mut(size)) {
-        let first = block * BLOCK_ROWS;
-        let from = rows.start.saturating_sub(first).min(BLOCK_ROWS);
-        let to = (rows.end - first).min(BLOCK_ROWS);
-        for codes in codes.chunks_exact_mut(BLOCK_ROWS) {
-            codes[..from].fill(0);
-            codes[to..].fill(0);
         }
     }
 }

@@ -16,6 +16,8 @@ pub struct UpdateStart {
     pub unit: ErrorUnit,
     /// Samples written one by one since ranges were last looked at.
     pub unlooked: u64,
+    /// Samples loaded before, by phase.
+    pub loaded: [u64; 3],
 }
 
 /// An operation with numbers of its own, or what happens between operations.

@@ -173,6 +173,7 @@ impl Engine {
             self.write_kept(layer, &ready, shift)
         };
         drop(ready);
+        self.layers[layer].arrays.iter_mut().for_each(Crossbar::end_write);
         if let Some(pulses) = &mut self.registers[layer].pulses {
             for (array, first, part) in &written {
                 pulses.merge(&self.layers[layer], *array, *first, &part.collected);

@@ -116,6 +116,8 @@ impl Config {
         let has = |effect: &&Effect| match (effect.of, effect.key) {
             // a floor above 0 is a lowest level that conducts
             (_, "on_off") => self.hardware.cell.window.floor() == 0,
+            (_, "stuck_cells") => self.hardware.faults.is_none(),
+            (_, "read_noise") => self.hardware.read_noise.is_none(),
             (Substrate::Any, _) => true,
             (Substrate::Electronic, _) => !optical,
             (Substrate::Optical, _) => optical,
@@ -184,5 +186,13 @@ mod tests {
     fn a_floor_above_0_is_an_on_off_ratio() {
         assert!(find(&absent(None, &[]), "on_off").is_some());
         assert!(find(&absent(None, &["hw.cell.floor=2"]), "on_off").is_none());
+    }
+
+    #[test]
+    fn what_is_simulated_is_not_said_to_be_absent() {
+        let stuck = absent(None, &["hw.device.faults.stuck_any=0.01"]);
+        assert!(find(&stuck, "stuck_cells").is_none() && find(&stuck, "read_noise").is_some());
+        let noisy = absent(None, &["hw.device.read_noise.sigma_cells=0.1"]);
+        assert!(find(&noisy, "stuck_cells").is_some() && find(&noisy, "read_noise").is_none());
     }
 }

@@ -1,11 +1,11 @@
 //! From the keys of a chip to checked numbers: defaults, ranges, and what fits with what.
 
-use super::ConfigError;
 use super::check::{between, range, word, wrong};
 use super::file::{
     AdcFile, AdcTable, CellFile, DriveFile, ErrorFile, HardwareFile, LutFile, RangeFile, TileFile,
     TimingFile, WriteFile,
 };
+use super::{ConfigError, device};
 use crate::chip::hardware::timing::CYCLES_MAX;
 use crate::chip::hardware::{
     Adc, AdcRange, CellSpec, ConverterKind, DigitalSpec, DitherBits, DitherPattern, DriveSpec,
@@ -105,6 +105,7 @@ pub(super) fn resolve(file: &mut HardwareFile, prefix: &str) -> Result<Hardware,
     let scheme = scheme(write, &key, increments)?;
     let slices = Slices { mode, converter, count: drive_bits.get().div_ceil(dac_bits), dac_bits };
     let timing = file.timing.as_mut().map(|table| timing(table, &slices, &key)).transpose()?;
+    let (faults, read_noise) = device::resolve(file.device.as_ref(), &key)?;
     let spec = HardwareSpec {
         cell: CellSpec { level_bits, window, floor_kind },
         tile: TileSpec { rows: tile_rows, columns: tile_columns, count_max, transposed_read },
@@ -113,6 +114,8 @@ pub(super) fn resolve(file: &mut HardwareFile, prefix: &str) -> Result<Hardware,
         digital: DigitalSpec { lut_bits, error_bits },
         write: WriteSpec { increment_max, dither_bits, dither_pattern, residual_bits, scheme },
         timing,
+        faults,
+        read_noise,
     };
     Hardware::new(spec)
         .map_err(|HardwareError { key: at, found, allowed }| wrong(&key(at), found, allowed))

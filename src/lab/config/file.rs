@@ -6,6 +6,7 @@ use std::fmt;
 use serde::de::{self, Deserializer, MapAccess, Visitor};
 use serde::{Deserialize, Serialize};
 
+use super::device::DeviceFile;
 use super::law::{ScalesFile, Settings};
 use super::quantity::{AreaKey, EnergyKey, PowerKey};
 
@@ -314,6 +315,8 @@ keys! {
         write: WriteFile,
         /// Cycles of what a tile does; without it no cycles are counted.
         timing: TimingFile,
+        /// What real cells and converters do that ideal ones do not.
+        device: DeviceFile,
         /// Joules of an event, by quantity and unit.
         energy: BTreeMap<EnergyKey, NumberFile>,
         /// Watts that flow whatever happens.

@@ -7,6 +7,7 @@
 
 use super::{Config, ConfigError, Select, TrainOn};
 use crate::chip::crossbar::kernel::ConvShape;
+use crate::chip::device::Faults;
 use crate::chip::hardware::{
     Adc, AdcRange, CellSpec, DigitalSpec, DitherBits, DitherPattern, DriveSpec, FloorKind,
     HardwareSpec, PulseCode, Subtract, TileSpec, Timing, WriteScheme, WriteSpec,
@@ -87,6 +88,10 @@ const FROZEN: &[(&str, &str)] = &[
     ("critic.error", "one_vs_all"),
     ("network.input", "values"),
     ("learning.flip", "false"),
+    ("faults.floor", "0"),
+    ("faults.ceiling", "0"),
+    ("faults.any", "0"),
+    ("read_noise.sigma", "0"),
 ];
 
 /// Key and word.
@@ -415,7 +420,8 @@ impl List {
     }
 
     fn chip(&mut self, hardware: &HardwareSpec) {
-        let HardwareSpec { cell, tile, drive, adc, digital, write, timing } = hardware;
+        let HardwareSpec { cell, tile, drive, adc, digital, write, timing, faults, read_noise } =
+            hardware;
         let CellSpec { level_bits, window, floor_kind } = cell;
         let TileSpec { rows, columns, count_max, transposed_read } = tile;
         let DriveSpec { bits: drive_bits, dac_bits } = drive;
@@ -477,6 +483,11 @@ impl List {
         if let Some(timing) = *timing {
             self.timing(timing);
         }
+        let Faults { floor, ceiling, any } = faults;
+        self.put("faults.floor", floor.get());
+        self.put("faults.ceiling", ceiling.get());
+        self.put("faults.any", any.get());
+        self.put("read_noise.sigma", read_noise.map_or(0, |noise| noise.sigma));
     }
 
     /// The clock turns cycles into seconds and is read by no schedule: it is no part of what decides a run.

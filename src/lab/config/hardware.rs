@@ -128,6 +128,13 @@ fn provenance(file: &HardwareFile) -> Vec<(&'static str, Option<&str>, Option<&s
         )*};
     }
     table!(cell tile drive lut error write timing);
+    let device = file.device.as_ref();
+    if let Some(table) = device.and_then(|device| device.faults.as_ref()) {
+        all.push(("device.faults", table.source.as_deref(), table.kind.as_deref()));
+    }
+    if let Some(table) = device.and_then(|device| device.read_noise.as_ref()) {
+        all.push(("device.read_noise", table.source.as_deref(), table.kind.as_deref()));
+    }
     if let Some(super::file::AdcFile::Finite(table)) = &file.adc {
         all.push(("adc", table.source.as_deref(), table.kind.as_deref()));
     }

@@ -135,6 +135,14 @@ fn complete(hw: &mut HardwareFile, settings: &[String]) {
         )*};
     }
     tables!(cell tile drive lut error write timing);
+    if let Some(device) = &mut hw.device {
+        if let Some(table) = &mut device.faults {
+            settle("device.faults", &mut table.source, &mut table.kind);
+        }
+        if let Some(table) = &mut device.read_noise {
+            settle("device.read_noise", &mut table.source, &mut table.kind);
+        }
+    }
     if let Some(AdcFile::Finite(table)) = &mut hw.adc {
         settle("adc", &mut table.source, &mut table.kind);
     }

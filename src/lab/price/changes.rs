@@ -60,7 +60,8 @@ pub fn changes(run: &Hardware, other: &Hardware) -> Vec<Change> {
         }
     };
     // without `..`: what a chip gets is a difference here or does not compile
-    let HardwareSpec { cell, tile, drive, adc, digital, write, timing } = &**run;
+    let HardwareSpec { cell, tile, drive, adc, digital, write, timing, faults, read_noise } =
+        &**run;
     let CellSpec { level_bits, window, floor_kind } = cell;
     let TileSpec { rows, columns, count_max: _, transposed_read: _ } = tile;
     let DriveSpec { bits: drive_bits, dac_bits: _ } = drive;
@@ -85,6 +86,8 @@ pub fn changes(run: &Hardware, other: &Hardware) -> Vec<Change> {
     differ("write.dither", *dither_pattern != other.write.dither_pattern, LEARNT, true);
     let remainders = *residual_bits != other.write.residual_bits;
     differ("write.residual_bits", remainders, REMAINDERS, true);
+    differ("device.faults", *faults != other.faults, LEARNT, true);
+    differ("device.read_noise", *read_noise != other.read_noise, LEARNT, true);
     differ("write.scheme", *scheme != other.write.scheme, SCHEME, true);
 
     match (*timing, other.timing) {

@@ -65,7 +65,9 @@ impl Classify {
         engine.set_threads(threads).map_err(|error| RunError::NoThreads { threads, error })?;
         let codes = trainer.calibrate(&train).map(|calibration| calibration.code_max);
         let low = codes.into_iter().flatten().enumerate().filter(|&(_, code_max)| code_max <= 3);
-        let notes = low.map(|(layer, code_max)| Note::LowCodes { layer, code_max }).collect();
+        let mut notes: Vec<_> =
+            low.map(|(layer, code_max)| Note::LowCodes { layer, code_max }).collect();
+        notes.extend(super::notes::stuck([trainer.driver()]));
         Ok(Self { trainer, train, validation, test: split.test, select: config.select, notes })
     }
 

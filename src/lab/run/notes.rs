@@ -17,6 +17,7 @@
 
 use crate::chip::ledger::Event;
 use crate::lab::store::record::{EpochRecord, Note, Receipt, Score, TestRecord};
+use crate::learn::driver::Driver;
 
 /// What ends at a rail or a bound: its name, the event, of what, and what share is too much of hidden layers and of the
 /// outputs.
@@ -174,6 +175,13 @@ fn chance((Score { correct, total }, constant): (Score, u64)) -> Option<Note> {
     (total > 0 && (correct <= constant || doubtful)).then_some(note)
 }
 
+/// How many cells of these networks are stuck, if any are.
+pub(super) fn stuck<'a>(drivers: impl IntoIterator<Item = &'a Driver>) -> Option<Note> {
+    let counts = drivers.into_iter().map(|driver| driver.engine().stuck_cells());
+    let [stuck, cells] = counts.fold([0; 2], |[a, b], [stuck, cells]| [a + stuck, b + cells]);
+    (stuck > 0).then_some(Note::Stuck { stuck, cells })
+}
+
 /// What the user of a run should know beside its result, from its receipt and its records: what calibration found, then
 /// what was seen layer by layer, then what came of it.
 ///
@@ -189,7 +197,8 @@ pub fn notes(receipt: &Receipt, records: &[EpochRecord]) -> Vec<Note> {
 
 /// As [`notes`], of records that were looked at.
 pub(super) fn with_calibration(receipt: &Receipt, watcher: &Watcher) -> Vec<Note> {
-    let found = receipt.notes.iter().filter(|note| matches!(note, Note::LowCodes { .. })).cloned();
+    let kept = |note: &&Note| matches!(note, Note::LowCodes { .. } | Note::Stuck { .. });
+    let found = receipt.notes.iter().filter(kept).cloned();
     found.chain(watcher.notes(receipt.data.classes, receipt.classified())).collect()
 }
 

@@ -70,7 +70,8 @@ impl Memory {
     pub fn of_network(layers: &[LayerSpec], hardware: &Hardware, batch: Batch) -> Self {
         let planes = if hardware.cell.level_bits.get() > 8 { 2 } else { 1 };
         let residual = if hardware.write.residual_bits.get() > 0 { 2 } else { 0 };
-        let pruned = u64::from(hardware.cell.floor_kind == FloorKind::Absorbing);
+        let absorbs = hardware.cell.floor_kind == FloorKind::Absorbing;
+        let pruned = u64::from(absorbs || !hardware.faults.is_none());
         let of = |layer: &LayerSpec| {
             let rows = layer.inputs + usize::from(layer.constant_row);
             let layout = Layout { rows, columns: layer.units };

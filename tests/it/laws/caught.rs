@@ -5,7 +5,7 @@ use proptest::prelude::*;
 use proptest::strategy::ValueTree;
 use proptest::test_runner::TestRunner;
 
-use super::choose::{Choice, Net, choices, net, side};
+use super::choose::{Choice, Net, choices, flawed, net, side};
 use super::fault::Fault;
 use super::play::{law, script};
 
@@ -15,7 +15,7 @@ const CASES: usize = 96;
 /// The same cases in every run.
 fn cases() -> Vec<(Net, Vec<Choice>)> {
     let small = prop_oneof![9 => 1usize..=12, 1 => side()];
-    let strategy = (net(prop::collection::vec(small, 2..=4)), choices());
+    let strategy = (net(prop::collection::vec(small, 2..=4)).prop_map(flawed), choices());
     let mut runner = TestRunner::deterministic();
     (0..CASES).map(|_| strategy.new_tree(&mut runner).unwrap().current()).collect()
 }

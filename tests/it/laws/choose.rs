@@ -1,5 +1,6 @@
 //! Any valid chip, any small network on it, any list of choices.
 
+use dalean::chip::device::{Chance, Faults, ReadNoise};
 use dalean::chip::hardware::{
     Adc, AdcRange, ConverterKind, DitherBits, DitherPattern, FloorKind, Hardware, HardwareSpec,
     PulseCode, SliceTime, SliceTimes, Subtract, Timing, Window, WriteScheme, converter,
@@ -370,6 +371,26 @@ pub(crate) fn timed_net() -> impl Strategy<Value = Net> {
         }
         net
     })
+}
+
+/// A network of which one in three has stuck cells, and one in three noisy reads.
+pub(crate) fn flawed(mut net: Net) -> Net {
+    let flaw = flaws(net.seed);
+    net.change(flaw);
+    net
+}
+
+/// The flaws of a chip of this seed: of their own, so that nothing else depends on them.
+pub(crate) fn flaws(seed: u64) -> impl Fn(&mut HardwareSpec) {
+    let mut numbers = Numbers(seed ^ 0x5bd1_e995);
+    let mut share = || Chance::new(1 << numbers.within(20, 30)).unwrap();
+    let faults = Faults { floor: share(), ceiling: share(), any: share() };
+    let sigma = 1 << numbers.within(0, 19);
+    let [stuck, noisy] = [0, 1].map(|_| numbers.within(0, 2) == 0);
+    move |h| {
+        h.faults = if stuck { faults } else { Faults::NONE };
+        h.read_noise = noisy.then_some(ReadNoise { sigma });
+    }
 }
 
 /// One decision: what to do, and with which numbers.

@@ -97,11 +97,23 @@ pub(crate) enum Fault {
     EvaluationIsTracked,
     /// The least code of a difference is not on the rail.
     LeastCodeIsNoRail,
+    /// A load moves stuck cells.
+    StuckCellIsLoaded,
+    /// Pulses move stuck cells.
+    StuckCellMoves,
+    /// An absorbing floor prunes cells that are stuck on it.
+    StuckCellIsPruned,
+    /// A conversion has the noise of the line beside it.
+    NoiseOfNeighbour,
+    /// All samples of a batch have the noise of the first.
+    NoiseOfFirstSample,
+    /// Reads from the columns have no noise.
+    BackwardIsQuiet,
 }
 
 impl Fault {
     /// All of them.
-    pub(crate) const ALL: [Self; 47] = [
+    pub(crate) const ALL: [Self; 53] = [
         Self::WrapAtCeiling,
         Self::FloorOffByOne,
         Self::CeilingOffByOne,
@@ -149,5 +161,11 @@ impl Fault {
         Self::RailsAreKept,
         Self::EvaluationIsTracked,
         Self::LeastCodeIsNoRail,
+        Self::StuckCellIsLoaded,
+        Self::StuckCellMoves,
+        Self::StuckCellIsPruned,
+        Self::NoiseOfNeighbour,
+        Self::NoiseOfFirstSample,
+        Self::BackwardIsQuiet,
     ];
 }

@@ -11,11 +11,12 @@ use dalean::chip::layer::{self, Delivery, DrivenBy, LayerSpec};
 use dalean::chip::ledger::{During, Event, Ledger};
 use dalean::chip::population::{Polarity, Stream};
 use dalean::learn::error::Centre;
-use dalean::num::tables::{Activation, Lut};
+use dalean::num::tables::{Activation, Lut, half_gaussian};
 
 use super::choose::Net;
 use super::fault::Fault;
 
+mod flaws;
 mod unit;
 mod write;
 
@@ -40,6 +41,8 @@ pub(crate) type Table = Vec<Vec<i64>>;
 /// One array: `[row][column]`.
 #[derive(Debug, Clone)]
 pub(crate) struct Array {
+    /// Levels of cells that hold theirs.
+    stuck: Vec<Vec<Option<i64>>>,
     pub(crate) level: Table,
     pub(crate) residual: Table,
     pub(crate) pruned: Vec<Vec<bool>>,
@@ -76,6 +79,10 @@ pub(crate) struct Shadow {
     samples: usize,
     /// Samples loaded so far, by phase.
     pub(crate) loaded: [u64; 3],
+    /// Phase of the loaded samples, and samples of it before them.
+    came: (Phase, u64),
+    /// An absolute Gaussian, where conversions are noisy.
+    half_gaussian: Vec<u16>,
     /// Running means of the error unit.
     pub(crate) means: Vec<i64>,
     /// Samples written one by one since ranges were looked at.
@@ -92,9 +99,11 @@ impl Shadow {
     pub(crate) fn new(net: &Net, fault: Option<Fault>) -> Self {
         let hw = &net.hardware;
         let floor = i64::from(hw.cell.window.floor());
-        let layers = net.specs.iter().zip(&net.deliveries).map(|(spec, delivery)| {
+        let layers = net.specs.iter().zip(&net.deliveries).enumerate();
+        let layers = layers.map(|(at, (spec, delivery))| {
             let rows = spec.inputs + usize::from(spec.constant_row);
             let array = Array {
+                stuck: vec![vec![None; spec.units]; rows],
                 level: table(rows, spec.units, floor),
                 residual: table(rows, spec.units, 0),
                 pruned: vec![vec![false; spec.units]; rows],
@@ -121,13 +130,17 @@ impl Shadow {
             };
             let tracks = matches!(hw.adc, Adc::Finite { range: AdcRange::Tracking, .. });
             let rails = shifts.iter().filter(|_| tracks).map(|s: &Vec<u32>| vec![[0; 2]; s.len()]);
+            let mut arrays = vec![array; spec.wiring.pathways().len()];
+            for (array, pathway) in arrays.iter_mut().zip(spec.wiring.pathways()) {
+                array.stick(net, at, pathway.code);
+            }
             Side {
                 rails: rails.collect(),
                 spec: spec.clone(),
                 delivery: delivery.clone(),
                 lut: Lut::new(spec.activation, hw.digital.lut_bits, layer::unit(spec, hw)),
                 rows,
-                arrays: vec![array; spec.wiring.pathways().len()],
+                arrays,
                 adc_shifts: shifts,
                 drives: Default::default(),
                 accumulators: Default::default(),
@@ -145,6 +158,8 @@ impl Shadow {
             layers: layers.collect(),
             samples: 0,
             loaded: [0; 3],
+            came: (Phase::Training, 0),
+            half_gaussian: hw.read_noise.map_or(vec![], |_| half_gaussian()),
             unlooked: 0,
             means: if net.centre == Centre::Running { vec![0; outputs] } else { vec![] },
             phase: Phase::Training,
@@ -174,8 +189,11 @@ impl Shadow {
     }
 
     pub(crate) fn load_weights(&mut self, layer: usize, array: usize, row: usize, levels: &[u16]) {
-        self.layers[layer].arrays[array].level[row] =
-            levels.iter().map(|&v| i64::from(v)).collect();
+        let moves = self.is(Fault::StuckCellIsLoaded);
+        let Array { level, stuck, .. } = &mut self.layers[layer].arrays[array];
+        for ((cell, stuck), &loaded) in level[row].iter_mut().zip(&stuck[row]).zip(levels) {
+            *cell = stuck.filter(|_| !moves).unwrap_or(i64::from(loaded));
+        }
         let (code, cells) = (self.code(layer, array), levels.len() as u64);
         self.count(layer, code, During::LoadWeights, Event::CellLoads, cells);
     }
@@ -202,6 +220,7 @@ impl Shadow {
         let rows = codes.chunks_exact(inputs * self.phases(0) as usize);
         let rows: Table = rows.map(|row| (0..inputs).map(|at| number(row, at)).collect()).collect();
         self.samples = rows.len();
+        self.came = (self.phase, self.loaded[self.phase as usize]);
         self.loaded[self.phase as usize] += rows.len() as u64;
         let rows: Table = rows.into_iter().map(|row| self.with_constant(0, row)).collect();
         self.layers[0].drives = [rows.clone(), rows];
@@ -236,7 +255,7 @@ impl Shadow {
         let source = this.spec.wiring.pathways()[bank].source;
         let drives = &this.drives[source.index()][sample];
         let mask = (1i64 << self.net.hardware.drive.dac_bits) - 1;
-        let whole = self.net.hardware.adc == Adc::Ideal;
+        let whole = self.is_whole();
         let mut rows = rows;
         if self.is(Fault::TileEdgeLost) && rows.end < this.rows {
             rows.end -= 1;
@@ -249,6 +268,11 @@ impl Shadow {
         .sum()
     }
 
+    /// Whether all rows may be driven at once by whole codes.
+    fn is_whole(&self) -> bool {
+        self.net.hardware.adc == Adc::Ideal && self.net.hardware.read_noise.is_none()
+    }
+
     /// Reads one target stream. Returns the currents every converter saw, by slice, when `probe` reads with
     /// ideal converters.
     fn read(&mut self, layer: usize, target: Stream, probe: bool) -> Vec<Vec<i64>> {
@@ -257,7 +281,7 @@ impl Shadow {
         let pairs = self.layers[layer].spec.wiring.pairs(target);
         let (tiles, phases) = (self.row_tiles(layer), self.phases(layer));
         let slices =
-            if hw.adc == Adc::Ideal { 1 } else { hw.drive.bits.get().div_ceil(hw.drive.dac_bits) };
+            if self.is_whole() { 1 } else { hw.drive.bits.get().div_ceil(hw.drive.dac_bits) };
         let mut seen = vec![vec![]; slices as usize];
         let (mut accumulators, mut saturated, mut look_ups) =
             (vec![], vec![[0; 2]; pairs.len()], 0);
@@ -266,15 +290,27 @@ impl Shadow {
             let mut row = vec![];
             for column in 0..units {
                 let mut acc = 0;
-                let reads = tiles.iter().flat_map(|tile| (0..slices).map(move |s| (tile, s)));
+                let reads = tiles.iter().enumerate();
+                let reads = reads.flat_map(|tile| (0..slices).map(move |s| (tile, s)));
                 let reads = reads.flat_map(|read| (0..pairs.len()).map(move |pair| (read, pair)));
                 let reads = reads.flat_map(|read| (0..phases).map(move |phase| (read, phase)));
-                for (((tile, s), pair), phase) in reads {
+                for ((((number, tile), s), pair), phase) in reads {
                     let (at, banks, saturated) =
                         ([sample, column], pairs[pair], &mut saturated[pair]);
                     let driven = (phase, s);
-                    let [e, i] =
-                        banks.map(|bank| self.current(layer, bank, at, tile.clone(), driven));
+                    let [e, i] = [0, 1].map(|which| {
+                        let current = self.current(layer, banks[which], at, tile.clone(), driven);
+                        let once =
+                            matches!(hw.adc, Adc::Finite { subtract: Subtract::Current, .. });
+                        if once && which == 1 {
+                            return current;
+                        }
+                        let code = self.code(layer, banks[which]);
+                        let phase = u32::try_from(phase).unwrap();
+                        let sub = s + (phase << 8);
+                        let place = (layer, code, sub);
+                        current + self.noise(place, sample, [tiles.len(), number, column])
+                    });
                     let weight =
                         if self.is(Fault::SliceShiftMissing) { 0 } else { s * hw.drive.dac_bits };
                     let d = match hw.adc {

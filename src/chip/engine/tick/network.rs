@@ -39,6 +39,8 @@ pub struct Network {
     /// Samples written one by one since ranges were looked at; `None` where converters do not track.
     unlooked: Option<u64>,
     samples: usize,
+    /// Samples loaded so far, by phase.
+    loaded: [u64; 3],
     phase: Phase,
     ledgers: [Ledger; 3],
     /// Cycles played so far.
@@ -74,6 +76,7 @@ impl Network {
             unit: Unit::new(hardware),
             unlooked: tracks.then_some(0),
             samples: 0,
+            loaded: [0; 3],
             phase: Phase::Training,
             ledgers: [ledger.clone(), ledger.clone(), ledger],
             clock: 0,
@@ -104,6 +107,11 @@ impl Network {
     /// Takes over how many samples were written one by one since ranges were looked at.
     pub fn set_unlooked(&mut self, unlooked: u64) {
         self.unlooked = self.unlooked.map(|_| unlooked);
+    }
+
+    /// Takes over how many samples were loaded so far, by phase.
+    pub const fn set_loaded(&mut self, loaded: [u64; 3]) {
+        self.loaded = loaded;
     }
 
     /// Writes are done: thresholds and steps move and, where converters track, ranges are looked at after those of a batch, or
@@ -240,6 +248,11 @@ impl Network {
             match segment {
                 Segment::LoadDrives { codes } => {
                     self.samples = codes.len() / self.layers[0].sample_inputs();
+                    let phase = self.phase as usize;
+                    for layer in &mut self.layers {
+                        layer.count_reads(self.phase, self.loaded[phase]);
+                    }
+                    self.loaded[phase] += self.samples as u64;
                     self.layers[0].load_inputs(codes);
                 }
                 Segment::LoadWeights { layer, array, row, levels } => {

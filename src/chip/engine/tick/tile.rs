@@ -23,7 +23,7 @@ mod write;
 pub use balance::TileBalance;
 use balance::TileReadings;
 pub use command::Command;
-pub use config::{More, Squares, TileAdc, TileConfig, TileSize, TileUnits};
+pub use config::{More, Squares, TileAdc, TileConfig, TileNoise, TileSize, TileUnits};
 pub use events::{BankEvents, TileEvents};
 use optimise::Kept;
 pub(super) use optimise::Said;
@@ -166,6 +166,8 @@ pub struct Tile {
     /// `[row][column]`.
     level: [Vec<u16>; 2],
     pruned: [Vec<bool>; 2],
+    /// Which cells hold their level whatever happens.
+    stuck: [Vec<bool>; 2],
     residual: [Vec<i64>; 2],
     /// `[slot][row]`.
     drive: [Vec<u8>; 2],
@@ -230,6 +232,7 @@ impl Tile {
         Self {
             level: [vec![0; cells], vec![0; cells]],
             pruned: [vec![false; cells], vec![false; cells]],
+            stuck: [vec![false; cells], vec![false; cells]],
             residual: two(cells),
             drive: [vec![0; size.slots * size.rows], vec![0; size.slots * size.rows]],
             lines: [lines(size.columns), lines(size.rows)],
@@ -341,7 +344,9 @@ impl Tile {
                 for (bank, levels) in levels.into_iter().enumerate() {
                     let at = row * self.size.columns;
                     let count = self.config.columns;
-                    self.level[bank][at..at + count].copy_from_slice(&levels[..count]);
+                    let cells = self.level[bank][at..].iter_mut().zip(&self.stuck[bank][at..]);
+                    let free = cells.zip(&levels[..count]).filter(|((_, stuck), _)| !**stuck);
+                    free.for_each(|((cell, _), &level)| *cell = level);
                     self.bank_events[bank].cell_loads += count as u64;
                 }
             }

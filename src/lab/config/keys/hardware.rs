@@ -2,6 +2,7 @@
 
 use super::KeyFileKind::Hardware;
 use super::{KeyEntry, KeyTable, KeyValues, flag, key, other, real, whole, words};
+use crate::lab::config::device::{DeviceFile, FaultsFile, ReadNoiseFile};
 use crate::lab::config::file::{
     AdcTable, CellFile, DriveFile, ErrorFile, HardwareFile, LutFile, NumberFile, TileFile,
     TimingFile, WriteFile,
@@ -37,6 +38,24 @@ pub(super) const TABLES: &[KeyTable] = &[
         TIMING,
     ),
     table(
+        "device",
+        "What real cells and converters do that ideal ones do not; without a table of it, nothing of the kind.",
+        DeviceFile::MEANINGS,
+        DEVICE,
+    ),
+    table(
+        "device.faults",
+        "Cells that hold one level, whatever is loaded or written: shares of all cells, which add up to at most 1.",
+        FaultsFile::MEANINGS,
+        FAULTS,
+    ),
+    table(
+        "device.read_noise",
+        "What conversions are off by: a Gaussian number each.",
+        ReadNoiseFile::MEANINGS,
+        READ_NOISE,
+    ),
+    table(
         "energy.*",
         "One physical number of `[energy]`, `[power]` or `[area]`; the unit is in its key.",
         NumberFile::MEANINGS,
@@ -69,6 +88,7 @@ const ROOT: &[KeyEntry] = &[
     other("error", "a table"),
     other("write", "a table"),
     other("timing", "a table").otherwise("no cycles are counted"),
+    other("device", "a table").otherwise("cells and reads are ideal"),
     other("energy", "a table of physical numbers").otherwise("no energy is reckoned"),
     other("power", "a table of physical numbers"),
     other("area", "a table of physical numbers"),
@@ -279,6 +299,25 @@ const TIMING: &[KeyEntry] = &[
         .only("", COUNTED)
         .otherwise("a whole row of both banks"),
     whole("beat_cycles", 1, 1_000_000).unit("cycles").default("1").only("", COUNTED),
+    PROVENANCE[0],
+    PROVENANCE[1],
+];
+
+const DEVICE: &[KeyEntry] = &[
+    other("faults", "a table").otherwise("every cell works"),
+    other("read_noise", "a table").otherwise("reads are free of noise"),
+];
+
+const FAULTS: &[KeyEntry] = &[
+    real("stuck_floor", 1e-9, 1.0).unit("of the cells").otherwise("none"),
+    real("stuck_ceiling", 1e-9, 1.0).unit("of the cells").otherwise("none"),
+    real("stuck_any", 1e-9, 1.0).unit("of the cells").otherwise("none"),
+    PROVENANCE[0],
+    PROVENANCE[1],
+];
+
+const READ_NOISE: &[KeyEntry] = &[
+    real("sigma_cells", 1e-4, 16.0).unit("cells").otherwise("the table needs it"),
     PROVENANCE[0],
     PROVENANCE[1],
 ];

@@ -16,6 +16,13 @@ pub enum Note {
         /// Greatest code.
         code_max: i64,
     },
+    /// Cells of the chip hold one level.
+    Stuck {
+        /// Such cells.
+        stuck: u64,
+        /// Of so many.
+        cells: u64,
+    },
     /// Many conversions saturated while learning.
     Saturated {
         /// Epochs by then.
@@ -101,6 +108,10 @@ impl fmt::Display for Note {
                 f,
                 "layer {layer}: on the first training examples the converters use codes 0 to {code_max} only; currents \
                  grow while learning, but if accuracy stays low, give them more hw.adc.bits or a smaller range"
+            ),
+            Self::Stuck { stuck, cells } => write!(
+                f,
+                "{stuck} of {cells} cells are stuck (hw.device.faults): they hold one level, whatever is loaded or written"
             ),
             Self::Saturated { epoch, saturated, conversions } => write!(
                 f,

@@ -77,7 +77,7 @@ impl Shadow {
         let banks = this.spec.wiring.banks(Stream::P);
         let (rows, columns) = (this.rows, this.spec.units);
         let mut backward = vec![];
-        for gates in &this.gates[Stream::P.index()] {
+        for (sample, gates) in this.gates[Stream::P.index()].iter().enumerate() {
             for row in 0..this.spec.inputs {
                 let phase = |positive: bool| -> i64 {
                     let driven = gates.iter().enumerate().filter(|(_, u)| (**u > 0) == positive);
@@ -85,7 +85,8 @@ impl Shadow {
                     driven.map(|(c, u)| u.abs() * (levels(banks[0], c) - levels(banks[1], c))).sum()
                 };
                 let negative = if self.is(Fault::BackwardPhaseAdds) { 1 } else { -1 };
-                backward.push(phase(true) + negative * phase(false));
+                let off = self.backward_noise(layer, banks, sample, row);
+                backward.push(phase(true) + negative * phase(false) + off);
             }
         }
         self.layers[layer].backward = backward;
@@ -203,9 +204,12 @@ impl Shadow {
             if self.is(Fault::CeilingOffByOne) {
                 after = (before + pulses).clamp(floor_bound, ceiling + 1);
             }
-            if gone {
+            let stuck = array.stuck[row][column].is_some() && !self.is(Fault::StuckCellMoves);
+            if gone || stuck {
                 after = before;
             }
+            let pruned = self.is(Fault::StuckCellIsPruned);
+            let prunes = array.stuck[row][column].is_none() || pruned;
             let left = total - (pulses << fraction);
             let reached = before + pulses;
             let held = match reached {
@@ -220,7 +224,7 @@ impl Shadow {
             array.level[row][column] = after;
             array.residual[row][column] = kept;
             array.pruned[row][column] |=
-                hw.cell.floor_kind == FloorKind::Absorbing && pulsed && after == floor;
+                prunes && hw.cell.floor_kind == FloorKind::Absorbing && pulsed && after == floor;
             requested += u64::from(wanted != 0);
             bounded += u64::from(wanted != pulses);
             attempted += pulses.unsigned_abs();

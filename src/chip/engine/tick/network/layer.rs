@@ -8,6 +8,7 @@
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
 use std::ops::Range;
+use std::sync::Arc;
 
 use super::super::tile::{BankEvents, Command, Launch, Tile, TileEvents, TileSize};
 use super::balance::Balancing;
@@ -19,11 +20,13 @@ use crate::chip::layer::{Delivery, DrivenBy, Layer, Optimiser};
 use crate::chip::ledger::{During, Part};
 use crate::chip::population::{Stream, Wiring};
 use crate::num::fixed::DriveBits;
-use crate::num::tables::Activation;
+use crate::num::tables::{Activation, Gaussian};
 
 mod build;
 mod draws;
+mod noise;
 mod optimise;
+mod ranges;
 mod window;
 
 use build::config;
@@ -73,6 +76,8 @@ pub(super) struct TickLayer {
     dither: (u32, DitherPattern),
     slots_log2: u32,
     seed: u64,
+    /// Gaussian numbers and the standard deviation of a conversion, where conversions are noisy.
+    noise: Option<(Arc<Gaussian>, i64)>,
     /// Writes of every array so far.
     writes: u64,
     /// On their way through a tree: cycles left, the head they go to, from columns, sums.
@@ -140,6 +145,7 @@ impl TickLayer {
                 WriteScheme::Trains { slots_log2 } => slots_log2,
             },
             seed,
+            noise: noise::of(hardware),
             writes: layer.writes.first().copied().unwrap_or(0),
             tree: vec![],
             delay: added.map(|tiles| timing.beat * tree_levels(tiles as u64)),
@@ -159,6 +165,7 @@ impl TickLayer {
                 }
             }
         }
+        this.stick(hardware);
         this.load_state(layer);
         this.load_words(layer);
         this
@@ -274,43 +281,6 @@ impl TickLayer {
     /// The code at which the units of a target are counted.
     pub(super) fn unit_code(&self, target: Stream) -> u8 {
         self.codes(self.heads(target))[0]
-    }
-
-    pub(super) fn set_adc_shifts(&mut self, adc_shifts: &[Vec<u32>]) {
-        self.adc_shifts = adc_shifts.to_vec();
-        let each = self.grid[0] * self.grid[1];
-        for (tile, tick) in self.tiles.iter_mut().enumerate() {
-            let (target, _) = self.planes[tile / each];
-            if let Some(shifts) = adc_shifts.get(target.index()) {
-                tick.set_adc_shifts(shifts);
-            }
-        }
-    }
-
-    /// Takes the codes that tiles have seen; they count where `counted` says so and converters track.
-    pub(super) fn take_rails(&mut self, counted: bool) {
-        for tile in 0..self.tiles.len() {
-            let (target, _) = self.planes[self.plane(tile)];
-            let seen = self.tiles[tile].take_rails();
-            if let Some(rails) = self.rails.get_mut(target.index()).filter(|_| counted) {
-                let both = rails.iter_mut().flatten().zip(seen.into_iter().flatten());
-                both.for_each(|(sum, more)| *sum += more);
-            }
-        }
-    }
-
-    /// Ranges are looked at: a slice of which more than one code in 64 lay on the rail takes a greater step.
-    pub(super) fn look(&mut self) {
-        let mut adc_shifts = self.adc_shifts.clone();
-        for (shifts, rails) in adc_shifts.iter_mut().zip(&mut self.rails) {
-            for (shift, [on_rail, codes]) in shifts.iter_mut().zip(rails) {
-                if 64 * *on_rail > *codes {
-                    *shift += 1;
-                }
-                (*on_rail, *codes) = (0, 0);
-            }
-        }
-        self.set_adc_shifts(&adc_shifts);
     }
 
     /// Loads a row of an array; the code of its pathway.

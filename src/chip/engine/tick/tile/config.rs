@@ -2,6 +2,7 @@
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
 use super::TileBalance;
+use crate::chip::device::Noise;
 use crate::chip::hardware::{PulseCode, SliceTime};
 use crate::num::fixed::DriveBits;
 
@@ -159,6 +160,21 @@ pub struct More {
     pub phases: usize,
     /// How words come pixel by pixel; `None`: a sample has one set of words, which all its positions hear.
     pub squares: Option<Squares>,
+    /// What conversions are off by.
+    pub noise: Option<TileNoise>,
+}
+
+/// Noise of the conversions of a tile, through rows and through columns.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct TileNoise {
+    /// Through the columns while rows are driven, and the other way.
+    pub ways: [Noise; 2],
+    /// Pathway codes of both banks.
+    pub codes: [u8; 2],
+    /// Number of the tile among those that are added up, each way.
+    pub at: [usize; 2],
+    /// First line of the logical array that a line of the tile is, each way.
+    pub first: [usize; 2],
 }
 
 /// Squares of positions, each of which hears the words of the pixel that a pool makes of it.
@@ -213,6 +229,7 @@ impl Default for More {
             positions: 1,
             phases: 1,
             squares: None,
+            noise: None,
         }
     }
 }

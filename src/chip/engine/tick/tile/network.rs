@@ -1,7 +1,7 @@
 //! What a network of tiles asks of one: state from outside, state to compare, parts at work, counts.
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
-use super::{BankEvents, ErrorStep, Tile, TileEvents, UpdKind, UpdPhase, Way};
+use super::{BankEvents, ErrorStep, Tile, TileEvents, TileNoise, UpdKind, UpdPhase, Way};
 
 impl Tile {
     const fn place(&self, row: usize, column: usize) -> usize {
@@ -16,7 +16,20 @@ impl Tile {
         level: u16,
     ) {
         let at = self.place(row, column);
-        self.level[bank][at] = level;
+        if !self.stuck[bank][at] {
+            self.level[bank][at] = level;
+        }
+    }
+
+    /// A cell holds this level from now on.
+    pub(in super::super) fn stick(&mut self, bank: usize, row: usize, column: usize, level: u16) {
+        let at = self.place(row, column);
+        (self.level[bank][at], self.stuck[bank][at]) = (level, true);
+    }
+
+    /// What conversions are off by from the next read on.
+    pub(in super::super) fn set_noise(&mut self, noise: Option<TileNoise>) {
+        self.config.more.noise = noise;
     }
 
     pub(in super::super) fn restore(

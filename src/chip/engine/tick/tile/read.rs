@@ -4,6 +4,7 @@
 use std::ops::Range;
 
 use super::{Lane, Launch, Tile, TileAdc, TileUnits, Way};
+use crate::chip::device::NoisePlace;
 use crate::chip::hardware::Subtract;
 use crate::chip::periphery::{self, Converter};
 use crate::num::fixed::AdcBits;
@@ -158,7 +159,23 @@ impl Tile {
     fn convert(&mut self, way: Way, line: usize) {
         let slice = self.conv.slice % self.config.slices;
         let lines = &mut self.lines[way as usize];
-        let [e, i] = [0, 1].map(|bank| lines.hold[bank][line]);
+        let [mut e, mut i] = [0, 1].map(|bank| lines.hold[bank][line]);
+        if let Some(noise) = &self.config.more.noise {
+            // what is converted once is off once
+            let once = way == Way::Rows && matches!(self.config.adc, TileAdc::Current { .. });
+            let off = |bank: usize| {
+                let at = NoisePlace {
+                    pathway: noise.codes[bank],
+                    slice,
+                    phase: self.conv.slice / self.config.slices,
+                    read: self.conv.slot as u64,
+                    tile: noise.at[way as usize],
+                };
+                noise.ways[way as usize].one(at, noise.first[way as usize] + line)
+            };
+            e += off(0);
+            i += if once { 0 } else { off(1) };
+        }
         let weight = slice * self.config.dac_bits;
         let adc = match way {
             Way::Rows => self.config.adc,

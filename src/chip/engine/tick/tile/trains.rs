@@ -81,7 +81,7 @@ impl Tile {
         for bank in 0..2 {
             for at in 0..self.trained[bank].len() {
                 let pulsed = std::mem::take(&mut self.trained[bank][at]);
-                let rests = self.level[bank][at] == self.config.floor;
+                let rests = self.level[bank][at] == self.config.floor && !self.stuck[bank][at];
                 self.pruned[bank][at] |= self.config.absorbing && pulsed && rests;
             }
         }

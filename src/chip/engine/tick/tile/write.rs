@@ -388,7 +388,8 @@ impl Tile {
         let before = i64::from(self.level[bank][at]);
         let (floor, ceiling) = (i64::from(self.config.floor), i64::from(self.config.ceiling));
         let wanted = if by > 0 { (before + by).min(ceiling) } else { (before + by).max(floor) };
-        let after = if self.pruned[bank][at] { before } else { wanted };
+        let still = self.pruned[bank][at] || self.stuck[bank][at];
+        let after = if still { before } else { wanted };
         self.level[bank][at] = u16::try_from(after).expect("inside the window");
         let events = &mut self.bank_events[bank];
         events.pulses_attempted += by.unsigned_abs();
@@ -402,6 +403,7 @@ impl Tile {
                 for column in 0..self.config.columns {
                     let at = self.upd.row * self.size.columns + column;
                     let rests = self.level[bank][at] == self.config.floor;
+                    let rests = rests && !self.stuck[bank][at];
                     if rests && self.pulse[bank][column] != 0 {
                         self.pruned[bank][at] = true;
                     }

@@ -110,6 +110,8 @@ pub(super) fn config(
                 greatest: matches!(layer.spec.pool, Pool::Max { .. })
                     .then_some(hardware.drive.bits),
             }),
+            // where samples are loaded
+            noise: None,
         },
     }
 }

@@ -1,0 +1,162 @@
+//! What an engine adds to ideal cells and converters: stuck cells, and noise of reads. The laws are those of `chip::device`.
+#![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
+
+use std::ops::Range;
+use std::sync::Arc;
+
+use super::Engine;
+use super::window::fold;
+use crate::chip::crossbar::layout::PANEL_COLUMNS;
+use crate::chip::device::{Direction, Noise, NoisePlace};
+use crate::chip::hardware::{Adc, Hardware, Subtract};
+use crate::chip::layer::LayerSpec;
+use crate::chip::population::Wiring;
+use crate::num::draw::{Place, Site};
+
+/// Standard deviation of a conversion's noise in units of current, 8 fractional bits; `None` where there is none.
+fn sd(hardware: &Hardware) -> Option<i64> {
+    let bits = hardware.drive.dac_bits.min(hardware.drive.bits.get());
+    let slice_max = u8::MAX >> (8 - bits);
+    Some(hardware.read_noise?.sd(hardware.cell.window.ceiling(), slice_max))
+}
+
+impl Engine {
+    /// Makes it another chip of the same kind: which cells are stuck and what reads are off by are drawn with this seed. Levels of
+    /// cells that were stuck before stay until they are loaded. An engine starts with the seed of its run.
+    pub fn set_chip_seed(&mut self, seed: u64) {
+        self.chip_seed = seed;
+        self.draw_faults();
+    }
+
+    pub(super) fn draw_faults(&mut self) {
+        if self.hardware.faults.is_none() {
+            return;
+        }
+        let seed = self.chip_seed;
+        let window = self.hardware.cell.window;
+        let ends = [window.floor(), window.ceiling()];
+        for (layer, sums) in self.layers.iter_mut().zip(&mut self.row_sums) {
+            let size = [layer.layout.rows, layer.layout.columns];
+            for (array, pathway) in layer.arrays.iter_mut().zip(layer.spec.wiring.pathways()) {
+                let place = Place {
+                    seed,
+                    site: Site::StuckCell,
+                    layer: layer.index,
+                    pathway: pathway.code,
+                    sub: 0,
+                    count: 0,
+                };
+                array.set_stuck(self.hardware.faults.stuck(place, ends, size));
+            }
+            *sums = None;
+        }
+    }
+
+    /// Cells that are stuck, and all cells.
+    #[must_use]
+    pub fn stuck_cells(&self) -> [u64; 2] {
+        let arrays = || self.layers.iter().flat_map(|layer| &layer.arrays);
+        let stuck = arrays().map(|array| array.stuck().len() as u64).sum();
+        [stuck, arrays().map(|array| array.layout().cells() as u64).sum()]
+    }
+
+    /// Noise of the reads of a layer of the loaded samples, if conversions have any.
+    pub(super) fn noise(&self, layer: usize, direction: Direction) -> Option<Noise> {
+        let (table, sd) = (Arc::clone(self.gaussian.as_ref()?), sd(&self.hardware)?);
+        let this = &self.layers[layer];
+        let [down, across] = this.tiles(&self.hardware);
+        let tiles = match direction {
+            Direction::Columns => down,
+            Direction::Rows => across,
+        };
+        let (phase, before) = self.came;
+        let first = before * this.spec.positions() as u64;
+        let of = (phase as u32, first);
+        Some(Noise::new(table, sd, (self.chip_seed, this.index), of, (direction, tiles)))
+    }
+}
+
+/// Noise of the banks of one target stream.
+pub(super) struct Noisy {
+    noise: Noise,
+    /// Pathway codes of both banks, by pair.
+    codes: Vec<[u8; 2]>,
+    /// Times that rows are driven for a read.
+    phases: usize,
+    /// Whether the difference of the banks is converted.
+    at_difference: bool,
+}
+
+impl Noisy {
+    pub(super) fn new(
+        noise: Noise,
+        wiring: Wiring,
+        pairs: &[[usize; 2]],
+        (phases, hardware): (usize, &Hardware),
+    ) -> Self {
+        let code = |&at: &usize| wiring.pathways()[at].code;
+        Self {
+            noise,
+            codes: pairs.iter().map(|pair| pair.each_ref().map(code)).collect(),
+            phases,
+            at_difference: matches!(hardware.adc, Adc::Finite { subtract: Subtract::Current, .. }),
+        }
+    }
+
+    /// Adds to the currents of pair number `pair` in the columns of a panel, `[driving][32]`, what their conversions are off by.
+    pub(super) fn disturb(
+        &self,
+        pair: usize,
+        (slice, tile): (usize, usize),
+        (panel, live): (usize, usize),
+        drivings: &Range<usize>,
+        [e, i]: [&mut [i64]; 2],
+    ) {
+        let first = panel * PANEL_COLUMNS;
+        for (bank, currents) in [e, i].into_iter().enumerate() {
+            if self.at_difference && bank == 1 {
+                continue;
+            }
+            for (driving, currents) in
+                drivings.clone().zip(currents.chunks_exact_mut(PANEL_COLUMNS))
+            {
+                let at = NoisePlace {
+                    pathway: self.codes[pair][bank],
+                    slice: u32::try_from(slice).expect("at most 8 slices"),
+                    phase: u32::try_from(driving % self.phases).expect("two phases"),
+                    read: (driving / self.phases) as u64,
+                    tile,
+                };
+                self.noise.each(at, first..first + live, |line, more| currents[line] += more);
+            }
+        }
+    }
+}
+
+/// Adds to the row sums of a transposed read what its conversions are off by: banks of codes `codes`, each slice with its
+/// weight, the second phase taken off. `read` counts from the first of all reads; `pixels` take what their rows do.
+pub(super) fn disturb_rows(
+    noise: &Noise,
+    codes: [u8; 2],
+    (hardware, spec, rows): (&Hardware, &LayerSpec, usize),
+    (read, tiles): (usize, usize),
+    pixels: &mut [i64],
+) {
+    let slices = hardware.slices();
+    let mut sums = vec![0; rows];
+    for tile in 0..tiles {
+        sums.fill(0);
+        for (pathway, inhibits) in codes.into_iter().zip([false, true]) {
+            for (phase, slice) in (0..2).flat_map(|phase| (0..slices).map(move |s| (phase, s))) {
+                let at = NoisePlace { pathway, slice, phase, read: read as u64, tile };
+                let negative = inhibits != (phase == 1);
+                noise.each(at, 0..rows, |row, more| {
+                    let more = more << (slice * hardware.drive.dac_bits);
+                    let more = i32::try_from(more).expect("at most 62 cells, 2^20 each");
+                    sums[row] += if negative { -more } else { more };
+                });
+            }
+        }
+        fold(spec, &sums, read % spec.positions(), (0, false), pixels);
+    }
+}

@@ -1,0 +1,69 @@
+//! Stuck cells and noisy conversions of a layer's tiles, cell by cell and conversion by conversion from the laws of
+//! `chip::device`.
+#![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
+
+use std::sync::Arc;
+
+use super::TickLayer;
+use crate::chip::device::{Direction, Noise};
+use crate::chip::engine::Phase;
+use crate::chip::engine::tick::tile::TileNoise;
+use crate::chip::hardware::Hardware;
+use crate::num::draw::{Place, Site};
+use crate::num::tables::Gaussian;
+
+/// Gaussian numbers, and the standard deviation of a conversion.
+pub(super) fn of(hardware: &Hardware) -> Option<(Arc<Gaussian>, i64)> {
+    let noise = hardware.read_noise?;
+    let bits = hardware.drive.dac_bits.min(hardware.drive.bits.get());
+    let slice_max = u8::try_from((1u32 << bits) - 1).expect("at most 8 bits");
+    let sd = noise.sd(hardware.cell.window.ceiling(), slice_max);
+    Some((Arc::new(Gaussian::new()), sd))
+}
+
+impl TickLayer {
+    /// Cells that are stuck hold their levels.
+    pub(super) fn stick(&mut self, hardware: &Hardware) {
+        let window = [hardware.cell.window.floor(), hardware.cell.window.ceiling()];
+        if hardware.faults.is_none() {
+            return;
+        }
+        for (array, pathway) in self.wiring.pathways().iter().enumerate() {
+            let place = Place {
+                seed: self.seed,
+                site: Site::StuckCell,
+                layer: self.index,
+                pathway: pathway.code,
+                sub: 0,
+                count: 0,
+            };
+            for cell in 0..self.rows * self.columns {
+                let at = [cell / self.columns, cell % self.columns];
+                if let Some(level) = hardware.faults.stuck_at(place, window, self.rows, at) {
+                    let (tile, bank, row, column) = self.cell(array, cell);
+                    self.tiles[tile].stick(bank, row, column, level);
+                }
+            }
+        }
+    }
+
+    /// Samples are loaded in a phase that had so many before: from there on reads are counted.
+    pub(in super::super) fn count_reads(&mut self, phase: Phase, before: u64) {
+        let Some((table, sd)) = self.noise.clone() else { return };
+        let first = before * self.positions() as u64;
+        for tile in 0..self.tiles.len() {
+            let [down, across] = [tile / self.grid[1] % self.grid[0], tile % self.grid[1]];
+            let way = |direction, tiles| {
+                let place = ((self.seed, self.index), (phase as u32, first));
+                Noise::new(Arc::clone(&table), sd, place.0, place.1, (direction, tiles))
+            };
+            let noise = TileNoise {
+                ways: [way(Direction::Columns, self.grid[0]), way(Direction::Rows, self.grid[1])],
+                codes: self.codes(self.plane(tile)),
+                at: [down, across],
+                first: [across * self.tile[1], down * self.tile[0]],
+            };
+            self.tiles[tile].set_noise(Some(noise));
+        }
+    }
+}
