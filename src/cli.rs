@@ -29,6 +29,7 @@ macro_rules! tell {
 
 mod bench;
 mod data;
+mod deploy;
 mod export;
 mod hw;
 mod keys;

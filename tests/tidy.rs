@@ -49,8 +49,8 @@ const HOUSE: [(&str, &[&str]); 6] = [
     (
         "cli",
         &[
-            "out", "known", "progress", "table", "data", "hw", "keys", "run", "report", "sweep",
-            "export", "store", "price", "runs", "trace", "watch", "bench",
+            "out", "known", "progress", "table", "data", "hw", "keys", "deploy", "run", "report",
+            "sweep", "export", "store", "price", "runs", "trace", "watch", "bench",
         ],
     ),
 ];

@@ -104,6 +104,12 @@ impl Crossbar {
         self.layout
     }
 
+    /// Its window.
+    #[must_use]
+    pub const fn window(&self) -> Window {
+        self.window
+    }
+
     /// The level of a cell.
     #[inline]
     #[must_use]

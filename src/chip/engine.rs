@@ -30,6 +30,7 @@ use crate::num::tables::{Gaussian, Scales};
 mod calibrate;
 mod columns;
 mod currents;
+mod deploy;
 mod each;
 mod error;
 mod forward;
@@ -60,6 +61,7 @@ use forward::Units;
 use schedule::Schedule;
 
 pub use calibrate::{CALIBRATION_SAMPLES, Calibration};
+pub use deploy::AllLevels;
 pub use pulses::{Pulses, TilePeaks, active};
 pub use tape::{Recorded, UpdateStart};
 pub use track::WritesDone;
@@ -264,8 +266,12 @@ pub struct Engine {
     loaded: [u64; 3],
     /// Phase of the loaded samples, and how many came in it before them.
     came: (Phase, u64),
-    /// Gaussian numbers, where conversions are noisy.
+    /// Gaussian numbers, where conversions or loads are noisy.
     gaussian: Option<Arc<Gaussian>>,
+    /// Words of the cells for noisy loads, by layer and array, once they are drawn.
+    load_words: Vec<Vec<Vec<[u16; 2]>>>,
+    /// By layer: what makes up for drift, 12 fractional bits.
+    factors: Vec<Option<i64>>,
     /// Samples written one by one since ranges of converters were last looked at: state where they track.
     unlooked: u64,
     phase: Phase,
@@ -321,7 +327,9 @@ impl Engine {
             samples: 0,
             loaded: [0; 3],
             came: (Phase::Training, 0),
-            gaussian: hardware.read_noise.map(|_| Arc::new(Gaussian::new())),
+            gaussian: noise::gaussian_of(&hardware),
+            load_words: vec![vec![]; count],
+            factors: vec![None; count],
             unlooked: 0,
             phase: Phase::Training,
             ledgers: [ledger.clone(), ledger.clone(), ledger],
@@ -493,12 +501,7 @@ impl Engine {
         }
         match *operation {
             Operation::LoadWeights { layer, array, row, levels } => {
-                let pathway = self.layers[layer].spec.wiring.pathways()[array].code;
-                self.layers[layer].arrays[array].load_row(row, levels);
-                self.row_sums[layer] = None;
-                let (during, count) = (During::LoadWeights, levels.len() as u64);
-                self.charge(layer, pathway, during, Event::CellLoads, count);
-                self.time(|schedule, cycles| schedule.load(cycles, layer));
+                self.load_weights(layer, array, row, levels);
             }
             Operation::LoadDrives { codes } => {
                 self.settle();

@@ -1,7 +1,7 @@
 //! What a chip is, as checked numbers. A hardware model file becomes one of these at the door.
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
-use super::device::{Faults, ReadNoise};
+use super::device::{Faults, Programming, ReadNoise};
 use crate::num::fixed::{
     AdcBits, DriveBits, ErrorBits, IncrementMax, LevelBits, LutBits, OutOfRange, ResidualBits,
 };
@@ -272,6 +272,8 @@ pub struct HardwareSpec {
     pub faults: Faults,
     /// What conversions are off by; `None`: nothing.
     pub read_noise: Option<ReadNoise>,
+    /// What loads leave beside a level; `None`: nothing.
+    pub programming: Option<Programming>,
 }
 
 /// Parts that make no chip.
@@ -332,8 +334,18 @@ impl Hardware {
     /// When a number lies outside what a chip of this kind can have, or parts contradict one another.
     pub fn new(spec: HardwareSpec) -> Result<Self, HardwareError> {
         // without `..`: a new part is checked here or does not compile
-        let HardwareSpec { cell, tile, drive, adc, digital, write, timing, faults, read_noise } =
-            &spec;
+        let HardwareSpec {
+            cell,
+            tile,
+            drive,
+            adc,
+            digital,
+            write,
+            timing,
+            faults,
+            read_noise,
+            programming,
+        } = &spec;
         let CellSpec { level_bits, window, floor_kind: _ } = cell;
         let TileSpec { rows, columns, count_max, transposed_read: _ } = tile;
         let DriveSpec { bits: drive_bits, dac_bits } = drive;
@@ -375,6 +387,14 @@ impl Hardware {
             let found = "make more than all cells".to_owned();
             let allowed = "the shares of stuck cells add up to at most 1".to_owned();
             return Err(HardwareError { key: "device.faults", found, allowed });
+        }
+        if let Some(Programming { coefficients }) = programming {
+            let most = Programming::COEFFICIENT_MAX;
+            if let Some(c) = coefficients.iter().find(|c| c.abs() > most) {
+                let found = format!("has {c} of 2^24");
+                let allowed = "a coefficient is at most four times the greatest conductance".into();
+                return Err(HardwareError { key: "device.programming.sigma", found, allowed });
+            }
         }
         if let Some(ReadNoise { sigma }) = read_noise {
             let most = u64::from(ReadNoise::SIGMA_MAX);
@@ -429,6 +449,7 @@ impl Hardware {
             timing: None,
             faults: Faults::NONE,
             read_noise: None,
+            programming: None,
         };
         Self::new(spec).expect("the reference is a chip")
     }

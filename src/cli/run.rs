@@ -8,7 +8,9 @@ use clap::Args;
 use serde_json::json;
 
 use super::progress::Meter;
-use super::{Done, Failure, Moved, Shared, configuration, environment, known, note, say, usage};
+use super::{
+    Done, Failure, Moved, Shared, configuration, deploy, environment, known, note, say, usage,
+};
 use crate::lab::config::absent_words;
 use crate::lab::price::{EnergySplit, PerPiece};
 use crate::lab::run::{self, Keeping, Machine, RunError, RunEvent, Trained, Verdict};
@@ -52,6 +54,8 @@ pub(super) struct EvalArgs {
     /// Folder of a run
     #[arg(value_hint = clap::ValueHint::DirPath)]
     run: PathBuf,
+    #[command(flatten)]
+    deploy: deploy::DeployArgs,
     #[command(flatten)]
     moved: Moved,
     #[command(flatten)]
@@ -315,6 +319,11 @@ fn played(episodes: &EpisodesRecord) -> String {
 
 pub(super) fn eval(args: &EvalArgs) -> Done {
     let shared = &args.shared;
+    if args.deploy.is_asked() {
+        let root = args.moved.root(shared.data_root());
+        let stop = Stop::default();
+        return deploy::deploy(&args.deploy, &args.run, &root, (shared, &|| stop.asked()));
+    }
     let (test, state_hash) =
         run::evaluate(&args.run, &args.moved.root(shared.data_root()), shared.machine()?)?;
     let absent = run::absent(&args.run)?;

@@ -30,6 +30,7 @@ pub(crate) use check::Bias;
 pub use check::{Config, DataConfig, Select, TrainOn};
 pub use defaults::policy::{POLICY_DEFAULTS, PolicyDefaults};
 pub use defaults::{SET_DEFAULTS, SetDefaults};
+pub use device::Retention;
 pub use differs::{Difference, flat};
 pub use file::{ExperimentFile, HardwareFile};
 pub use hardware::{Model, builtin_models, load_model, model_names};

@@ -5,6 +5,7 @@
 
 mod again;
 mod classify;
+mod deploy;
 mod notes;
 mod policy;
 mod profile;
@@ -19,6 +20,7 @@ mod watch;
 mod weigh;
 
 pub use again::{address_of, configuration, evaluate};
+pub use deploy::{ChipResult, Deployment, deploy, quantile, seconds_of};
 pub use notes::notes;
 pub use profile::{Act, ModeUse, Profile, profile};
 pub use proof::{records, untouched};

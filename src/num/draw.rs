@@ -30,6 +30,8 @@ pub enum Site {
     Shuffle = 2,
     /// What a conversion reads beside the current.
     ReadNoise = 5,
+    /// Drift of levels with time.
+    Drift = 6,
     /// Actions that a policy tries.
     Exploration = 7,
     /// How episodes of an environment begin and go on.
@@ -46,6 +48,8 @@ pub enum Site {
     ColumnTrain = 13,
     /// Which cells are stuck, and where.
     StuckCell = 16,
+    /// What a load leaves beside a level.
+    ProgrammingNoise = 17,
 }
 
 /// Bytes of one block.

@@ -15,6 +15,7 @@
 #![expect(clippy::float_arithmetic, reason = "floats become integers here and nowhere else")]
 #![deny(clippy::disallowed_types, clippy::disallowed_methods)]
 
+mod drift;
 mod gaussian;
 mod policy;
 #[cfg(test)]
@@ -24,6 +25,7 @@ mod scales;
 mod softmax;
 mod unit;
 
+pub use drift::{DriftLaw, DriftTables, OfLogarithm};
 pub use gaussian::{Gaussian, half_gaussian};
 pub use policy::PolicyTables;
 pub use rate::{Decay, LEVELS_SHIFT_MAX, Rate, RateOf, SHIFT_MAX};

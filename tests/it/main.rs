@@ -11,6 +11,7 @@ mod bench;
 mod browser;
 mod damage;
 mod defaults;
+mod deploy;
 mod environments;
 mod examples;
 mod extending;

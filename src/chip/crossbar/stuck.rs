@@ -41,6 +41,16 @@ impl Crossbar {
         &self.stuck
     }
 
+    /// Moves every cell that is not stuck, to where its number row by row and its level say. Levels may leave the window, which is
+    /// one of programming.
+    pub(in super::super) fn move_all(&mut self, to: impl Fn(usize, u16) -> u16) {
+        let layout = self.layout;
+        for (cell, level) in self.levels().enumerate() {
+            self.put(cell / layout.columns, cell % layout.columns, to(cell, level));
+        }
+        (0..layout.rows).for_each(|row| self.hold_row(row));
+    }
+
     /// Stuck cells of a row get their levels back.
     pub(super) fn hold_row(&mut self, row: usize) {
         if self.stuck.is_empty() {

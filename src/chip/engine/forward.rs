@@ -22,7 +22,6 @@ use super::read::{Histogram, Mode, PanelPart, Reader, Seen};
 use super::window::windows_of;
 use crate::chip::crossbar::kernel::{HandOn, Image, Kernel, LookUp, Scratch, TOGETHER, Windows};
 use crate::chip::crossbar::layout::{BLOCK_ROWS, PANEL_COLUMNS};
-use crate::chip::device::Direction;
 use crate::chip::hardware::{Adc, Hardware, Subtract};
 use crate::chip::layer::Layer;
 use crate::chip::ledger::{During, Event};
@@ -148,7 +147,7 @@ impl Engine {
         }
         let samples = self.reads(layer);
         let notes = self.notes(layer, mode);
-        let noise = self.noise(layer, Direction::Columns);
+        let beside = self.beside(layer);
         let direct = self.hands_on_directly(layer);
         let (head, tail) = self.registers.split_at_mut(layer + 1);
         let own = &mut head[layer];
@@ -159,7 +158,7 @@ impl Engine {
             .targets()
             .iter()
             .map(|&target| {
-                let mode = (mode, noise.clone());
+                let mode = (mode, beside.clone());
                 Reader::new(this, &self.hardware, target, samples, mode, drives)
             })
             .collect();
@@ -209,7 +208,7 @@ impl Engine {
     fn put_out_near(&mut self, layer: usize, mode: Mode) -> Vec<Seen> {
         let reads = self.reads(layer);
         let notes = self.notes(layer, mode);
-        let noise = self.noise(layer, Direction::Columns);
+        let beside = self.beside(layer);
         let direct = self.hands_on_directly(layer);
         let (head, tail) = self.registers.split_at_mut(layer + 1);
         let own = &mut head[layer];
@@ -256,8 +255,7 @@ impl Engine {
                 let drives = |source: Stream| &near[this.spec.drives_of(source).index()][..];
                 let samples = some.len();
                 let reader = |&target| {
-                    let noise = noise.as_ref().map(|noise| noise.from_read(some.start));
-                    let mode = (mode, noise);
+                    let mode = (mode, beside.from_read(some.start));
                     let mut reader = Reader::new(this, hardware, target, samples, mode, drives);
                     reader.prepare(kernel);
                     let middle = Middle::of(this, target, &reader, notes);

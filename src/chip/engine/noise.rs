@@ -9,9 +9,37 @@ use super::window::fold;
 use crate::chip::crossbar::layout::PANEL_COLUMNS;
 use crate::chip::device::{Direction, Noise, NoisePlace};
 use crate::chip::hardware::{Adc, Hardware, Subtract};
-use crate::chip::layer::LayerSpec;
+use crate::chip::layer::{Layer, LayerSpec};
 use crate::chip::population::Wiring;
 use crate::num::draw::{Place, Site};
+use crate::num::tables::Gaussian;
+
+/// Gaussian numbers for a chip that needs some.
+pub(super) fn gaussian_of(hardware: &Hardware) -> Option<Arc<Gaussian>> {
+    let needed = hardware.read_noise.is_some() || hardware.programming.is_some();
+    needed.then(|| Arc::new(Gaussian::new()))
+}
+
+/// What a reader does beside the ideal.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Beside {
+    /// What conversions are off by.
+    pub(super) noise: Option<Noise>,
+    /// What accumulators are multiplied by, 12 fractional bits.
+    pub(super) factor: Option<i64>,
+}
+
+impl Beside {
+    /// The same for reads of which the first is number `read` of these.
+    pub(super) fn from_read(&self, read: usize) -> Self {
+        Self { noise: self.noise.as_ref().map(|noise| noise.from_read(read)), ..*self }
+    }
+
+    /// Whether there is nothing.
+    pub(super) const fn is_nothing(&self) -> bool {
+        self.noise.is_none() && self.factor.is_none()
+    }
+}
 
 /// Standard deviation of a conversion's noise in units of current, 8 fractional bits; `None` where there is none.
 fn sd(hardware: &Hardware) -> Option<i64> {
@@ -21,15 +49,17 @@ fn sd(hardware: &Hardware) -> Option<i64> {
 }
 
 impl Engine {
-    /// Makes it another chip of the same kind: which cells are stuck and what reads are off by are drawn with this seed. Levels of
+    /// Makes it another chip of the same kind: which cells are stuck, what loads leave and what reads are off by are drawn with this seed. Levels of
     /// cells that were stuck before stay until they are loaded. An engine starts with the seed of its run.
     pub fn set_chip_seed(&mut self, seed: u64) {
         self.chip_seed = seed;
+        self.load_words.iter_mut().for_each(Vec::clear);
         self.draw_faults();
     }
 
     pub(super) fn draw_faults(&mut self) {
-        if self.hardware.faults.is_none() {
+        let any = |layer: &Layer| layer.arrays.iter().any(|array| !array.stuck().is_empty());
+        if self.hardware.faults.is_none() && !self.layers.iter().any(any) {
             return;
         }
         let seed = self.chip_seed;
@@ -60,9 +90,15 @@ impl Engine {
         [stuck, arrays().map(|array| array.layout().cells() as u64).sum()]
     }
 
+    /// What reads of the columns of a layer have beside the ideal.
+    pub(super) fn beside(&self, layer: usize) -> Beside {
+        Beside { noise: self.noise(layer, Direction::Columns), factor: self.factors[layer] }
+    }
+
     /// Noise of the reads of a layer of the loaded samples, if conversions have any.
     pub(super) fn noise(&self, layer: usize, direction: Direction) -> Option<Noise> {
-        let (table, sd) = (Arc::clone(self.gaussian.as_ref()?), sd(&self.hardware)?);
+        let sd = sd(&self.hardware)?;
+        let table = Arc::clone(self.gaussian.as_ref()?);
         let this = &self.layers[layer];
         let [down, across] = this.tiles(&self.hardware);
         let tiles = match direction {

@@ -20,7 +20,6 @@ use super::each::each;
 use super::read::{Mode, PanelPart, Reader, Seen};
 use crate::chip::crossbar::kernel::{HandOn, Kernel, SQUARED_MAX, Scratch, TOGETHER};
 use crate::chip::crossbar::layout::{BLOCK_ROWS, PANEL_COLUMNS};
-use crate::chip::device::Direction;
 use crate::chip::ledger::Event;
 use crate::chip::periphery::normalise;
 use crate::chip::population::Stream;
@@ -50,7 +49,7 @@ impl Engine {
     /// Reads a layer and normalises its streams. What was seen, by target.
     pub(super) fn normalised(&mut self, layer: usize, mode: Mode, hand_on: HandOn) -> Vec<Seen> {
         let samples = self.samples;
-        let noise = self.noise(layer, Direction::Columns);
+        let beside = self.beside(layer);
         let (head, tail) = self.registers.split_at_mut(layer + 1);
         let (own, next) = (&mut head[layer], tail.first_mut().expect("a layer is driven"));
         let this = &self.layers[layer];
@@ -60,7 +59,7 @@ impl Engine {
             .targets()
             .iter()
             .map(|&target| {
-                let mode = (mode, noise.clone());
+                let mode = (mode, beside.clone());
                 Reader::new(this, &self.hardware, target, samples, mode, drives)
             })
             .collect();

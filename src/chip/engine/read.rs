@@ -14,15 +14,15 @@ use std::borrow::Cow;
 use std::ops::Range;
 
 use super::homeostasis::{Noted, Notes};
-use super::noise::Noisy;
+use super::noise::{Beside, Noisy};
 use crate::chip::crossbar::Crossbar;
 use crate::chip::crossbar::kernel::{Banks, Conversion, Drives, Greatest, Kernel, Scratch};
 use crate::chip::crossbar::layout::{BLOCK_ROWS, PANEL_COLUMNS};
-use crate::chip::device::Noise;
 use crate::chip::hardware::{Adc, Hardware, Subtract};
 use crate::chip::layer::{CHUNK_BLOCKS, Layer};
 use crate::chip::periphery::Converter;
 use crate::chip::population::{BANKS_MAX, Stream, Wiring};
+use crate::num::fixed::rsh;
 use signed::{below_from_above, both_phases};
 use tiles::{Tiles, tile_reads};
 
@@ -138,6 +138,8 @@ pub(super) struct Reader<'a> {
     greatest: Greatest,
     /// What conversions are off by.
     noisy: Option<Noisy>,
+    /// What accumulators are multiplied by, 12 fractional bits.
+    factor: Option<i64>,
     narrow: bool,
     /// Sums lie below this.
     bound: u128,
@@ -151,7 +153,7 @@ impl<'a> Reader<'a> {
         hardware: &Hardware,
         target: Stream,
         samples: usize,
-        (mode, noise): (Mode, Option<Noise>),
+        (mode, beside): (Mode, Beside),
         drives: impl Fn(Stream) -> &'a [u8],
     ) -> Self {
         let wiring = layer.spec.wiring;
@@ -172,7 +174,8 @@ impl<'a> Reader<'a> {
         };
         let pairs = wiring.pairs(target);
         let bound = bound(layer, hardware, pairs.len(), converters.as_ref());
-        let narrow = bound.is_some() && !mode.shows_currents() && noise.is_none();
+        let narrow = bound.is_some() && !mode.shows_currents() && beside.is_nothing();
+        let Beside { noise, factor } = beside;
         let tiles = match (&converters, narrow) {
             // a lossless conversion is off all the same
             (None, _) if noise.is_none() => Tiles::Whole,
@@ -207,6 +210,7 @@ impl<'a> Reader<'a> {
                 },
             },
             noisy: noise.map(|noise| Noisy::new(noise, wiring, pairs, (phases, hardware))),
+            factor,
             narrow,
             bound: bound.unwrap_or(u128::MAX),
             columns: layer.layout.columns,
@@ -365,6 +369,14 @@ impl<'a> Reader<'a> {
         sums: &mut [i64],
         seen: &mut Seen,
     ) {
+        self.read_both(kernel, part, sums, seen);
+        if let Some(factor) = self.factor {
+            sums.iter_mut().for_each(|sum| *sum = rsh(*sum * factor, 12));
+        }
+    }
+
+    /// The same as they come out of the adders.
+    fn read_both(&self, kernel: &Kernel, part: &PanelPart, sums: &mut [i64], seen: &mut Seen) {
         if self.phases == 1 {
             return self.drive_wide(kernel, part, sums, seen);
         }

@@ -118,6 +118,7 @@ impl Config {
             (_, "on_off") => self.hardware.cell.window.floor() == 0,
             (_, "stuck_cells") => self.hardware.faults.is_none(),
             (_, "read_noise") => self.hardware.read_noise.is_none(),
+            (_, "programming_noise") => self.hardware.programming.is_none(),
             (Substrate::Any, _) => true,
             (Substrate::Electronic, _) => !optical,
             (Substrate::Optical, _) => optical,

@@ -11,7 +11,7 @@ use super::hardware::check_marks;
 use super::law::{kind_of, settings};
 use super::policy::PolicySettings;
 use super::quantity::{Constants, constants_of};
-use super::{ConfigError, Sources, chip, data};
+use super::{ConfigError, Sources, chip, data, device};
 use crate::chip::hardware::{ConverterKind, Hardware};
 use crate::chip::layer::{Homeostasis, Optimiser};
 use crate::lab::near;
@@ -139,6 +139,8 @@ pub struct Config {
     pub(crate) policy: Option<PolicySettings>,
     /// The chip.
     pub(crate) hardware: Hardware,
+    /// How its levels drift, where that is known: for readings after a time.
+    pub(crate) drift: Option<device::Retention>,
     /// What its events, its parts and its idling cost.
     pub(crate) constants: Constants,
     /// What the chip does and is not simulated.
@@ -220,6 +222,7 @@ pub(super) fn config(mut file: ExperimentFile, model: &UnderModel) -> Result<Con
     let seed = *file.seed.get_or_insert(1);
     let ChipFile(hw) = file.hw.get_or_insert_with(ChipFile::default);
     let hardware = chip::resolve(hw, "hw.")?;
+    let drift = device::resolve(hw.device.as_ref(), &|name| format!("hw.{name}"))?.drift;
     check_marks(hw, "hw.")?;
     changed::settle(hw, model, &settings(&hardware, kind_of(hw)));
     let constants = constants_of(hw, &hardware, "hw.")?;
@@ -268,6 +271,7 @@ pub(super) fn config(mut file: ExperimentFile, model: &UnderModel) -> Result<Con
         select,
         policy,
         hardware,
+        drift,
         constants,
         not_simulated,
         hardware_name,

@@ -105,7 +105,8 @@ pub(super) fn resolve(file: &mut HardwareFile, prefix: &str) -> Result<Hardware,
     let scheme = scheme(write, &key, increments)?;
     let slices = Slices { mode, converter, count: drive_bits.get().div_ceil(dac_bits), dac_bits };
     let timing = file.timing.as_mut().map(|table| timing(table, &slices, &key)).transpose()?;
-    let (faults, read_noise) = device::resolve(file.device.as_ref(), &key)?;
+    let device::Device { faults, read_noise, programming, drift: _ } =
+        device::resolve(file.device.as_ref(), &key)?;
     let spec = HardwareSpec {
         cell: CellSpec { level_bits, window, floor_kind },
         tile: TileSpec { rows: tile_rows, columns: tile_columns, count_max, transposed_read },
@@ -116,6 +117,7 @@ pub(super) fn resolve(file: &mut HardwareFile, prefix: &str) -> Result<Hardware,
         timing,
         faults,
         read_noise,
+        programming,
     };
     Hardware::new(spec)
         .map_err(|HardwareError { key: at, found, allowed }| wrong(&key(at), found, allowed))

@@ -92,6 +92,7 @@ const FROZEN: &[(&str, &str)] = &[
     ("faults.ceiling", "0"),
     ("faults.any", "0"),
     ("read_noise.sigma", "0"),
+    ("programming.sigma", "none"),
 ];
 
 /// Key and word.
@@ -420,8 +421,18 @@ impl List {
     }
 
     fn chip(&mut self, hardware: &HardwareSpec) {
-        let HardwareSpec { cell, tile, drive, adc, digital, write, timing, faults, read_noise } =
-            hardware;
+        let HardwareSpec {
+            cell,
+            tile,
+            drive,
+            adc,
+            digital,
+            write,
+            timing,
+            faults,
+            read_noise,
+            programming,
+        } = hardware;
         let CellSpec { level_bits, window, floor_kind } = cell;
         let TileSpec { rows, columns, count_max, transposed_read } = tile;
         let DriveSpec { bits: drive_bits, dac_bits } = drive;
@@ -488,6 +499,8 @@ impl List {
         self.put("faults.ceiling", ceiling.get());
         self.put("faults.any", any.get());
         self.put("read_noise.sigma", read_noise.map_or(0, |noise| noise.sigma));
+        let sigma = programming.map(|loads| loads.coefficients.map(|c| c.to_string()).join(" "));
+        self.put("programming.sigma", sigma.unwrap_or_else(|| "none".into()));
     }
 
     /// The clock turns cycles into seconds and is read by no schedule: it is no part of what decides a run.

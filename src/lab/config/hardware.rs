@@ -128,13 +128,15 @@ fn provenance(file: &HardwareFile) -> Vec<(&'static str, Option<&str>, Option<&s
         )*};
     }
     table!(cell tile drive lut error write timing);
-    let device = file.device.as_ref();
-    if let Some(table) = device.and_then(|device| device.faults.as_ref()) {
-        all.push(("device.faults", table.source.as_deref(), table.kind.as_deref()));
+    macro_rules! device {
+        ($($name:ident)*) => {$(
+            if let Some(table) = file.device.as_ref().and_then(|device| device.$name.as_ref()) {
+                let name = concat!("device.", stringify!($name));
+                all.push((name, table.source.as_deref(), table.kind.as_deref()));
+            }
+        )*};
     }
-    if let Some(table) = device.and_then(|device| device.read_noise.as_ref()) {
-        all.push(("device.read_noise", table.source.as_deref(), table.kind.as_deref()));
-    }
+    device!(faults read_noise programming drift);
     if let Some(super::file::AdcFile::Finite(table)) = &file.adc {
         all.push(("adc", table.source.as_deref(), table.kind.as_deref()));
     }

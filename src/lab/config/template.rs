@@ -135,14 +135,15 @@ fn complete(hw: &mut HardwareFile, settings: &[String]) {
         )*};
     }
     tables!(cell tile drive lut error write timing);
-    if let Some(device) = &mut hw.device {
-        if let Some(table) = &mut device.faults {
-            settle("device.faults", &mut table.source, &mut table.kind);
-        }
-        if let Some(table) = &mut device.read_noise {
-            settle("device.read_noise", &mut table.source, &mut table.kind);
-        }
+    macro_rules! device {
+        ($($name:ident)*) => {$(
+            if let Some(table) = hw.device.as_mut().and_then(|device| device.$name.as_mut()) {
+                let name = concat!("device.", stringify!($name));
+                settle(name, &mut table.source, &mut table.kind);
+            }
+        )*};
     }
+    device!(faults read_noise programming drift);
     if let Some(AdcFile::Finite(table)) = &mut hw.adc {
         settle("adc", &mut table.source, &mut table.kind);
     }

@@ -60,8 +60,18 @@ pub fn changes(run: &Hardware, other: &Hardware) -> Vec<Change> {
         }
     };
     // without `..`: what a chip gets is a difference here or does not compile
-    let HardwareSpec { cell, tile, drive, adc, digital, write, timing, faults, read_noise } =
-        &**run;
+    let HardwareSpec {
+        cell,
+        tile,
+        drive,
+        adc,
+        digital,
+        write,
+        timing,
+        faults,
+        read_noise,
+        programming,
+    } = &**run;
     let CellSpec { level_bits, window, floor_kind } = cell;
     let TileSpec { rows, columns, count_max: _, transposed_read: _ } = tile;
     let DriveSpec { bits: drive_bits, dac_bits: _ } = drive;
@@ -87,6 +97,7 @@ pub fn changes(run: &Hardware, other: &Hardware) -> Vec<Change> {
     let remainders = *residual_bits != other.write.residual_bits;
     differ("write.residual_bits", remainders, REMAINDERS, true);
     differ("device.faults", *faults != other.faults, LEARNT, true);
+    differ("device.programming", *programming != other.programming, LEARNT, true);
     differ("device.read_noise", *read_noise != other.read_noise, LEARNT, true);
     differ("write.scheme", *scheme != other.write.scheme, SCHEME, true);
 

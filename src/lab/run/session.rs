@@ -202,6 +202,11 @@ impl Session {
         self.task.networks()
     }
 
+    /// The same, to read them as other chips.
+    pub(super) fn networks_mut(&mut self) -> Vec<&mut Driver> {
+        self.task.networks_mut()
+    }
+
     /// The chips of the networks, or the parts of one chip that they are on.
     #[must_use]
     pub(crate) fn engines(&self) -> Vec<&Engine> {

@@ -1,6 +1,6 @@
 //! Any valid chip, any small network on it, any list of choices.
 
-use dalean::chip::device::{Chance, Faults, ReadNoise};
+use dalean::chip::device::{Chance, Faults, Programming, ReadNoise};
 use dalean::chip::hardware::{
     Adc, AdcRange, ConverterKind, DitherBits, DitherPattern, FloorKind, Hardware, HardwareSpec,
     PulseCode, SliceTime, SliceTimes, Subtract, Timing, Window, WriteScheme, converter,
@@ -373,7 +373,7 @@ pub(crate) fn timed_net() -> impl Strategy<Value = Net> {
     })
 }
 
-/// A network of which one in three has stuck cells, and one in three noisy reads.
+/// A network of which one in three has stuck cells, one in three noisy reads and one in three noisy loads.
 pub(crate) fn flawed(mut net: Net) -> Net {
     let flaw = flaws(net.seed);
     net.change(flaw);
@@ -386,10 +386,12 @@ pub(crate) fn flaws(seed: u64) -> impl Fn(&mut HardwareSpec) {
     let mut share = || Chance::new(1 << numbers.within(20, 30)).unwrap();
     let faults = Faults { floor: share(), ceiling: share(), any: share() };
     let sigma = 1 << numbers.within(0, 19);
-    let [stuck, noisy] = [0, 1].map(|_| numbers.within(0, 2) == 0);
+    let [stuck, noisy, loads] = [0; 3].map(|_| numbers.within(0, 2) == 0);
+    let coefficients = [0; 4].map(|_| numbers.within(-(1 << 22), 1 << 23));
     move |h| {
         h.faults = if stuck { faults } else { Faults::NONE };
         h.read_noise = noisy.then_some(ReadNoise { sigma });
+        h.programming = loads.then_some(Programming { coefficients });
     }
 }
 

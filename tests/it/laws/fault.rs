@@ -103,6 +103,8 @@ pub(crate) enum Fault {
     StuckCellMoves,
     /// An absorbing floor prunes cells that are stuck on it.
     StuckCellIsPruned,
+    /// A noisy load leaves what it was asked for.
+    LoadIsExact,
     /// A conversion has the noise of the line beside it.
     NoiseOfNeighbour,
     /// All samples of a batch have the noise of the first.
@@ -113,7 +115,7 @@ pub(crate) enum Fault {
 
 impl Fault {
     /// All of them.
-    pub(crate) const ALL: [Self; 53] = [
+    pub(crate) const ALL: [Self; 54] = [
         Self::WrapAtCeiling,
         Self::FloorOffByOne,
         Self::CeilingOffByOne,
@@ -164,6 +166,7 @@ impl Fault {
         Self::StuckCellIsLoaded,
         Self::StuckCellMoves,
         Self::StuckCellIsPruned,
+        Self::LoadIsExact,
         Self::NoiseOfNeighbour,
         Self::NoiseOfFirstSample,
         Self::BackwardIsQuiet,

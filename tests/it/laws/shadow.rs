@@ -81,7 +81,7 @@ pub(crate) struct Shadow {
     pub(crate) loaded: [u64; 3],
     /// Phase of the loaded samples, and samples of it before them.
     came: (Phase, u64),
-    /// An absolute Gaussian, where conversions are noisy.
+    /// An absolute Gaussian.
     half_gaussian: Vec<u16>,
     /// Running means of the error unit.
     pub(crate) means: Vec<i64>,
@@ -159,7 +159,7 @@ impl Shadow {
             samples: 0,
             loaded: [0; 3],
             came: (Phase::Training, 0),
-            half_gaussian: hw.read_noise.map_or(vec![], |_| half_gaussian()),
+            half_gaussian: half_gaussian(),
             unlooked: 0,
             means: if net.centre == Centre::Running { vec![0; outputs] } else { vec![] },
             phase: Phase::Training,
@@ -189,6 +189,7 @@ impl Shadow {
     }
 
     pub(crate) fn load_weights(&mut self, layer: usize, array: usize, row: usize, levels: &[u16]) {
+        let levels = &self.left(layer, array, row, levels);
         let moves = self.is(Fault::StuckCellIsLoaded);
         let Array { level, stuck, .. } = &mut self.layers[layer].arrays[array];
         for ((cell, stuck), &loaded) in level[row].iter_mut().zip(&stuck[row]).zip(levels) {

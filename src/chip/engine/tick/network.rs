@@ -256,7 +256,8 @@ impl Network {
                     self.layers[0].load_inputs(codes);
                 }
                 Segment::LoadWeights { layer, array, row, levels } => {
-                    let code = self.layers[layer].load_row(array, row, levels);
+                    let left = self.layers[layer].programmed(array, row, levels);
+                    let code = self.layers[layer].load_row(array, row, &left);
                     self.charge(
                         layer,
                         code,

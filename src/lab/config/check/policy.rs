@@ -148,6 +148,11 @@ pub(super) fn resolve(
     let named = word("learning.rule", &mut learning.rule, "ed", &learning::RULES)?;
     let method = match named {
         Named::Evolution => {
+            if hardware.programming.is_some() {
+                let allowed = "evolution strategies load every candidate anew, and what a load leaves in a cell is drawn \
+                               once: take the table out";
+                return Err(wrong("hw.device.programming", "is given", allowed));
+            }
             let given = file.ppo.is_some();
             refuse(&[(
                 "ppo",

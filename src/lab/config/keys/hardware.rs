@@ -2,7 +2,9 @@
 
 use super::KeyFileKind::Hardware;
 use super::{KeyEntry, KeyTable, KeyValues, flag, key, other, real, whole, words};
-use crate::lab::config::device::{DeviceFile, FaultsFile, ReadNoiseFile};
+use crate::lab::config::device::{
+    DeviceFile, DriftFile, FaultsFile, ProgrammingFile, ReadNoiseFile,
+};
 use crate::lab::config::file::{
     AdcTable, CellFile, DriveFile, ErrorFile, HardwareFile, LutFile, NumberFile, TileFile,
     TimingFile, WriteFile,
@@ -54,6 +56,18 @@ pub(super) const TABLES: &[KeyTable] = &[
         "What conversions are off by: a Gaussian number each.",
         ReadNoiseFile::MEANINGS,
         READ_NOISE,
+    ),
+    table(
+        "device.programming",
+        "What loads leave beside a level: a Gaussian number a cell.",
+        ProgrammingFile::MEANINGS,
+        PROGRAMMING,
+    ),
+    table(
+        "device.drift",
+        "What time does to levels between programming and reading: `dalean eval RUN --after 1d`. A training takes no time in which levels drift.",
+        DriftFile::MEANINGS,
+        DRIFT,
     ),
     table(
         "energy.*",
@@ -306,6 +320,8 @@ const TIMING: &[KeyEntry] = &[
 const DEVICE: &[KeyEntry] = &[
     other("faults", "a table").otherwise("every cell works"),
     other("read_noise", "a table").otherwise("reads are free of noise"),
+    other("programming", "a table").otherwise("loads are exact"),
+    other("drift", "a table").otherwise("a level stays as it was written"),
 ];
 
 const FAULTS: &[KeyEntry] = &[
@@ -318,6 +334,30 @@ const FAULTS: &[KeyEntry] = &[
 
 const READ_NOISE: &[KeyEntry] = &[
     real("sigma_cells", 1e-4, 16.0).unit("cells").otherwise("the table needs it"),
+    PROVENANCE[0],
+    PROVENANCE[1],
+];
+
+const PROGRAMMING: &[KeyEntry] = &[
+    other("sigma", "a list of 1 to 4 numbers").otherwise("the table needs it"),
+    PROVENANCE[0],
+    PROVENANCE[1],
+];
+
+const POWER: &[&str] = &["hw.device.drift.start_s=20", "hw.device.drift.exponent=[0.05]"];
+const LOGARITHM: &[&str] = &["hw.device.drift.start_s=1", "hw.device.drift.change=-0.01"];
+
+const DRIFT: &[KeyEntry] = &[
+    real("start_s", 1e-9, 1e12)
+        .unit("s")
+        .otherwise("the table needs it")
+        .only("", &["hw.device.drift.exponent=[0.05]"]),
+    other("exponent", "a list of 1 or 4 numbers").only("without `change`", POWER),
+    other("exponent_spread", "a list of 1 or 4 numbers")
+        .only("with `exponent`", POWER)
+        .otherwise("none"),
+    other("change", "a number in -1..=1").only("without `exponent`", LOGARITHM),
+    other("change_spread", "a number in 0..=1").only("with `change`", LOGARITHM).otherwise("none"),
     PROVENANCE[0],
     PROVENANCE[1],
 ];

@@ -39,6 +39,38 @@ impl Array {
 }
 
 impl Shadow {
+    /// What a load leaves of a row of levels.
+    pub(super) fn left(&self, layer: usize, array: usize, row: usize, levels: &[u16]) -> Vec<u16> {
+        let hw = &self.net.hardware;
+        let Some(programming) = hw.programming.filter(|_| !self.is(Fault::LoadIsExact)) else {
+            return levels.to_vec();
+        };
+        let window = hw.cell.window;
+        let (floor, ceiling) = (i64::from(window.floor()), i64::from(window.ceiling()));
+        let left = levels.iter().enumerate().map(|(column, &level)| {
+            let word = |sub| {
+                let place = Place {
+                    seed: self.net.seed,
+                    site: Site::ProgrammingNoise,
+                    layer: u16::try_from(layer).unwrap(),
+                    pathway: self.code(layer, array),
+                    sub,
+                    count: 0,
+                };
+                place.half(self.layers[layer].rows, row, column)
+            };
+            let level = i64::from(level);
+            let share = |c: i64| (c * level * 2 + ceiling).div_euclid(ceiling * 2);
+            let [a, b, c, d] = programming.coefficients;
+            let sd = rsh((a + share(b + share(c + share(d)))).max(0) * ceiling, 16);
+            let size = i64::from(self.half_gaussian[usize::from(word(0) / 16)]);
+            let g = if word(0) % 2 == 0 { size } else { -size };
+            let left = ((level << 20) + g * sd + 16 * i64::from(word(1))).div_euclid(1 << 20);
+            u16::try_from(left.clamp(floor, ceiling)).unwrap()
+        });
+        left.collect()
+    }
+
     /// What the conversion of a line is off by: of so many tiles above one another, in one of them.
     pub(crate) fn noise(
         &self,

@@ -78,6 +78,8 @@ pub(super) struct TickLayer {
     seed: u64,
     /// Gaussian numbers and the standard deviation of a conversion, where conversions are noisy.
     noise: Option<(Arc<Gaussian>, i64)>,
+    /// What loads leave, where they are noisy.
+    programming: Option<noise::Loads>,
     /// Writes of every array so far.
     writes: u64,
     /// On their way through a tree: cycles left, the head they go to, from columns, sums.
@@ -146,6 +148,7 @@ impl TickLayer {
             },
             seed,
             noise: noise::of(hardware),
+            programming: noise::loads(hardware),
             writes: layer.writes.first().copied().unwrap_or(0),
             tree: vec![],
             delay: added.map(|tiles| timing.beat * tree_levels(tiles as u64)),

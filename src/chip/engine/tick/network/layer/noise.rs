@@ -5,7 +5,7 @@
 use std::sync::Arc;
 
 use super::TickLayer;
-use crate::chip::device::{Direction, Noise};
+use crate::chip::device::{Direction, Noise, Programming};
 use crate::chip::engine::Phase;
 use crate::chip::engine::tick::tile::TileNoise;
 use crate::chip::hardware::Hardware;
@@ -19,6 +19,16 @@ pub(super) fn of(hardware: &Hardware) -> Option<(Arc<Gaussian>, i64)> {
     let slice_max = u8::try_from((1u32 << bits) - 1).expect("at most 8 bits");
     let sd = noise.sd(hardware.cell.window.ceiling(), slice_max);
     Some((Arc::new(Gaussian::new()), sd))
+}
+
+/// The law of noisy loads, its Gaussian numbers, and the window.
+pub(super) type Loads = (Programming, Gaussian, [u16; 2]);
+
+/// That of a chip, where loads are noisy.
+pub(super) fn loads(hardware: &Hardware) -> Option<Loads> {
+    let window = hardware.cell.window;
+    let ends = [window.floor(), window.ceiling()];
+    Some((hardware.programming?, Gaussian::new(), ends))
 }
 
 impl TickLayer {
@@ -45,6 +55,29 @@ impl TickLayer {
                 }
             }
         }
+    }
+
+    /// What a load leaves of a row of levels.
+    pub(in super::super) fn programmed(
+        &self,
+        array: usize,
+        row: usize,
+        levels: &[u16],
+    ) -> Vec<u16> {
+        let Some((programming, gaussian, window)) = &self.programming else { return levels.into() };
+        let place = Place {
+            seed: self.seed,
+            site: Site::ProgrammingNoise,
+            layer: self.index,
+            pathway: self.wiring.pathways()[array].code,
+            sub: 0,
+            count: 0,
+        };
+        let left = levels.iter().enumerate().map(|(column, &level)| {
+            let words = Programming::words(place, self.rows, [row, column]);
+            programming.left(gaussian, level, words, *window)
+        });
+        left.collect()
     }
 
     /// Samples are loaded in a phase that had so many before: from there on reads are counted.

@@ -1,0 +1,219 @@
+//! What a finished run knows on other chips of its kind, and after a time: the trained levels are loaded anew, left to drift and
+//! read.
+//!
+//! ```text
+//! chip 0      the one that learnt: its levels as they are, its faults
+//! chip k > 0  another of its kind: seed k decides stuck cells, what loads leave, drift and noise; levels are loaded
+//! after t     levels drift from the start of the law to t; with compensation, a factor a layer makes up for their sum
+//! ```
+//!
+//! Every reading starts from the same counters, so chip k after t gives the same whatever was read before. Converter ranges, thresholds
+//! and tables stay as they were learnt. See docs/MODEL.md, 3.12.
+
+use std::path::Path;
+
+use super::again::read_again;
+use super::{Machine, RunError};
+use crate::chip::engine::AllLevels;
+use crate::chip::hardware::{Hardware, HardwareSpec};
+use crate::lab::config::{self, Config, ConfigError, Overlay, Retention, Sources};
+use crate::lab::data::DataRoot;
+use crate::lab::store::folder::{self, names};
+use crate::lab::store::record::TestOutcome;
+
+/// Which chips are read, and when.
+#[derive(Debug, Clone, Default)]
+pub struct Deployment {
+    /// Seconds after programming; none: at once, without drift.
+    pub after: Vec<f64>,
+    /// Numbers of the chips.
+    pub chips: Vec<u64>,
+    /// Whether a factor a layer makes up for drift.
+    pub compensated: bool,
+    /// A hardware model whose `[device]` the chips have.
+    pub device: Option<String>,
+    /// Keys of `hw.device`, as `--set` takes them.
+    pub settings: Vec<String>,
+}
+
+/// One reading of the test set, or of the final test of a policy.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ChipResult {
+    /// Number of the chip.
+    pub chip: u64,
+    /// Seconds after programming.
+    pub after_s: Option<f64>,
+    /// Accuracy as a fraction, or the mean return.
+    pub score: f64,
+}
+
+fn wrong(key: &str, found: &str, allowed: &str) -> RunError {
+    let [key, found, allowed] = [key, found, allowed].map(str::to_owned);
+    ConfigError::Value { key, found, allowed }.into()
+}
+
+/// The chip of a run with another device.
+fn chip(path: &Path, deployment: &Deployment) -> Result<(Hardware, Option<Retention>), RunError> {
+    for setting in &deployment.settings {
+        if !setting.trim_start().starts_with("hw.device.") {
+            let found = format!("is set by `{setting}`");
+            let allowed = "eval changes what cells and reads do, hw.device.*; everything else is as it was learnt with";
+            return Err(wrong("eval --set", &found, allowed));
+        }
+    }
+    let text = folder::read_text(path, names::CONFIG)?;
+    let name = path.join(names::CONFIG).display().to_string();
+    let mut table = toml::Table::new();
+    if let Some(model) = &deployment.device {
+        let model_text = config::load_model(model)?.text;
+        let mut own: toml::Table = model_text.parse().expect("a model that was read");
+        let Some(device) = own.remove("device") else {
+            let allowed = "name a model with a table [device], such as hw_models/own/pcm_drift.toml, or use --set hw.device.KEY=VALUE";
+            return Err(wrong("eval --hw", &format!("names {model}, which has none"), allowed));
+        };
+        let hw = toml::Table::from_iter([("device".to_owned(), device)]);
+        table.insert("hw".into(), toml::Value::Table(hw));
+    }
+    let config = config::load(&Sources {
+        experiment: Some((&name, &text)),
+        overlays: &[Overlay { place: "eval --hw", table: &table }],
+        settings: &deployment.settings,
+        ..Sources::default()
+    })?;
+    let Config { hardware, drift, .. } = config;
+    Ok((hardware, drift))
+}
+
+/// Reads the test set of a run on the chips of a deployment; `each` is told every result and says whether to go on.
+///
+/// # Errors
+/// When the run is damaged or its data is not the same, or when nothing of what is asked for varies on its chip.
+pub fn deploy(
+    path: &Path,
+    data_root: &DataRoot,
+    machine: Machine,
+    deployment: &Deployment,
+    each: &mut dyn FnMut(&ChipResult) -> bool,
+) -> Result<Vec<ChipResult>, RunError> {
+    let (hardware, drift) = chip(path, deployment)?;
+    let level_max = hardware.cell.window.ceiling();
+    let others = deployment.chips.iter().any(|&chip| chip > 0);
+    let varies = !hardware.faults.is_none()
+        || hardware.read_noise.is_some()
+        || hardware.programming.is_some()
+        || (drift.is_some() && !deployment.after.is_empty());
+    if others && !varies {
+        let allowed = "chips of this kind are all alike: give hw.device.faults, hw.device.programming or \
+                       hw.device.read_noise with --set or --hw, or --after with hw.device.drift";
+        return Err(wrong("eval --samples", "asks for other chips", allowed));
+    }
+    let times: Vec<Option<f64>> = match &deployment.after[..] {
+        [] => vec![None],
+        times => times.iter().copied().map(Some).collect(),
+    };
+    if deployment.compensated && deployment.after.is_empty() {
+        let allowed = "it makes up for drift: say with --after when chips are read";
+        return Err(wrong("eval --compensate", "is given", allowed));
+    }
+    let tables = times.iter().map(|time| {
+        let Some(seconds) = *time else { return Ok(None) };
+        let Some(drift) = drift else {
+            let allowed = "give hw.device.drift with --set, or --hw with a model that has it, such as hw_models/own/pcm_drift.toml";
+            return Err(wrong("hw.device.drift", "is missing", allowed));
+        };
+        drift.after(seconds, level_max).map(Some).ok_or_else(|| {
+            let found = format!("is {seconds} s");
+            let start = format!("levels are of {} s after programming: give that or more", drift.start_s());
+            wrong("eval --after", &found, &start)
+        })
+    });
+    let tables = tables.collect::<Result<Vec<_>, _>>()?;
+    let (mut session, _) = read_again(path, data_root, machine)?;
+    let HardwareSpec { faults, read_noise, programming, .. } = (*hardware).clone();
+    let levels: Vec<AllLevels> =
+        session.engines().iter().map(|engine| engine.all_levels()).collect();
+    let counters: Vec<[u64; 3]> =
+        session.engines().iter().map(|engine| engine.all_loaded()).collect();
+    let own = session.engines().iter().map(|engine| engine.chip_seed()).collect::<Vec<_>>();
+    let mut results = Vec::new();
+    for &number in &deployment.chips {
+        for (time, tables) in times.iter().zip(&tables) {
+            for (at, driver) in session.networks_mut().into_iter().enumerate() {
+                let engine = driver.engine_mut();
+                // the chip that learnt is loaded with what it holds, exactly
+                let loads = programming.filter(|_| number > 0);
+                let set = engine.set_device(faults, read_noise, loads);
+                set.map_err(|error| wrong(error.key, &error.found, &error.allowed))?;
+                engine.set_chip_seed(if number > 0 { number } else { own[at] });
+                engine.load_all(&levels[at]);
+                engine.set_loaded(counters[at]);
+                if let Some(tables) = tables {
+                    engine.age(tables, deployment.compensated);
+                }
+            }
+            let hint = "there is nothing to evaluate on";
+            let test = session.test()?.ok_or(RunError::Empty { part: "test", hint })?;
+            let score = match &test {
+                TestOutcome::Classify(test) => test.score.fraction(),
+                TestOutcome::Policy(test) => test.episodes.mean().unwrap_or(f64::NAN),
+            };
+            let result = ChipResult { chip: number, after_s: *time, score };
+            let go_on = each(&result);
+            results.push(result);
+            if !go_on {
+                return Ok(results);
+            }
+        }
+    }
+    Ok(results)
+}
+
+/// A number's place among others in order, between those beside it: 0 is the least, 1 the greatest.
+#[must_use]
+pub fn quantile(sorted: &[f64], place: f64) -> f64 {
+    let last = sorted.len().saturating_sub(1);
+    let at = place.clamp(0.0, 1.0) * last as f64;
+    let (low, high) = (at.floor() as usize, at.ceil() as usize);
+    let [a, b] = [low, high].map(|at| sorted.get(at).copied().unwrap_or(f64::NAN));
+    a + (b - a) * (at - at.floor())
+}
+
+/// Seconds of a span such as `25s`, `1h`, `1d`, `1y` (365.25 days).
+#[must_use]
+pub fn seconds_of(span: &str) -> Option<f64> {
+    let text = span.trim();
+    let split = text.find(|c: char| c.is_ascii_alphabetic() && c != 'e').unwrap_or(text.len());
+    let (number, unit) = text.split_at(split);
+    let seconds = match unit {
+        "s" | "" => 1.0,
+        "min" => 60.0,
+        "h" => 3600.0,
+        "d" => 86_400.0,
+        "y" => 31_557_600.0,
+        _ => return None,
+    };
+    let number: f64 = number.trim().parse().ok()?;
+    (number > 0.0 && number.is_finite()).then_some(number * seconds)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn spans_have_units() {
+        let found = ["25s", "3", "2 min", "1h", "1d", "1y", "1e3s"].map(seconds_of);
+        let wanted = [25.0, 3.0, 120.0, 3600.0, 86_400.0, 31_557_600.0, 1000.0].map(Some);
+        assert_eq!(found, wanted);
+        assert_eq!(["", "d", "-1d", "1w", "1.2.3s", "infs"].map(seconds_of), [None; 6]);
+    }
+
+    #[test]
+    fn quantiles_lie_between_the_numbers_beside_them() {
+        let sorted = [1.0, 2.0, 4.0];
+        let found = [0.0, 0.25, 0.5, 0.75, 1.0].map(|place| quantile(&sorted, place));
+        assert_eq!(found, [1.0, 1.5, 2.0, 3.0, 4.0]);
+        assert_eq!(quantile(&[7.0], 0.3), 7.0);
+        assert!(quantile(&[], 0.5).is_nan());
+    }
+}
