@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 from ._dalean import ARITHMETIC, VERSION as __version__
 from .chip import Chip, Network
-from .deployment import Deployed, deploy, signed
+from .deployment import Deployed, deploy, outputs, signed
 from .errors import (
     ArrayError,
     CheckpointError,
@@ -58,6 +58,7 @@ __all__ = [
     "__version__",
     "configuration",
     "deploy",
+    "outputs",
     "resume",
     "signed",
     "sweep",

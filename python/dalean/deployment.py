@@ -4,7 +4,9 @@
 
     net = dalean.deploy([(w1, b1), (w2, b2)], x, "reram")       # NumPy, [inputs, units]; or a PyTorch module, NPZ, safetensors
     net.read(test)                                              # through the chip's converters
-    net.deliver(...), net.write()                               # and trained on, in place
+    y = dalean.outputs(net)                                     # in the units that the weights came in
+    net.deliver(net.error_words(255 * (wanted - softmax(y))))   # and trained on, in place
+    net.write()
 
 ``w = E - I`` of two cells, one of which rests on the floor::
 
@@ -13,7 +15,7 @@
 
 The levels of a layer are ``floor + round(|w| 2^level_bits / weight_max)``. A unit of the chip puts out 0 to 1, so the weights of
 layers of ``relu`` are divided by what their units put out most, and multiplied by it in the layer above; a step of cells is a power
-of two there. Sigmoids and outputs take any width (``network.alpha``), so their greatest weight is the greatest level.
+of two there. Sigmoids take any width (``network.alpha``) and outputs are sums, so their greatest weight is the greatest level.
 """
 
 from __future__ import annotations
@@ -35,7 +37,7 @@ from .errors import ArrayError
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["Deployed", "deploy", "signed"]
+__all__ = ["Deployed", "deploy", "outputs", "signed"]
 
 _Layer = tuple[np.ndarray, "np.ndarray | None"]
 _PATHWAYS = {"pairs": (("e",), ("i",)), "dual": (("pp", "nn"), ("np", "pn"))}
@@ -126,7 +128,7 @@ def deploy(
             active = sums if last else 1 / (1 + np.exp(-sums))
             weight_max = 1.0
             factor = weight_max * full / most
-            alpha = 2 * factor
+            alpha = None if last else 2 * factor
         if biased:
             rows = np.vstack([rows, shifts])
         exact = rows * factor * steps / weight_max
@@ -137,14 +139,16 @@ def deploy(
         arrays.append(np.where(exact < 0, levels, 0) + floor)
         before = scale
 
-    # widths stand for layers of sigmoids alone; of others any will do
-    widths = [one.alpha or 1.0 for one in told]
-    keys = {
+    keys: dict[str, Any] = {
         "network.activation": activation,
-        "network.alpha": widths,
+        "learning.error": "softmax",
+        "learning.centre": "none",
         "network.weight_max": [one.weight_max for one in told],
         "network.bias": "rows" if biased else "none",
     }
+    if activation == "sigmoid" and len(told) > 1:
+        # that of sums is none
+        keys["network.alpha"] = [one.alpha or 1.0 for one in told]
     net = Network(
         sizes,
         chip,
@@ -165,16 +169,29 @@ def deploy(
     return net
 
 
+def outputs(net: Network) -> NDArray[np.float64]:
+    """What a deployed network put out for the samples that it read, ``[sample, output]``, in the units of its weights.
+
+    :raises dalean.ArrayError: when it was not deployed.
+    """
+    told = _deployed(net)[-1]
+    return net.accumulators() * (told.weight_max / 2.0**net.level_bits / net.code_max / told.factor)
+
+
+def _deployed(net: Network) -> list[Deployed]:
+    if net.deployment is None:
+        raise _wrong("the network", "was not deployed", "make it by dalean.deploy")
+    return net.deployment
+
+
 def signed(net: Network) -> list[tuple[NDArray[np.float64], NDArray[np.float64] | None]]:
     """Weights ``[inputs, units]`` and biases of a deployed network, of both signs and in the units that they came in; of dual
     arrays those of the p stream.
 
     :raises dalean.ArrayError: when it was not deployed.
     """
-    if net.deployment is None:
-        raise _wrong("the network", "was not deployed", "make it by dalean.deploy")
     found, before = [], 1.0
-    for at, told in enumerate(net.deployment):
+    for at, told in enumerate(_deployed(net)):
         plus, minus = ("e", "i") if "e" in net.pathways(at) else ("pp", "np")
         levels = net.levels(at, plus).astype(np.float64) - net.levels(at, minus)
         weights = levels * told.weight_max / 2.0**net.level_bits / told.factor

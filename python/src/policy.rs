@@ -55,11 +55,16 @@ impl PolicyLearner {
         for (which, &stop) in stops.iter().enumerate() {
             let stop = usize::try_from(stop).ok().filter(|stop| (from..=on.len()).contains(stop));
             let Some(stop) = stop else {
-                return Err(wrong(what, &format!("end at {} in environment {which}", stops[which]), pair));
+                return Err(wrong(
+                    what,
+                    &format!("end at {} in environment {which}", stops[which]),
+                    pair,
+                ));
             };
             let of = &on[from..stop];
             if of.len() > most || !of.is_sorted_by(|a, b| a < b) {
-                let found = format!("are {} lines, or no rising ones, in environment {which}", of.len());
+                let found =
+                    format!("are {} lines, or no rising ones, in environment {which}", of.len());
                 return Err(wrong(what, &found, &format!("{pair}; {most} at most are on")));
             }
             for &line in of {

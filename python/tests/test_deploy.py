@@ -46,7 +46,7 @@ def test_a_deployed_network_computes_what_it_did(to, biased, activation):
     for (weights, biases), (back, shift), told in zip(pairs, dalean.signed(net), net.deployment):
         assert np.abs(back - weights).max() < 2e-3 * max(np.abs(weights).max(), 1)
         assert biased == (shift is not None) and (not biased or np.abs(shift - biases).max() < 4e-3)
-        assert told.error_rms < 0.3
+        assert told.error_rms < 0.5
     if to == "dual":
         assert (net.levels(0, "pp") == net.levels(0, "nn")).all() and (net.levels(0, "pn") == net.levels(0, "np")).all()
         assert (net.codes(0, "p") == net.codes(0, "n")).all()
@@ -123,8 +123,8 @@ def test_the_example(examples):
     spec = importlib.util.spec_from_file_location("deploy", examples / "deploy.py")
     made = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(made)
-    told = made.main(epochs=1)
-    assert told["float"][0] > 0.9
+    told = made.main(epochs=2)
     for to in ("pairs", "dual"):
-        before, after = told[to]
-        assert 0.3 < before <= told["float"][0] + 0.02 and after > before - 0.02
+        before, after = told[to][0], told[to][-1]
+        # a sign that is wrong somewhere answers by chance, 0.1; errors of the wrong sign lose a third in an epoch
+        assert 0.7 < before < told["float"][0] and after > before

@@ -1,7 +1,7 @@
 """A policy on one of Gymnasium's MuJoCo environments, whose every weight is a non-negative 8-bit cell.
 
     pip install "./python[mujoco]"
-    python examples/python/mujoco.py HalfCheetah-v5 --steps 1_000_000 --seeds 1 2 3 --out cheetah.jsonl
+    python examples/python/locomotion.py HalfCheetah-v5 --steps 1_000_000 --seeds 1 2 3 --out cheetah.jsonl
 
 Prints a line of JSON a seed: mean and spread of the returns of episodes that are played after the training with the likeliest
 actions, steps, seconds, and the hash of the state. A seed whose line is in the file is not trained again.
