@@ -241,16 +241,25 @@ impl Outcomes {
             Err(EnvError { id: spec.id.to_string(), which, found, allowed: allowed.into() })
         };
         if !idle.is_empty() && idle.len() != self.rewards.len() {
-            let found = format!("is one of {}, but {} are said to be idle or not", self.rewards.len(), idle.len());
+            let found = format!(
+                "is one of {}, but {} are said to be idle or not",
+                self.rewards.len(),
+                idle.len()
+            );
             return wrong(0, found, "say it of each, or of none");
         }
         for which in (0..idle.len()).filter(|&which| idle[which]) {
             if self.terminated[which] || self.truncated[which] {
                 let found = "ends an episode in the step that begins it".into();
-                return wrong(which, found, "nobody acted there: the step that begins an episode shows it and no more");
+                return wrong(
+                    which,
+                    found,
+                    "nobody acted there: the step that begins an episode shows it and no more",
+                );
             }
             if self.rewards[which] != Real::ZERO {
-                let found = format!("earns {} in the step that begins an episode", self.rewards[which]);
+                let found =
+                    format!("earns {} in the step that begins an episode", self.rewards[which]);
                 return wrong(which, found, "nobody acted there: its reward is 0");
             }
         }

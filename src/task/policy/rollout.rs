@@ -126,6 +126,8 @@ impl Rollout {
             return Cow::Borrowed(&self.shown);
         }
         let each = self.shown.chunks_exact(values).enumerate();
-        Cow::Owned(each.filter(|&(step, _)| self.acted(step)).flat_map(|(_, one)| one).copied().collect())
+        Cow::Owned(
+            each.filter(|&(step, _)| self.acted(step)).flat_map(|(_, one)| one).copied().collect(),
+        )
     }
 }
