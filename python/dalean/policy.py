@@ -144,15 +144,17 @@ class EDPolicy:
                     return self
 
     def _made(self, env: Any, steps: int) -> _dalean.PolicyLearner:
+        faces = self._env
         keys = {
             "task": "policy",
+            # what is left unsaid depends on it
+            "environment.id": _like(faces.name, faces.discrete),
             "environment.count": env.num_envs,
             "environment.horizon": self.horizon,
             "environment.steps": steps,
             "network.hidden": list(self.hidden),
             "learning.rule": self.rule,
         }
-        faces = self._env
         return _dalean.PolicyLearner(
             "EDPolicy",
             text(keys),
@@ -229,6 +231,12 @@ class EDPolicy:
         """BLAKE3 of levels, statistics and counters."""
         return self._trained().state_hash()
 
+    @property
+    def config(self) -> str:
+        """The resolved configuration, as TOML. Of environments that are not the program's own, ``environment.id`` is the one whose
+        defaults hold."""
+        return self._trained().config
+
     def checkpoint(self) -> bytes:
         """The state as safetensors."""
         return self._trained().checkpoint()
@@ -251,6 +259,12 @@ def _begins(env: Any) -> str:
         f"does not say when episodes begin again ({mode})",
         'metadata["autoreset_mode"] is one of gymnasium.vector.AutoresetMode: SAME_STEP, NEXT_STEP, DISABLED',
     )
+
+
+def _like(name: str, discrete: bool) -> str:
+    """The environment of the program whose defaults hold: that of the same name, else one that takes the same kind of actions."""
+    known = {"CartPole-v1": True, "Acrobot-v1": True, "Pendulum-v1": False, "MountainCarContinuous-v0": False}
+    return name if known.get(name) == discrete else "CartPole-v1" if discrete else "MountainCarContinuous-v0"
 
 
 class _Faces:

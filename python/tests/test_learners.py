@@ -76,6 +76,21 @@ def test_a_policy_learns_on_a_vector_environment(name):
     assert len(made.evaluate(name, 2, envs=2)) == 2
 
 
+def test_what_is_left_unsaid_is_what_the_kind_of_actions_has():
+    """The spread of actions once stood still wherever they are numbers, and its keys were refused."""
+    pytest.importorskip("gymnasium")
+    made = policy().learn("Pendulum-v1", 1024, envs=4)
+    assert len({one["entropy"] for one in made.epochs}) > 1
+    assert "gamma = 0.95" in made.config and "log_sigma_rate = 0.003" in made.config and "entropy = 0.0\n" in made.config
+    other = vector("Pendulum-v1", 4)
+    other.spec = None
+    assert "gamma = 0.99" in policy().learn(other, 512).config
+    still = policy()
+    still.overrides = {**still.overrides, "ppo.log_sigma": -1.0, "ppo.log_sigma_rate": 0.0}
+    assert len({one["entropy"] for one in still.learn("Pendulum-v1", 1024, envs=4).epochs}) == 1
+    assert "entropy = 0.01\n" in policy().learn("CartPole-v1", 512, envs=4).config
+
+
 def test_episodes_may_be_begun_by_hand():
     a = policy().learn(vector("CartPole-v1", 4), 512)
     b = policy().learn(vector("CartPole-v1", 4, "DISABLED"), 512)
