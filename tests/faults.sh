@@ -182,7 +182,7 @@ fault "4 trains fire in one phase" $timing \
     '2 * slots * self.pulse' 'slots * self.pulse' laws::law_4
 fault "4 the current has no limit" src/chip/engine/passes.rs \
     'u64::from(cells).div_ceil(together)' 'u64::from(cells.min(1)) * together.min(1)' laws::law_4
-fault "5 a tile loses its last row" $read \
+fault "5 a tile loses its last row" src/chip/engine/read/tiles.rs \
     'codes[to..].fill(0);' 'codes[to - 1..].fill(0);' laws::product
 fault "5 transposed banks add" $columns \
     'backward.extend(rows.map(|(e, i)| e - i));' \
