@@ -228,6 +228,8 @@ Keys = TypedDict(
         "hw.write": Any,
         # Cycles of what a tile does; without it no cycles are counted.
         "hw.timing": Any,
+        # What real cells and converters do that ideal ones do not.
+        "hw.device": Any,
         # Joules of an event, by quantity and unit.
         "hw.energy": Any,
         # Watts that flow whatever happens.
@@ -358,6 +360,50 @@ Keys = TypedDict(
         "hw.timing.source": Any,
         # How far to trust the numbers.
         "hw.timing.kind": Literal["measured", "fitted", "assumed"],
+        # Cells that hold one level.
+        "hw.device.faults": Any,
+        # Noise of conversions.
+        "hw.device.read_noise": Any,
+        # Noise of loads.
+        "hw.device.programming": Any,
+        # What time does to levels, between programming and reading (`dalean eval --after`).
+        "hw.device.drift": Any,
+        # Share of the cells that are stuck at the floor. [of the cells]
+        "hw.device.faults.stuck_floor": float,
+        # Share of the cells that are stuck at the ceiling. [of the cells]
+        "hw.device.faults.stuck_ceiling": float,
+        # Share of the cells that are stuck at any level of the window, each level as often as any other. [of the cells]
+        "hw.device.faults.stuck_any": float,
+        # Where the numbers come from.
+        "hw.device.faults.source": Any,
+        # How far to trust the numbers.
+        "hw.device.faults.kind": Literal["measured", "fitted", "assumed"],
+        # Standard deviation of a conversion, in currents of one cell at the ceiling under the greatest slice of a drive. [cells]
+        "hw.device.read_noise.sigma_cells": float,
+        # Where the numbers come from.
+        "hw.device.read_noise.source": Any,
+        # How far to trust the numbers.
+        "hw.device.read_noise.kind": Literal["measured", "fitted", "assumed"],
+        # Standard deviation of what a load leaves, in shares of the greatest conductance: coefficients of a polynomial in the conductance as a share of the greatest, the constant first.
+        "hw.device.programming.sigma": Any,
+        # Where the numbers come from.
+        "hw.device.programming.source": Any,
+        # How far to trust the numbers.
+        "hw.device.programming.kind": Literal["measured", "fitted", "assumed"],
+        # Seconds after programming that levels are of, as they are loaded or learnt. [s]
+        "hw.device.drift.start_s": float,
+        # Mean exponent: a number, or slope, offset, least and most of `clamp(slope ln g + offset, least, most)`, g the conductance as a share of the greatest.
+        "hw.device.drift.exponent": Any,
+        # Its standard deviation from cell to cell, in the same form.
+        "hw.device.drift.exponent_spread": Any,
+        # Mean change a decade of time, in shares of the greatest conductance.
+        "hw.device.drift.change": Any,
+        # Its standard deviation from cell to cell.
+        "hw.device.drift.change_spread": Any,
+        # Where the numbers come from.
+        "hw.device.drift.source": Any,
+        # How far to trust the numbers.
+        "hw.device.drift.kind": Literal["measured", "fitted", "assumed"],
         # The least that is credible.
         "hw.energy.*.low": Any,
         # What is reckoned with.
