@@ -73,6 +73,7 @@ pub use crate::task::classify::{
 /// assert_eq!(chip.adc, adc);
 /// ```
 pub mod hardware {
+    pub use crate::chip::device::{Chance, Faults, Programming, ReadNoise};
     pub use crate::chip::hardware::{
         Adc, AdcRange, CellSpec, ConverterKind, DigitalSpec, DitherBits, DitherPattern, DriveSpec,
         FloorKind, PulseCode, SliceTime, SliceTimes, Subtract, TileSpec, Timing, Window,

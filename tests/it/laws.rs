@@ -19,6 +19,7 @@ use proptest::test_runner::FileFailurePersistence;
 mod bounds;
 mod caught;
 mod choose;
+mod draws;
 mod fault;
 mod order;
 mod play;

@@ -43,7 +43,7 @@ impl Crossbar {
 
     /// Moves every cell that is not stuck, to where its number row by row and its level say. Levels may leave the window, which is
     /// one of programming.
-    pub(in super::super) fn move_all(&mut self, to: impl Fn(usize, u16) -> u16) {
+    pub(crate) fn move_all(&mut self, to: impl Fn(usize, u16) -> u16) {
         let layout = self.layout;
         for (cell, level) in self.levels().enumerate() {
             self.put(cell / layout.columns, cell % layout.columns, to(cell, level));
@@ -73,7 +73,7 @@ impl Crossbar {
     }
 
     /// After a write: a cell that came to rest on a floor that does not absorb is as free as before.
-    pub(in super::super) fn end_write(&mut self) {
+    pub(crate) fn end_write(&mut self) {
         if self.absorbs || self.stuck.is_empty() {
             return;
         }

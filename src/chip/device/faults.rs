@@ -150,61 +150,12 @@ mod tests {
         Place { seed, site: Site::StuckCell, layer, pathway, sub: 0, count: 0 }
     }
 
-    fn share(of: f64) -> Chance {
-        Chance::new((of * 4_294_967_296.0) as u64).unwrap()
-    }
-
     const SIZE: [usize; 2] = [400, 250];
     const WINDOW: [u16; 2] = [2, 14];
 
     fn faults() -> Faults {
-        Faults { floor: share(0.02), ceiling: share(0.01), any: share(0.1) }
-    }
-
-    /// A share of 10^5 cells within four standard deviations: a chance of one in 16,000 each, and the seeds are fixed.
-    fn is_near(found: usize, of: f64, wanted: f64) -> bool {
-        (found as f64 - of * wanted).abs() < 4.0 * (of * wanted * (1.0 - wanted)).sqrt()
-    }
-
-    /// Fails when a bound is taken from the other kind, when levels are drawn from the word that chose, or when a level of the
-    /// window is left out.
-    #[test]
-    fn shares_of_cells_are_stuck_where_they_are_said_to_be() {
-        let cells = faults().stuck(place(1, 0, 0), WINDOW, SIZE);
-        let of = 1e5;
-        let at = |level: u16| cells.iter().filter(|cell| cell.level == level).count();
-        let each = 0.1 / 13.0;
-        assert!(is_near(cells.len(), of, 0.13), "{}", cells.len());
-        assert!(is_near(at(2), of, 0.02 + each) && is_near(at(14), of, 0.01 + each));
-        for level in 3..14 {
-            assert!(is_near(at(level), of, each), "{level}: {}", at(level));
-        }
-    }
-
-    /// Fails when rows or columns share words: then the cells of a row or a column would stick together.
-    #[test]
-    fn faults_are_independent_of_their_neighbours_and_of_other_arrays_and_seeds() {
-        let faults = Faults { floor: share(0.3), ..Faults::NONE };
-        let map = |place| {
-            let mut map = vec![false; SIZE[0] * SIZE[1]];
-            for cell in faults.stuck(place, WINDOW, SIZE) {
-                map[cell.row as usize * SIZE[1] + cell.column as usize] = true;
-            }
-            map
-        };
-        let one = map(place(1, 0, 0));
-        let both = |other: &[bool]| one.iter().zip(other).filter(|(a, b)| **a && **b).count();
-        for other in [place(2, 0, 0), place(1, 1, 0), place(1, 0, 1)] {
-            assert!(is_near(both(&map(other)), 1e5, 0.09));
-        }
-        for apart in [1, SIZE[1]] {
-            let pairs = both(&one[apart..]);
-            assert!(is_near(pairs, 1e5 - apart as f64, 0.09), "{apart}: {pairs}");
-        }
-        let per_column =
-            (0..SIZE[1]).map(|c| (0..SIZE[0]).filter(|r| one[r * SIZE[1] + c]).count());
-        let worst = per_column.map(|n| (n as f64 - 120.0).abs()).fold(0.0, f64::max);
-        assert!(worst < 4.5 * (400.0f64 * 0.21).sqrt(), "{worst}");
+        let share = |of_100: u64| Chance::new((of_100 << 32) / 100).unwrap();
+        Faults { floor: share(2), ceiling: share(1), any: share(10) }
     }
 
     #[test]

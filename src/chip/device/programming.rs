@@ -77,47 +77,8 @@ pub fn cell_words(place: Place, [rows, columns]: [usize; 2]) -> Vec<[u16; 2]> {
 mod tests {
     use super::*;
 
-    /// PCM as of Nandakumar et al., ICECS 2019: 0.26348, 1.9650 and -1.1731 uS of 25.
-    fn pcm() -> Programming {
-        let share = |microsiemens: f64| (microsiemens / 25.0 * 16_777_216.0).round() as i64;
-        Programming { coefficients: [share(0.26348), share(1.9650), share(-1.1731), 0] }
-    }
-
     fn place() -> Place {
         Place { seed: 3, site: Site::ProgrammingNoise, layer: 1, pathway: 2, sub: 0, count: 0 }
-    }
-
-    #[test]
-    fn the_deviation_is_the_polynomial() {
-        for level in [0u16, 1, 64, 128, 200, 255] {
-            let g = f64::from(level) / 255.0;
-            let exact = (0.26348 + 1.9650 * g - 1.1731 * g * g) / 25.0 * 255.0;
-            let found = pcm().sd(level, 255) as f64 / 256.0;
-            assert!((found - exact).abs() < 0.01, "{level}: {found} {exact}");
-        }
-        assert_eq!(Programming { coefficients: [-1, 0, 0, 0] }.sd(3, 15), 0, "no less than none");
-        let cube = Programming { coefficients: [0, 0, 0, 1 << 24] };
-        assert_eq!([0, 5, 10].map(|level| cube.sd(level, 10)), [0, 320, 2560]);
-    }
-
-    /// Mean, variance and tails over 10^5 cells, within four of the deviations that such a sample has.
-    #[test]
-    fn what_a_load_leaves_has_the_mean_and_the_deviation_of_its_law() {
-        let gaussian = Gaussian::new();
-        let words = cell_words(place(), [400, 250]);
-        let all = words.iter().map(|&words| pcm().left(&gaussian, 128, words, [0, 255]));
-        let all: Vec<f64> = all.map(f64::from).collect();
-        let (n, sd) = (1e5, pcm().sd(128, 255) as f64 / 256.0);
-        // rounding with a draw: a sixth of a level squared where the fraction is as likely as any
-        let variance = sd * sd + 1.0 / 6.0;
-        let mean = all.iter().sum::<f64>() / n;
-        let found = all.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / n;
-        assert!((mean - 128.0).abs() < 4.0 * (variance / n).sqrt(), "{mean}");
-        assert!((found / variance - 1.0).abs() < 4.0 * (2.0f64 / n).sqrt(), "{found} {variance}");
-        let far = all.iter().filter(|x| (**x - 128.0).abs() > 3.0 * variance.sqrt()).count();
-        assert!((150..400).contains(&far), "{far}");
-        let r = all.windows(2).map(|p| (p[0] - mean) * (p[1] - mean)).sum::<f64>() / (n * found);
-        assert!(r.abs() < 4.0 / f64::sqrt(n), "{r}");
     }
 
     #[test]

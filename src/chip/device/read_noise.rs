@@ -164,33 +164,6 @@ mod tests {
         assert!(ReadNoise { sigma: ReadNoise::SIGMA_MAX }.sd(4095, 255) < 1 << 33);
     }
 
-    /// Mean, variance and tails on 10^5 conversions, within four of the standard deviations that such a sample has.
-    #[test]
-    fn conversions_have_the_moments_and_tails_of_a_gaussian() {
-        let noise = noise(1 << 12, 7, 0, 1);
-        let mut all: Vec<f64> = Vec::new();
-        for read in 0..100 {
-            noise.each(NoisePlace { read, ..AT }, 0..1000, |_, more| all.push(more as f64));
-        }
-        let (n, sd) = (all.len() as f64, 255.0 * 255.0 / 16.0);
-        let mean = all.iter().sum::<f64>() / n;
-        let variance = all.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / (n - 1.0);
-        assert!(mean.abs() < 4.0 * sd / n.sqrt(), "{mean}");
-        let wanted = sd * sd;
-        assert!((variance / wanted - 1.0).abs() < 4.0 * (2.0 / n).sqrt(), "{}", variance / wanted);
-        for (beyond, share) in [(1.0, 0.31731), (2.0, 0.0455), (3.0, 0.0027)] {
-            let found = all.iter().filter(|x| x.abs() > beyond * sd).count() as f64;
-            let off = (found - n * share).abs();
-            assert!(off < 4.0 * (n * share * (1.0 - share)).sqrt() + 30.0, "{beyond}: {found}");
-        }
-        // neighbours in a read, and the same line of the next
-        for apart in [1, 1000] {
-            let sum: f64 = all.iter().zip(&all[apart..]).map(|(a, b)| a * b).sum();
-            let r = sum / (variance * (n - apart as f64));
-            assert!(r.abs() < 4.0 / n.sqrt(), "{apart}: {r}");
-        }
-    }
-
     #[test]
     fn every_part_of_a_place_has_draws_of_its_own_and_reads_are_counted_on() {
         let of = |noise: &Noise, at: NoisePlace| {

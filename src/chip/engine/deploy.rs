@@ -203,10 +203,10 @@ mod tests {
         all.map(|(sample, unit)| engine.output(Stream::P, sample, unit).0).collect()
     }
 
-    fn after(ratio: f64) -> DriftTables {
+    fn much_later() -> DriftTables {
         let of = |x| OfLogarithm { slope: 0.0, offset: x, least: x, most: x };
         let law = DriftLaw::Power { exponent: of(0.05), spread: of(0.01) };
-        DriftTables::new(law, 255, ratio)
+        DriftTables::new(law, 255, 1e6)
     }
 
     /// Fails when a stuck cell drifts, when a cell has another's words, or when drift is applied twice.
@@ -215,7 +215,7 @@ mod tests {
         let mut engine = engine();
         engine.set_chip_seed(9);
         engine.load_all(&levels());
-        let tables = after(1e6);
+        let tables = much_later();
         engine.age(&tables, false);
         let gaussian = Gaussian::new();
         let array = &engine.layers()[0].arrays[1];
@@ -241,7 +241,7 @@ mod tests {
         let (mut plain, mut made_up) = (engine(), engine());
         for (engine, on) in [(&mut plain, false), (&mut made_up, true)] {
             engine.load_all(&levels());
-            engine.age(&after(1e6), on);
+            engine.age(&much_later(), on);
         }
         let sum = |engine: &Engine| -> u64 {
             engine.layers()[0].arrays.iter().flat_map(Crossbar::levels).map(u64::from).sum()
