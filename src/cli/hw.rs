@@ -7,12 +7,14 @@ use clap::{Args, Subcommand};
 use serde_json::json;
 
 use super::{Done, Failure, known, say, usage};
+use crate::chip::device::{CellSpread, PulseNoise};
 use crate::chip::hardware::{Adc, AdcRange, Hardware, PulseCode, Subtract, Timing};
 use crate::lab::config::{
     self, Config, Constant, CostTable, Model, Sources, Standing, absent_words, builtin_models,
     load_model, model_names,
 };
 use crate::lab::price::{Convention, bounds, figures, peak, prefixed};
+use crate::num::tables::Response;
 
 mod modes;
 
@@ -407,6 +409,25 @@ fn on_off(hardware: &Hardware) -> String {
     }
 }
 
+/// What a pulse does to cells that are not ideal.
+fn pulse(hardware: &Hardware) -> Option<String> {
+    let device = hardware.device.as_ref()?;
+    let curve = match &device.response {
+        Response::Linear(_) => "linear",
+        Response::SoftBounds(_) => "soft bounds",
+        Response::Exponential(_) => "exponential",
+        Response::Neurosim(_) => "curves of NeuroSim",
+        Response::Measured(_) => "measured",
+    };
+    let noise = match device.noise {
+        PulseNoise::Off => String::new(),
+        PulseNoise::OfStep(share) => format!(", noise {share} of a step"),
+        PulseNoise::OfWindow(share) => format!(", noise {share} of the window"),
+    };
+    let differ = if device.spread == CellSpread::default() { "" } else { ", cells differ" };
+    Some(format!("{curve}, {} across the window{noise}{differ}", device.states))
+}
+
 fn numbers(hardware: &Hardware) -> Vec<(&'static str, String)> {
     let h = hardware;
     let converter = match h.adc {
@@ -426,7 +447,7 @@ fn numbers(hardware: &Hardware) -> Vec<(&'static str, String)> {
         }
     };
     let window = (h.cell.window.floor(), h.cell.window.ceiling());
-    vec![
+    let mut all = vec![
         ("cell", format!("{} bits, levels {}..={}", h.cell.level_bits.get(), window.0, window.1)),
         ("on/off", on_off(h)),
         ("tile", format!("{} x {} cells a bank", h.tile.rows, h.tile.columns)),
@@ -439,5 +460,7 @@ fn numbers(hardware: &Hardware) -> Vec<(&'static str, String)> {
         ("error word", format!("{} bits", h.digital.error_bits.get())),
         ("write", format!("at most {} pulses a cell", h.write.increment_max.get())),
         ("remainder", format!("{} bits", h.write.residual_bits.get())),
-    ]
+    ];
+    all.extend(pulse(h).map(|text| ("pulse", text)));
+    all
 }

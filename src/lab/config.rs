@@ -10,6 +10,7 @@ mod check;
 mod chip;
 mod data;
 mod defaults;
+mod device;
 mod differs;
 mod experiment;
 pub mod file;

@@ -7,16 +7,21 @@
 
 use super::{Config, ConfigError, Select, TrainOn};
 use crate::chip::crossbar::kernel::ConvShape;
+use crate::chip::device::{CellSpread, DeviceSpec, PulseNoise};
 use crate::chip::hardware::{
     Adc, AdcRange, CellSpec, DigitalSpec, DitherBits, DitherPattern, DriveSpec, FloorKind,
-    HardwareSpec, PulseCode, Subtract, TileSpec, Timing, WriteScheme, WriteSpec,
+    HardwareSpec, PulseCode, PulseNoise, Subtract, TileSpec, Timing, WriteScheme, WriteSpec,
 };
 use crate::chip::layer::{DrivenBy, Gain, Homeostasis, InitialLevels, LayerSpec, Optimiser, Pool};
 use crate::learn::error::{Centre, OutputError};
 use crate::learn::network::NetworkSpec;
 use crate::learn::route::Route;
 use crate::learn::rule::{Control, Rule, UpdateMode};
-use crate::num::tables::{Activation, Decay};
+use crate::num::fixed::Millionths;
+use crate::num::tables::{
+    Activation, Decay, ExponentialSteps, LinearSteps, MeasuredSteps, NeurosimSteps, Response,
+    SoftBoundSteps, SpreadLaw,
+};
 use crate::task::classify::{Augment, Coding, Experiment, WHITE_NAME};
 use crate::task::policy::{Evaluating, Evolution, InputCoding, Method, PolicyExperiment, Ppo};
 
@@ -414,8 +419,53 @@ impl List {
         put("homeostasis_window_log2", window_log2);
     }
 
+    fn device(&mut self, device: &DeviceSpec) {
+        let DeviceSpec { response, states, asymmetry, noise, spread } = device;
+        let CellSpread { step_law, step, asymmetry: lean, ceiling, floor } = spread;
+        // millionths, as integers
+        let list = |numbers: &[Millionths]| {
+            let words: Vec<_> = numbers.iter().map(|number| number.0.to_string()).collect();
+            words.join(" ")
+        };
+        let response = match response {
+            Response::Linear(LinearSteps { up, down }) => {
+                format!("linear {} {}", list(up), list(down))
+            }
+            Response::SoftBounds(SoftBoundSteps { up, down }) => {
+                format!("soft_bounds {}", list(&[*up, *down]))
+            }
+            Response::Exponential(ExponentialSteps { amplitude, growth, z }) => {
+                format!("exponential {} {} {}", list(amplitude), list(growth), list(z))
+            }
+            Response::Neurosim(NeurosimSteps { labels }) => format!("neurosim {}", list(labels)),
+            Response::Measured(MeasuredSteps { points }) => {
+                format!("measured {}", list(points.as_flattened()))
+            }
+        };
+        self.put("device.response", response);
+        self.put("device.states", states);
+        self.put("device.asymmetry", asymmetry.0);
+        let noise = match *noise {
+            PulseNoise::Off => "off".into(),
+            PulseNoise::OfStep(share) => format!("of_step {}", share.0),
+            PulseNoise::OfWindow(share) => format!("of_window {}", share.0),
+        };
+        self.put("device.noise", noise);
+        let law = match step_law {
+            SpreadLaw::Normal => "normal",
+            SpreadLaw::LogNormal => "log_normal",
+        };
+        if step.0 != 0 {
+            self.put("device.spread.step_law", law);
+        }
+        self.put("device.spread.step", step.0);
+        self.put("device.spread.asymmetry", lean.0);
+        self.put("device.spread.ceiling", ceiling.0);
+        self.put("device.spread.floor", floor.0);
+    }
+
     fn chip(&mut self, hardware: &HardwareSpec) {
-        let HardwareSpec { cell, tile, drive, adc, digital, write, timing } = hardware;
+        let HardwareSpec { cell, tile, drive, adc, digital, write, device, timing } = hardware;
         let CellSpec { level_bits, window, floor_kind } = cell;
         let TileSpec { rows, columns, count_max, transposed_read } = tile;
         let DriveSpec { bits: drive_bits, dac_bits } = drive;
@@ -474,6 +524,9 @@ impl List {
             WriteScheme::Trains { slots_log2 } => format!("rank1 {slots_log2}"),
         };
         self.put("write.scheme", scheme);
+        if let Some(device) = device {
+            self.device(device);
+        }
         if let Some(timing) = *timing {
             self.timing(timing);
         }

@@ -128,6 +128,13 @@ fn provenance(file: &HardwareFile) -> Vec<(&'static str, Option<&str>, Option<&s
         )*};
     }
     table!(cell tile drive lut error write timing);
+    let device = file.device.as_ref();
+    if let Some(table) = device.and_then(|device| device.response.as_ref()) {
+        all.push(("device.response", table.source.as_deref(), table.kind.as_deref()));
+    }
+    if let Some(table) = device.and_then(|device| device.spread.as_ref()) {
+        all.push(("device.spread", table.source.as_deref(), table.kind.as_deref()));
+    }
     if let Some(super::file::AdcFile::Finite(table)) = &file.adc {
         all.push(("adc", table.source.as_deref(), table.kind.as_deref()));
     }
