@@ -10,11 +10,10 @@ use super::{Done, Failure, known, say, usage};
 use crate::chip::device::{CellSpread, PulseNoise};
 use crate::chip::hardware::{Adc, AdcRange, Hardware, PulseCode, Subtract, Timing};
 use crate::lab::config::{
-    self, Config, Constant, CostTable, Model, Sources, Standing, absent_words, builtin_models,
-    load_model, model_names,
+    self, Config, Constant, CostTable, Model, Sources, Standing, absent_words, builtin_devices,
+    builtin_models, device_names, load_model, model_names,
 };
 use crate::lab::price::{Convention, bounds, figures, peak, prefixed};
-use crate::num::tables::Response;
 
 mod modes;
 
@@ -115,13 +114,14 @@ fn widths(text: &str) -> Result<Widths, String> {
 pub(super) fn execute(command: &HwCommand) -> Done {
     match command {
         HwCommand::List { json, quiet } => {
-            for Model { name, summary, .. } in builtin_models() {
+            for Model { name, summary, .. } in builtin_models().into_iter().chain(builtin_devices())
+            {
                 say(&match (json, quiet) {
                     (true, _) => {
                         json!({"event": "model", "name": name, "summary": summary}).to_string()
                     }
                     (_, true) => name,
-                    _ => format!("{name:12} {summary}"),
+                    _ => format!("{name:14} {summary}"),
                 });
             }
             Ok(())
@@ -156,7 +156,7 @@ fn new(name: &Path, json: bool, quiet: bool) -> Done {
         );
         return Err(usage(&message));
     }
-    if model_names().contains(&chip) {
+    if model_names().contains(&chip) || device_names().contains(&chip) {
         let message = format!("{chip} is a built-in model; give yours another name");
         return Err(usage(&message));
     }
@@ -412,13 +412,7 @@ fn on_off(hardware: &Hardware) -> String {
 /// What a pulse does to cells that are not ideal.
 fn pulse(hardware: &Hardware) -> Option<String> {
     let device = hardware.device.as_ref()?;
-    let curve = match &device.response {
-        Response::Linear(_) => "linear",
-        Response::SoftBounds(_) => "soft bounds",
-        Response::Exponential(_) => "exponential",
-        Response::Neurosim(_) => "curves of NeuroSim",
-        Response::Measured(_) => "measured",
-    };
+    let curve = device.response.name().replace('_', " ");
     let noise = match device.noise {
         PulseNoise::Off => String::new(),
         PulseNoise::OfStep(share) => format!(", noise {share} of a step"),

@@ -17,11 +17,7 @@ use crate::learn::error::{Centre, OutputError};
 use crate::learn::network::NetworkSpec;
 use crate::learn::route::Route;
 use crate::learn::rule::{Control, Rule, UpdateMode};
-use crate::num::fixed::Millionths;
-use crate::num::tables::{
-    Activation, Decay, ExponentialSteps, LinearSteps, MeasuredSteps, NeurosimSteps, Response,
-    SoftBoundSteps, SpreadLaw,
-};
+use crate::num::tables::{Activation, Decay, SpreadLaw};
 use crate::task::classify::{Augment, Coding, Experiment, WHITE_NAME};
 use crate::task::policy::{Evaluating, Evolution, InputCoding, Method, PolicyExperiment, Ppo};
 
@@ -423,25 +419,8 @@ impl List {
         let DeviceSpec { response, states, asymmetry, noise, spread } = device;
         let CellSpread { step_law, step, asymmetry: lean, ceiling, floor } = spread;
         // millionths, as integers
-        let list = |numbers: &[Millionths]| {
-            let words: Vec<_> = numbers.iter().map(|number| number.0.to_string()).collect();
-            words.join(" ")
-        };
-        let response = match response {
-            Response::Linear(LinearSteps { up, down }) => {
-                format!("linear {} {}", list(up), list(down))
-            }
-            Response::SoftBounds(SoftBoundSteps { up, down }) => {
-                format!("soft_bounds {}", list(&[*up, *down]))
-            }
-            Response::Exponential(ExponentialSteps { amplitude, growth, z }) => {
-                format!("exponential {} {} {}", list(amplitude), list(growth), list(z))
-            }
-            Response::Neurosim(NeurosimSteps { labels }) => format!("neurosim {}", list(labels)),
-            Response::Measured(MeasuredSteps { points }) => {
-                format!("measured {}", list(points.as_flattened()))
-            }
-        };
+        let numbers: Vec<_> = response.numbers().iter().map(|n| n.0.to_string()).collect();
+        let response = format!("{} {}", response.name(), numbers.join(" "));
         self.put("device.response", response);
         self.put("device.states", states);
         self.put("device.asymmetry", asymmetry.0);

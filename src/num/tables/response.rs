@@ -71,6 +71,12 @@ trait Curve {
     /// Its steps; `mean` is the one of which as many as the device has states cross the window.
     fn steps(&self, mean: f64) -> Steps<'_>;
 
+    /// What it is called.
+    fn name(&self) -> &'static str;
+
+    /// All its numbers, in an order that stays.
+    fn numbers(&self) -> Vec<Millionths>;
+
     /// Whether its numbers are steps.
     fn check(&self) -> Result<(), ResponseError>;
 }
@@ -84,6 +90,18 @@ impl Response {
             Self::Neurosim(steps) => steps,
             Self::Measured(steps) => steps,
         }
+    }
+
+    /// What its kind is called.
+    #[must_use]
+    pub fn name(&self) -> &'static str {
+        self.curve().name()
+    }
+
+    /// All its numbers, in an order that stays.
+    #[must_use]
+    pub fn numbers(&self) -> Vec<Millionths> {
+        self.curve().numbers()
     }
 
     /// Checks its numbers.

@@ -34,6 +34,14 @@ impl Curve for ExponentialSteps {
         })
     }
 
+    fn name(&self) -> &'static str {
+        "exponential"
+    }
+
+    fn numbers(&self) -> Vec<Millionths> {
+        [self.amplitude, self.growth, self.z].concat()
+    }
+
     fn check(&self) -> Result<(), ResponseError> {
         within("amplitude", &self.amplitude, [-1000, 1000], "amplitudes lie in -1000..=1000")?;
         within("growth", &self.growth, [-100, 100], "growths lie in -100..=100")?;

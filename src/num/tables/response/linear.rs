@@ -26,6 +26,14 @@ impl Curve for LinearSteps {
         Box::new(move |x| lines.map(|[floor, ceiling]| mean * (floor + (ceiling - floor) * x)))
     }
 
+    fn name(&self) -> &'static str {
+        "linear"
+    }
+
+    fn numbers(&self) -> Vec<Millionths> {
+        [self.up, self.down].concat()
+    }
+
     fn check(&self) -> Result<(), ResponseError> {
         let allowed = "steps at the floor and the ceiling are 0 to 1000 mean steps";
         within("up", &self.up, [0, 1000], allowed)?;

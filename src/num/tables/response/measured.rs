@@ -23,6 +23,14 @@ impl Curve for MeasuredSteps {
         })
     }
 
+    fn name(&self) -> &'static str {
+        "measured"
+    }
+
+    fn numbers(&self) -> Vec<Millionths> {
+        self.points.as_flattened().to_vec()
+    }
+
     fn check(&self) -> Result<(), ResponseError> {
         let wrong = |found: String, allowed| Err(ResponseError { name: "points", found, allowed });
         let rising = self.points.is_sorted_by(|a, b| a[0] < b[0]);

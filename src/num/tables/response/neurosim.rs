@@ -70,6 +70,14 @@ impl Curve for NeurosimSteps {
         })
     }
 
+    fn name(&self) -> &'static str {
+        "neurosim"
+    }
+
+    fn numbers(&self) -> Vec<Millionths> {
+        self.labels.to_vec()
+    }
+
     fn check(&self) -> Result<(), ResponseError> {
         within("labels", &self.labels, [-9, 9], "labels of nonlinearity lie in -9..=9")
     }

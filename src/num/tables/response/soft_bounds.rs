@@ -25,6 +25,14 @@ impl Curve for SoftBoundSteps {
         Box::new(move |x| [mean * up * (1.0 - x), mean * down * x])
     }
 
+    fn name(&self) -> &'static str {
+        "soft_bounds"
+    }
+
+    fn numbers(&self) -> Vec<Millionths> {
+        vec![self.up, self.down]
+    }
+
     fn check(&self) -> Result<(), ResponseError> {
         let allowed = "the longest step is 0 to 1000 mean steps";
         within("up", &[self.up], [0, 1000], allowed)?;
