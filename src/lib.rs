@@ -125,6 +125,7 @@ pub mod policy {
 pub mod sweep {
     pub use crate::lab::sweep::{
         Carried, Options as SweepOptions, Shard, SweepError, SweepProgress, Swept, sweep,
+        sweep_part, sweep_runs,
     };
     pub use crate::lab::table::{Column, ColumnUnit, Format, Role, Table, Values, WriteError};
 }

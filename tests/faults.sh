@@ -4,7 +4,8 @@
 #   tests/faults.sh             all faults, one line each: caught, MISSED, NOT PLANTED or NOT JUDGED
 #   tests/faults.sh sign "4 "   those whose name holds "sign" or "4 "
 #
-# A name begins with the number of the law that is to notice, or with `run` where tests of run folders are.
+# A name begins with the number of the law that is to notice (6: convolutions and homeostasis, by unit tests and the oracle),
+# or with `run` where tests of run folders are.
 # The copy and what is built from it live in a temporary folder (FAULTS_DIR, FAULTS_TARGET_DIR to keep them).
 # First all these tests run on sources without a fault: what fails there can catch nothing.
 # Ends with 1 unless every fault was caught.
@@ -18,7 +19,7 @@ export PROPTEST_MAX_SHRINK_ITERS=0
 only=("${@:-}")
 status=0
 # half of a build is what a debugger would read
-build=(cargo test --config profile.dev.package.dalean.debug=0 --config profile.test.package.dalean.debug=0 --test it)
+build=(cargo test --config profile.dev.package.dalean.debug=0 --config profile.test.package.dalean.debug=0 --lib --test it)
 
 copy() {
     (cd "$root" && tar cf - --exclude=./target --exclude=./.git --exclude=./runs .) |
@@ -50,7 +51,7 @@ fault() {
     fi
     # shellcheck disable=SC2086
     if (cd "$work/tree" && "${build[@]}" -- $tests) >"$work/log" 2>&1; then
-        if grep -q '^running 0 tests' "$work/log"; then say "$name" "NOT JUDGED (no test is called $tests)"; else say "$name" MISSED; fi
+        if ! grep -q '^running [1-9]' "$work/log"; then say "$name" "NOT JUDGED (no test is called $tests)"; else say "$name" MISSED; fi
         status=1
         return 0
     fi
@@ -67,7 +68,7 @@ fault() {
 # touched, so that what an earlier fault left is built again: the copy has the dates of the sources
 copy
 touch "$work/tree/src/lib.rs"
-if ! (cd "$work/tree" && "${build[@]}" -- laws damage golden_run) >"$work/log" 2>&1; then
+if ! (cd "$work/tree" && "${build[@]}" -- laws damage golden_run oracle engine:: layer::) >"$work/log" 2>&1; then
     say "none, for control" "FAILS: $(sed -n 's/^test \(.*\) \.\.\. FAILED$/\1/p' "$work/log" | paste -sd' ') ($work/log)"
     exit 1
 fi
@@ -204,4 +205,56 @@ fault "run an address has constants in it" src/lab/config/given.rs \
     'Ok(classify(&experiment, self.train_on, self.select))' \
     'Ok([classify(&experiment, self.train_on, self.select), vec![("constants".into(), format!("{:?}", self.constants))]].concat())' \
     golden_run
+window=src/chip/engine/window.rs
+back=src/chip/engine/window/back.rs
+homeostasis=src/chip/engine/homeostasis.rs
+balance=src/chip/layer/homeostasis.rs
+
+fault "6 a mean of four truncates" $window \
+    '((sum + 2) >> 2) as u8' '(sum >> 2) as u8' 'engine::window oracle::conv'
+fault "6 a mean of nine truncates" $window \
+    '(2 * sum + cells) / (2 * cells)' '2 * sum / (2 * cells)' 'engine::window oracle::conv'
+fault "6 an image is not framed above" $window \
+    '((y + shape.pad) * shape.padded()[1] + shape.pad)' '(y * shape.padded()[1] + shape.pad)' 'engine::window oracle::conv'
+fault "6 a pool leaves the last column" $window \
+    '&codes[row..row + side]' '&codes[row..row + side.max(2) - 1]' 'engine::window oracle::conv'
+fault "6 a map is flattened one unit off" $window \
+    'let codes = &codes[first.min(last)..last];' \
+    'let codes = &codes[first.min(last).saturating_sub(usize::from(first > 0))..last - usize::from(first > 0)];' 'engine::window oracle::conv'
+fault "6 what comes back forgets the stride" $back \
+    'let first = position * shape.stride;' 'let first = position;' engine::window::back
+fault "6 all that are greatest hear the word" $back \
+    'std::mem::take(&mut left[unit])' 'left[unit]' engine::window::back
+fault "6 a mean hands one place its word" $back \
+    'square().for_each(|at| heard[at] = *word);' 'square().take(1).for_each(|at| heard[at] = *word);' engine::window::back
+fault "6 a threshold is added" $homeostasis \
+    'let left = *sum - self.offsets[at + column];' 'let left = *sum + self.offsets[at + column];' 'engine::homeostasis oracle::conv'
+fault "6 evaluation moves thresholds" $homeostasis \
+    'Mode::Hardware if self.phase == Phase::Training => Notes {' 'Mode::Hardware => Notes {' 'engine::homeostasis oracle::conv'
+fault "6 thresholds move twice as fast" $balance \
+    'sum << THRESHOLD_BITS, reads, window)' 'sum << THRESHOLD_BITS, reads, window - 1)' 'engine::homeostasis oracle::conv'
+fault "6 positions are not counted in a window" $balance \
+    'self.law.window_log2 + self.positions_log2)' 'self.law.window_log2)' 'engine::homeostasis oracle::conv'
+fault "6 a step grows and its variance stays" $balance \
+    '(shift + 1, variance >> 2)' '(shift + 1, variance)' 'layer::homeostasis engine::homeostasis oracle::conv'
+fault "6 means are of images, not of pixels" src/chip/engine/optimise.rs \
+    'next_mean(mean, codes, samples, window + pixels_log2)' 'next_mean(mean, codes, samples, window)' 'engine::window engine::optimise oracle::conv'
+fault "6 a constant row has the mean of one" src/chip/engine/optimise.rs \
+    'let constant = pixels * i64::from(self.hardware.drive.bits.code_max());' 'let constant = pixels;' 'engine::window oracle::conv'
+fault "6 a scale follows an eighth of the way" src/chip/layer/requests/rms.rs \
+    'rsh(now - self.power, 4)' 'rsh(now - self.power, 3)' 'layer::requests oracle::conv'
+fault "6 one position is read" $schedule \
+    'cycles.occupy(layer, During::ForwardRows, count * front);' \
+    'cycles.occupy(layer, During::ForwardRows, samples as u64 * front);' 'tick::network oracle::conv'
+fault "6 positions are read at once" $schedule \
+    '*again = (*again).max(shape.positions * front).max(shape.stage);' '*again = (*again).max(front).max(shape.stage);' 'tick::network oracle::conv'
+fault "6 a pool takes no time" $schedule \
+    '*latency += one + shape.stage;' '*latency += one;' 'tick::network oracle::conv'
+fault "6 gates of one position are formed" $schedule \
+    't.error(shape.words, shape.columns, shape.positions)' 't.error(shape.words, shape.columns, 1)' 'tick::network oracle::conv'
+fault "6 columns are read at one position" $schedule \
+    'cycles.occupy(layer, During::ForwardColumns, count * front);' \
+    'cycles.occupy(layer, During::ForwardColumns, samples as u64 * front);' 'tick::network engine::window'
+fault "6 thresholds move in no time" $schedule \
+    'longest = longest.max(one);' 'longest = longest.max(0 * one);' 'engine::homeostasis oracle::conv'
 exit $status

@@ -4,7 +4,7 @@ Deterministic and all-integer: the same bits from Python, from the command line,
 
 1. whole runs: :func:`train`, :func:`sweep`, :class:`Run`
 2. learners: :class:`EDClassifier` (scikit-learn's style), :class:`EDPolicy` (Gymnasium)
-3. the chip itself: :class:`Chip`, :class:`Network`
+3. the chip itself: :class:`Chip`, :class:`Network`, and :func:`deploy` for networks that were trained elsewhere
 
 docs/python.md has an example of each.
 """
@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 from ._dalean import ARITHMETIC, VERSION as __version__
 from .chip import Chip, Network
+from .deployment import Deployed, deploy, outputs, signed
 from .errors import (
     ArrayError,
     CheckpointError,
@@ -31,7 +32,7 @@ from .tables import Table
 
 if TYPE_CHECKING:
     from .estimator import EDClassifier
-    from .policy import EDPolicy
+    from .policy import EDPolicy, Lines
 
 __all__ = [
     "ARITHMETIC",
@@ -41,10 +42,12 @@ __all__ = [
     "ChipError",
     "ConfigError",
     "DataError",
+    "Deployed",
     "EDClassifier",
     "EDPolicy",
     "EnvironmentFault",
     "Error",
+    "Lines",
     "Network",
     "NetworkError",
     "Report",
@@ -54,7 +57,10 @@ __all__ = [
     "Verdict",
     "__version__",
     "configuration",
+    "deploy",
+    "outputs",
     "resume",
+    "signed",
     "sweep",
     "train",
 ]
@@ -66,8 +72,8 @@ def __getattr__(name: str) -> Any:
         from .estimator import EDClassifier
 
         return EDClassifier
-    if name == "EDPolicy":
-        from .policy import EDPolicy
+    if name in ("EDPolicy", "Lines"):
+        from . import policy
 
-        return EDPolicy
+        return getattr(policy, name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

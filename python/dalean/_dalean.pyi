@@ -60,6 +60,17 @@ def sweep(
     replace: bool,
     callback: _Told,
 ) -> tuple[str, list[tuple[str, str, str, list[Any]]], str, list[int], bytes]: ...
+def sweep_runs(file: PathLike[str], settings: list[str], data: PathLike[str]) -> int: ...
+def sweep_part(
+    file: PathLike[str],
+    settings: list[str],
+    store: PathLike[str],
+    data: PathLike[str],
+    kernel: str | None,
+    keep_states: bool,
+    replace: bool,
+    shard: str,
+) -> list[int]: ...
 
 class Network:
     """A dense network whose every operation is the caller's; see :class:`dalean.Network`."""
@@ -73,6 +84,8 @@ class Network:
     """Greatest drive code of an input."""
     word_max: int
     """Greatest error word; the least is its negative."""
+    level_bits: int
+    """Bits of a stored level."""
     window: tuple[int, int]
     """Least and greatest level of a cell."""
     updates: int
@@ -169,6 +182,7 @@ class PolicyLearner:
         seed: int | None,
         id: str,
         shown: int,
+        active: int | None,
         discrete: bool,
         taken: int,
         steps_max: int,
@@ -176,17 +190,18 @@ class PolicyLearner:
         kernel: str | None,
     ) -> PolicyLearner: ...
     def turn(self) -> tuple[str, NDArray[Any] | None]: ...
-    def begin(self, shown: ArrayLike) -> None: ...
+    def begin(self, shown: ArrayLike | tuple[ArrayLike, ArrayLike]) -> None: ...
     def take(
         self,
-        next: ArrayLike,
+        next: ArrayLike | tuple[ArrayLike, ArrayLike],
         rewards: ArrayLike,
         terminated: ArrayLike,
         truncated: ArrayLike,
-        reached: ArrayLike | None = None,
+        reached: ArrayLike | tuple[ArrayLike, ArrayLike] | None = None,
+        idle: ArrayLike | None = None,
     ) -> None: ...
     def learn(self) -> dict[str, Any] | None: ...
-    def answer(self, shown: ArrayLike, step: int) -> NDArray[Any]: ...
+    def answer(self, shown: ArrayLike | tuple[ArrayLike, ArrayLike], step: int) -> NDArray[Any]: ...
     def state_hash(self) -> str: ...
     def checkpoint(self) -> bytes: ...
     def put_back(self, bytes: bytes) -> None: ...

@@ -71,6 +71,8 @@ class Network(_dalean.Network):
     """
 
     sizes: list[int]
+    deployment: Any = None
+    """How the layers of a network came onto the chip that :func:`dalean.deploy` made."""
 
     def __new__(
         cls,

@@ -279,6 +279,7 @@ def sweep(
     kernel: str | None = None,
     keep_states: bool = False,
     replace: bool = False,
+    ray: bool | str = False,
     progress: bool | None = None,
 ) -> Table:
     """Carries out a sweep in a store, as ``dalean sweep`` does, and gives its table: one row a point.
@@ -290,13 +291,21 @@ def sweep(
     :param store: folder of all runs; else ``DALEAN_STORE``, else ``store``.
     :param name: what the sweep of a dict is called in the store.
     :param jobs: runs at a time, on one thread each.
+    :param ray: whether runs are tasks of Ray, on one thread each and as many at a time as it has processors; or its address. Store and
+        data are folders that all its machines reach by the same path. The rows are those of a sweep without it.
     """
     with Progress(progress, "share") as told, tempfile.TemporaryDirectory(prefix="dalean") as folder:
+        written = None
         if isinstance(file, Mapping):
-            path = Path(folder) / f"{name or 'sweep'}.toml"
-            path.write_text(_sweep_text(file), encoding="utf-8")
+            path, written = Path(folder) / f"{name or 'sweep'}.toml", _sweep_text(file)
+            path.write_text(written, encoding="utf-8")
         else:
             path = Path(file)
+        if ray:
+            from ._ray import share
+
+            here, there = place(store, "DALEAN_STORE", "store").absolute(), place(data, "DALEAN_DATA", "data").absolute()
+            share(ray, path.absolute(), written, settings(overrides), here, there, kernel, keep_states, replace, told)
         swept = _dalean.sweep(
             path,
             settings(overrides),

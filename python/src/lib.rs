@@ -22,7 +22,10 @@ mod _dalean {
     #[pymodule_export]
     use crate::policy::PolicyLearner;
     #[pymodule_export]
-    use crate::runs::{configuration, evaluate, price, report, resume, sweep, train, verify};
+    use crate::runs::{
+        configuration, evaluate, price, report, resume, sweep, sweep_part, sweep_runs, train,
+        verify,
+    };
 
     /// The command line: the program with these arguments, its own name first. Gives its exit code.
     #[pyfunction]

@@ -176,6 +176,11 @@ impl Network {
     }
 
     #[getter]
+    fn level_bits(&self) -> u32 {
+        self.made.experiment.hardware.cell.level_bits.get()
+    }
+
+    #[getter]
     fn window(&self) -> [u16; 2] {
         self.network.window()
     }

@@ -1,14 +1,14 @@
 //! A policy whose environments are the caller's, for `dalean.EDPolicy`.
 
 use dalean::policy::{
-    Actions, EnvSpec, FloatDoor, FloatOutcomes, PolicyExperiment, PolicyTurn, Shown, Taken,
+    Actions, EnvSpec, FloatDoor, Observations, PolicyExperiment, PolicyTurn, Shown, Taken,
 };
 use dalean::{Checkpointed, Config, Sources};
 use numpy::PyArray1;
 use pyo3::prelude::*;
 use pyo3::types::{PyAny, PyBytes, PyDict};
 
-use crate::arrays::{flags, reals, table};
+use crate::arrays::{flags, reals, table, wholes};
 use crate::errors::{Raised, wrong};
 use crate::waits::{Held, Watch, backend};
 
@@ -41,6 +41,43 @@ pub(crate) struct PolicyLearner {
 }
 
 impl PolicyLearner {
+    /// What all environments show: numbers, or a pair of the lines that are on and where those of each end.
+    fn observations(&self, what: &str, shown: &Bound<'_, PyAny>) -> PyResult<Observations> {
+        let Shown::Sparse { lines, active: most } = self.made.spec.shown else {
+            return Ok(self.door.observations(&reals(what, shown)?).map_err(Raised::from)?);
+        };
+        let pair = "give a pair: the lines that are on, rising in each environment, and where those of each end";
+        let (on, stops) = shown
+            .extract::<(Bound<'_, PyAny>, Bound<'_, PyAny>)>()
+            .map_err(|_| wrong(what, "are no pair", pair))?;
+        let ((on, _), (stops, _)) = (wholes(what, &on)?, wholes(what, &stops)?);
+        let (mut active, mut ends, mut from) = (Vec::with_capacity(on.len()), vec![], 0);
+        for (which, &stop) in stops.iter().enumerate() {
+            let stop = usize::try_from(stop).ok().filter(|stop| (from..=on.len()).contains(stop));
+            let Some(stop) = stop else {
+                return Err(wrong(
+                    what,
+                    &format!("end at {} in environment {which}", stops[which]),
+                    pair,
+                ));
+            };
+            let of = &on[from..stop];
+            if of.len() > most || !of.is_sorted_by(|a, b| a < b) {
+                let found =
+                    format!("are {} lines, or no rising ones, in environment {which}", of.len());
+                return Err(wrong(what, &found, &format!("{pair}; {most} at most are on")));
+            }
+            for &line in of {
+                let line = u32::try_from(line).ok().filter(|&line| (line as usize) < lines);
+                let allowed = format!("there are {lines} lines, from 0");
+                active.push(line.ok_or_else(|| wrong(what, "name another line", &allowed))?);
+            }
+            from = stop;
+            ends.push(stop);
+        }
+        Ok(Observations { active, ends, ..Observations::default() })
+    }
+
     /// The thing itself; in a child of a fork, with threads of its own.
     fn held(&mut self) -> Result<&mut dalean::policy::PolicyLearner, Raised> {
         let Self { made, learner, .. } = self;
@@ -75,7 +112,7 @@ fn actions<'py>(
 #[pymethods]
 impl PolicyLearner {
     #[new]
-    #[pyo3(signature = (name, text, hw, settings, seed, id, shown, discrete, taken, steps_max, threads, kernel))]
+    #[pyo3(signature = (name, text, hw, settings, seed, id, shown, active, discrete, taken, steps_max, threads, kernel))]
     #[expect(clippy::too_many_arguments, reason = "the package gives all of them by name")]
     fn new(
         py: Python<'_>,
@@ -86,6 +123,7 @@ impl PolicyLearner {
         seed: Option<u64>,
         id: String,
         shown: usize,
+        active: Option<usize>,
         discrete: bool,
         taken: usize,
         steps_max: u32,
@@ -104,7 +142,10 @@ impl PolicyLearner {
         }
         let spec = EnvSpec {
             id: id.into(),
-            shown: Shown::Dense(shown),
+            shown: match active {
+                Some(active) => Shown::Sparse { lines: shown, active },
+                None => Shown::Dense(shown),
+            },
             taken: if discrete { Taken::Discrete(taken) } else { Taken::Continuous(taken) },
             steps_max,
             inputs: vec![("observation", shown)],
@@ -174,12 +215,11 @@ impl PolicyLearner {
     }
 
     fn begin(&mut self, shown: &Bound<'_, PyAny>) -> PyResult<()> {
-        let shown = reals("observations", shown)?;
-        let shown = self.door.observations(&shown).map_err(Raised::from)?;
+        let shown = self.observations("observations", shown)?;
         Ok(self.held()?.begin(&shown).map_err(Raised::from)?)
     }
 
-    #[pyo3(signature = (next, rewards, terminated, truncated, reached = None))]
+    #[pyo3(signature = (next, rewards, terminated, truncated, reached = None, idle = None))]
     fn take(
         &mut self,
         py: Python<'_>,
@@ -188,21 +228,18 @@ impl PolicyLearner {
         terminated: &Bound<'_, PyAny>,
         truncated: &Bound<'_, PyAny>,
         reached: Option<&Bound<'_, PyAny>>,
+        idle: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<()> {
-        let next = reals("observations", next)?;
-        let reached = reached.map(|reached| reals("final observations", reached)).transpose()?;
+        let next = self.observations("observations", next)?;
+        let last = |reached| self.observations("final observations", reached);
+        let reached = reached.map(last).transpose()?;
         let rewards = reals("rewards", rewards)?;
         let (over, stop) = (flags("terminated", terminated)?, flags("truncated", truncated)?);
-        let outcomes = FloatOutcomes {
-            next: &next,
-            reached: reached.as_deref(),
-            rewards: &rewards,
-            terminated: &over,
-            truncated: &stop,
-        };
-        let outcomes = self.door.outcomes(&outcomes).map_err(Raised::from)?;
+        let idle = idle.map_or(Ok(vec![]), |idle| flags("idle", idle))?;
+        let outcomes =
+            self.door.came(next, reached, &rewards, [&over, &stop]).map_err(Raised::from)?;
         let learner = self.held()?;
-        Ok(py.detach(|| learner.take(&outcomes)).map_err(Raised::from)?)
+        Ok(py.detach(|| learner.take_idle(&outcomes, &idle)).map_err(Raised::from)?)
     }
 
     /// Learns from a full rollout: what came of the epoch, if that was its last one.
@@ -236,8 +273,7 @@ impl PolicyLearner {
         shown: &Bound<'py, PyAny>,
         step: u64,
     ) -> PyResult<Bound<'py, PyAny>> {
-        let shown = reals("observations", shown)?;
-        let shown = self.door.observations(&shown).map_err(Raised::from)?;
+        let shown = self.observations("observations", shown)?;
         let count = self.count() as usize;
         let learner = self.held()?;
         let taken = py.detach(|| learner.answer(&shown, step)).map_err(Raised::from)?;

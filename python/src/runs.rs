@@ -5,7 +5,9 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-use dalean::sweep::{Format, SweepOptions, SweepProgress, Swept, Values, sweep as carry_out};
+use dalean::sweep::{
+    Format, SweepError, SweepOptions, SweepProgress, Swept, Values, sweep as carry_out,
+};
 use dalean::{
     Config, DataRoot, EpochRecord, Keeping, RunError, RunEvent, Sources, TestOutcome, Verdict,
 };
@@ -251,27 +253,94 @@ pub(crate) fn sweep<'py>(
     replace: bool,
     callback: Option<Py<PyAny>>,
 ) -> PyResult<(String, Bound<'py, PyList>, PathBuf, [usize; 3], Vec<u8>)> {
-    let machine = machine(kernel.as_deref(), jobs)?;
+    let options = options(jobs, kernel.as_deref(), keep_states, replace)?;
+    let swept = watched(py, callback, |stop, note| {
+        carry_out(&file, &settings, &root(data, None), &store, options, stop, note)
+    })?;
+    let Swept { name, carried, table, page, .. } = swept;
+    let columns = PyList::empty(py);
+    for column in &table.columns {
+        let cells = match &column.values {
+            Values::Whole(cells) => PyList::new(py, cells)?,
+            Values::Real(cells) => PyList::new(py, cells)?,
+            Values::Text(cells) => PyList::new(py, cells)?,
+        };
+        columns.append((&column.name, &column.label, column.unit.sign(), cells))?;
+    }
+    let mut parquet = Vec::new();
+    table.write(Format::Parquet, &mut parquet).map_err(Raised::from)?;
+    Ok((name, columns, page, [carried.runs, carried.finished, carried.failed], parquet))
+}
+
+/// How many runs a sweep has.
+#[pyfunction]
+pub(crate) fn sweep_runs(
+    py: Python<'_>,
+    file: PathBuf,
+    settings: Vec<String>,
+    data: PathBuf,
+) -> PyResult<usize> {
+    let runs = py.detach(|| dalean::sweep::sweep_runs(&file, &settings, &root(data, None)));
+    Ok(runs.map_err(Raised::from)?)
+}
+
+/// The runs of a shard, `I/N`: how many it has, how many are finished, how many failed. Each keeps a checkpoint after every epoch.
+#[pyfunction]
+#[expect(clippy::too_many_arguments, reason = "the package gives all of them by name")]
+pub(crate) fn sweep_part(
+    py: Python<'_>,
+    file: PathBuf,
+    settings: Vec<String>,
+    store: PathBuf,
+    data: PathBuf,
+    kernel: Option<String>,
+    keep_states: bool,
+    replace: bool,
+    shard: &str,
+) -> PyResult<[usize; 3]> {
+    let mut options = options(1, kernel.as_deref(), keep_states, replace)?;
+    options.keeping.every = Duration::ZERO;
+    let part = shard.parse();
+    let wrong = |allowed: String| wrong("shard", &format!("is {shard:?}"), &allowed);
+    options.shard = Some(part.map_err(wrong)?);
+    let carried = watched(py, None, |stop, note| {
+        dalean::sweep::sweep_part(&file, &settings, &root(data, None), &store, options, stop, note)
+    })?;
+    Ok([carried.runs, carried.finished, carried.failed])
+}
+
+fn options(
+    jobs: usize,
+    kernel: Option<&str>,
+    keep_states: bool,
+    replace: bool,
+) -> PyResult<SweepOptions> {
+    let machine = machine(kernel, jobs)?;
     let mut keeping = Keeping::ALL;
     (keeping.states, keeping.every) = (keep_states, Duration::from_secs(10));
-    let options = SweepOptions {
-        backend: machine.backend(),
-        jobs: machine.threads(),
-        keeping,
-        shard: None,
-        replace,
-    };
+    let (backend, jobs) = (machine.backend(), machine.threads());
+    Ok(SweepOptions { backend, jobs, keeping, shard: None, replace })
+}
+
+/// Hears how far a sweep is.
+type Note<'a> = &'a (dyn Fn(SweepProgress) + Sync);
+
+/// Does the long work of a sweep in another thread, while this one hears the user.
+fn watched<T: Send>(
+    py: Python<'_>,
+    callback: Option<Py<PyAny>>,
+    work: impl FnOnce(&AtomicBool, Note<'_>) -> Result<T, SweepError> + Send,
+) -> PyResult<T> {
     let (stop, at) = (AtomicBool::new(false), Mutex::new(SweepProgress::default()));
     let mut watch = Watch::new(callback);
-    let swept = py.detach(|| {
+    let done = py.detach(|| {
         std::thread::scope(|scope| {
             let work = scope.spawn(|| {
                 let note = |progress| {
                     *at.lock().unwrap_or_else(std::sync::PoisonError::into_inner) = progress;
                 };
-                carry_out(&file, &settings, &root(data, None), &store, options, &stop, &note)
+                work(&stop, &note)
             });
-            // this thread hears the user
             while !work.is_finished() {
                 std::thread::sleep(Duration::from_millis(5));
                 let go_on = watch.go_on("sweep", || {
@@ -291,20 +360,8 @@ pub(crate) fn sweep<'py>(
             work.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))
         })
     });
-    if let Some(error) = watch.error {
-        return Err(error);
+    match watch.error {
+        Some(error) => Err(error),
+        None => Ok(done.map_err(Raised::from)?),
     }
-    let Swept { name, carried, table, page, .. } = swept.map_err(Raised::from)?;
-    let columns = PyList::empty(py);
-    for column in &table.columns {
-        let cells = match &column.values {
-            Values::Whole(cells) => PyList::new(py, cells)?,
-            Values::Real(cells) => PyList::new(py, cells)?,
-            Values::Text(cells) => PyList::new(py, cells)?,
-        };
-        columns.append((&column.name, &column.label, column.unit.sign(), cells))?;
-    }
-    let mut parquet = Vec::new();
-    table.write(Format::Parquet, &mut parquet).map_err(Raised::from)?;
-    Ok((name, columns, page, [carried.runs, carried.finished, carried.failed], parquet))
 }

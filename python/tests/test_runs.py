@@ -1,14 +1,17 @@
 """Floor 1: whole runs, the same as the command line's."""
 
+import contextlib
 import json
 import multiprocessing
 import os
 import pickle
+import random
 import signal
 import subprocess
 import sys
 import threading
 import time
+from pathlib import Path
 
 import pytest
 
@@ -196,3 +199,91 @@ def test_keys_are_those_of_the_program():
 
     with open(dalean.keys.__file__, encoding="utf-8") as file:
         assert file.read() == made, "make it again: dalean keys --json | python python/stubs.py > python/dalean/keys.py"
+
+
+def test_the_quick_start_notebook(examples, tmp_path):
+    """In a kernel where there is one; else cell by cell in this process, which finds the same mistakes of ours."""
+    path = examples / "quickstart.ipynb"
+    try:
+        import nbclient
+        import nbformat
+
+        import ipykernel  # noqa: F401
+    except ImportError:
+        cells = json.loads(path.read_text())["cells"]
+        names = {"__name__": "__main__"}
+        for cell in cells:
+            if cell["cell_type"] == "code":
+                exec(compile("".join(cell["source"]), str(path), "exec"), names)
+        return
+    nbclient.NotebookClient(nbformat.read(path, 4), timeout=300, resources={"metadata": {"path": str(tmp_path)}}).execute()
+
+
+GRID = {
+    "base": {"network.hidden": [16], "learning.batch": 16, "learning.epochs": 6},
+    "axis": [
+        {"name": "bits", "key": "hw.cell.level_bits", "values": [3, 8]},
+        {"name": "seed", "key": "seed", "values": [1, 2, 3]},
+    ],
+}
+
+
+def rows(table):
+    """What a table says, but for the times that runs took."""
+    columns = {name: list(table[name]) for name in table.columns if "second" not in name}
+    return columns
+
+
+@pytest.fixture(scope="module")
+def ray():
+    ray = pytest.importorskip("ray")
+    ray.init(num_cpus=2, include_dashboard=False, log_to_driver=False)
+    yield ray
+    ray.shutdown()
+
+
+def test_tasks_of_ray_give_the_rows_of_a_plain_sweep(ray):
+    plain = dalean.sweep(GRID, store="plain", name="grid")
+    shared = dalean.sweep(GRID, store="shared", name="grid", ray=True)
+    assert rows(shared) == rows(plain) and len(rows(plain)["bits"]) == 6
+    # and again: nothing is left to do
+    assert rows(dalean.sweep(GRID, store="shared", name="grid", ray=True)) == rows(plain)
+
+
+def test_a_worker_that_is_killed_loses_nothing_and_doubles_nothing(ray, tmp_path):
+    """Kills workers at five moments; what they did not finish others go on with."""
+    grid = {**GRID, "base": {**GRID["base"], "learning.epochs": 60}}
+    plain = dalean.sweep(grid, store="plain", name="grid")
+    draw, killed = random.Random(5), []
+    done = threading.Event()
+
+    def kill():
+        while not done.wait(draw.uniform(0.3, 0.9)) and len(killed) < 5:
+            if pids := workers(ray):
+                pid = draw.choice(pids)
+                with contextlib.suppress(ProcessLookupError):
+                    os.kill(pid, signal.SIGKILL)
+                    killed.append(pid)
+
+    killer = threading.Thread(target=kill)
+    killer.start()
+    try:
+        shared = dalean.sweep(grid, store="shared", name="grid", ray=True)
+    finally:
+        done.set()
+        killer.join()
+    assert killed and rows(shared) == rows(plain)
+    receipts = list((tmp_path / "shared").rglob("receipt.json"))
+    assert len(receipts) == 6
+    for run in (dalean.Run(receipt.parent) for receipt in receipts):
+        assert [one["epoch"] for one in run.metrics] == list(range(61))
+
+
+def workers(ray):
+    """Processes of Ray, below this test's own, that carry out a run now."""
+    found = []
+    for place in Path("/proc").glob("[0-9]*"):
+        with contextlib.suppress(OSError):
+            if (place / "cmdline").read_bytes().startswith(b"ray::one"):
+                found.append(int(place.name))
+    return found

@@ -30,7 +30,7 @@ pub use report::{SweepPage, report};
 pub use row::{RESULTS, ResultColumn, ResultKind, Row, row, row_as};
 pub use sample::{Finding, Sampled, sample};
 pub use table::{Results, find, results};
-pub use whole::{SweepProgress, Swept, sweep};
+pub use whole::{SweepProgress, Swept, sweep, sweep_part, sweep_runs};
 
 use std::path::PathBuf;
 

@@ -112,6 +112,23 @@ impl Observations {
         self.ends.extend(others.ends.iter().map(|end| before + end));
     }
 
+    /// Puts observation number `which` of others behind these.
+    pub(crate) fn append_one(&mut self, others: &Self, which: usize, spec: &EnvSpec) {
+        self.values.extend_from_slice(others.values_of(which, spec.values()));
+        if let Shown::Sparse { .. } = spec.shown {
+            self.active.extend_from_slice(others.lines_of(which));
+            self.ends.push(self.active.len());
+        }
+    }
+
+    /// How many there are.
+    pub(crate) fn count(&self, spec: &EnvSpec) -> usize {
+        match spec.shown {
+            Shown::Dense(values) => self.values.len() / values.max(1),
+            Shown::Sparse { .. } => self.ends.len(),
+        }
+    }
+
     /// Checks that this is what so many environments show, whoever made it.
     ///
     /// # Errors
@@ -216,6 +233,37 @@ impl Outcomes {
             }
             None => Ok(()),
         }
+    }
+
+    /// Checks who is said to have been idle: one entry each, or none at all, and one that was neither ended nor earned anything.
+    pub(crate) fn check_idle(&self, spec: &EnvSpec, idle: &[bool]) -> Result<(), EnvError> {
+        let wrong = |which, found: String, allowed: &str| {
+            Err(EnvError { id: spec.id.to_string(), which, found, allowed: allowed.into() })
+        };
+        if !idle.is_empty() && idle.len() != self.rewards.len() {
+            let found = format!(
+                "is one of {}, but {} are said to be idle or not",
+                self.rewards.len(),
+                idle.len()
+            );
+            return wrong(0, found, "say it of each, or of none");
+        }
+        for which in (0..idle.len()).filter(|&which| idle[which]) {
+            if self.terminated[which] || self.truncated[which] {
+                let found = "ends an episode in the step that begins it".into();
+                return wrong(
+                    which,
+                    found,
+                    "nobody acted there: the step that begins an episode shows it and no more",
+                );
+            }
+            if self.rewards[which] != Real::ZERO {
+                let found =
+                    format!("earns {} in the step that begins an episode", self.rewards[which]);
+                return wrong(which, found, "nobody acted there: its reward is 0");
+            }
+        }
+        Ok(())
     }
 }
 

@@ -85,16 +85,32 @@ impl FloatDoor {
         of: &FloatOutcomes<'_, F>,
     ) -> Result<Outcomes, EnvError> {
         let next = self.observations(of.next)?;
-        let rewards = self.reals("reward", of.rewards, 1)?;
-        for ends in [of.terminated, of.truncated] {
+        let reached = of.reached.map(|reached| self.observations(reached)).transpose()?;
+        self.came(next, reached, of.rewards, [of.terminated, of.truncated])
+    }
+
+    /// What came of a step where observations are no floats: `next` and `reached` as [`Outcomes`] has them, rewards, who was
+    /// terminated and who truncated.
+    ///
+    /// # Errors
+    /// As [`FloatDoor::outcomes`]; what is shown is checked by whoever takes it.
+    pub fn came<F: Copy + Into<f64>>(
+        &self,
+        next: Observations,
+        reached: Option<Observations>,
+        rewards: &[F],
+        [terminated, truncated]: [&[bool]; 2],
+    ) -> Result<Outcomes, EnvError> {
+        let rewards = self.reals("reward", rewards, 1)?;
+        for ends in [terminated, truncated] {
             if ends.len() != self.count {
                 let found = format!("is one of {}, but {} ends are given", self.count, ends.len());
                 return Err(self.wrong(0, found, "say of each whether its episode ended"));
             }
         }
-        let ended = of.terminated.iter().zip(of.truncated).position(|(&over, &stop)| over || stop);
-        let reached = match (of.reached, ended) {
-            (Some(reached), _) => self.observations(reached)?,
+        let ended = terminated.iter().zip(truncated).position(|(&over, &stop)| over || stop);
+        let reached = match (reached, ended) {
+            (Some(reached), _) => reached,
             (None, None) => next.clone(),
             (None, Some(which)) => {
                 let found = "ended its episode without saying what it reached".into();
@@ -103,8 +119,8 @@ impl FloatDoor {
             }
         };
         let truncated =
-            of.truncated.iter().zip(of.terminated).map(|(&stop, &over)| stop && !over).collect();
-        Ok(Outcomes { reached, next, rewards, terminated: of.terminated.to_vec(), truncated })
+            truncated.iter().zip(terminated).map(|(&stop, &over)| stop && !over).collect();
+        Ok(Outcomes { reached, next, rewards, terminated: terminated.to_vec(), truncated })
     }
 
     /// Actions as floats: choices by their number, values from -1 to 1, `[environment][value]`.

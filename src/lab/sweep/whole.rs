@@ -5,7 +5,8 @@ use std::sync::Mutex;
 use std::sync::atomic::AtomicBool;
 
 use super::{
-    Carried, Options, Sweep, SweepError, SweepEvent, carry_out, find, plan, report, results,
+    Carried, Options, Sweep, SweepError, SweepEvent, SweepPlan, carry_out, find, plan, report,
+    results,
 };
 use crate::lab::data::DataRoot;
 use crate::lab::store::index::Store;
@@ -85,6 +86,53 @@ pub fn sweep(
     stop: &AtomicBool,
     on_progress: &(dyn Fn(SweepProgress) + Sync),
 ) -> Result<Swept, SweepError> {
+    let (plan, carried, store) =
+        carried_out(file, settings, data_root, store, options, stop, on_progress)?;
+    let name = plan.sweep.name.clone();
+    let record = find(&store, Some(&name))?;
+    let page = report(&store, &record, true)?.page;
+    let table = results(&store, &record)?.table;
+    Ok(Swept { name, carried, table, page })
+}
+
+/// Carries out a part of a sweep, the runs of a [`Shard`](super::Shard), beside other processes in the same store; no table and no page are
+/// made. Ends early when `stop` is set.
+///
+/// # Errors
+/// As [`sweep`].
+pub fn sweep_part(
+    file: &Path,
+    settings: &[String],
+    data_root: &DataRoot,
+    store: &Path,
+    options: Options,
+    stop: &AtomicBool,
+    on_progress: &(dyn Fn(SweepProgress) + Sync),
+) -> Result<Carried, SweepError> {
+    Ok(carried_out(file, settings, data_root, store, options, stop, on_progress)?.1)
+}
+
+/// How many runs the sweep of a file has: as many as it can be shared among.
+///
+/// # Errors
+/// When the file makes no sweep.
+pub fn sweep_runs(
+    file: &Path,
+    settings: &[String],
+    data_root: &DataRoot,
+) -> Result<usize, SweepError> {
+    Ok(plan(Sweep::read(file)?, settings, data_root)?.tasks.len())
+}
+
+fn carried_out(
+    file: &Path,
+    settings: &[String],
+    data_root: &DataRoot,
+    store: &Path,
+    options: Options,
+    stop: &AtomicBool,
+    on_progress: &(dyn Fn(SweepProgress) + Sync),
+) -> Result<(SweepPlan, Carried, Store), SweepError> {
     let plan = plan(Sweep::read(file)?, settings, data_root)?;
     let mut store = Store::open(store)?;
     // what is done, of how much
@@ -104,9 +152,5 @@ pub fn sweep(
         progress.share = if *work > 0.0 { (*done / *work).min(1.0) } else { 1.0 };
         on_progress(*progress);
     })?;
-    let name = plan.sweep.name.clone();
-    let record = find(&store, Some(&name))?;
-    let page = report(&store, &record, true)?.page;
-    let table = results(&store, &record)?.table;
-    Ok(Swept { name, carried, table, page })
+    Ok((plan, carried, store))
 }

@@ -99,18 +99,25 @@ impl Agent {
         player.actor.act(&player.tables, place, rollout)
     }
 
-    /// What came of that. `ended` is told the return and length of every episode that ended.
+    /// What came of that. `epoch` is told the return and length of every episode that ended. `idle` says who began an episode
+    /// and did not act; nobody where it is empty.
     ///
     /// # Errors
     /// When the outcomes are not those of so many environments.
     pub(super) fn take(
         &mut self,
         outcomes: &Outcomes,
+        idle: &[bool],
         epoch: &mut PolicyEpoch,
     ) -> Result<(), EnvError> {
         outcomes.check(&self.player.spec, self.settings.environments)?;
+        outcomes.check_idle(&self.player.spec, idle)?;
         let first = self.rollout.len();
         for which in 0..self.settings.environments {
+            if idle.get(which) == Some(&true) {
+                self.rollout.idle.push(first + which);
+                continue;
+            }
             let [gained, length] = &mut self.going[which];
             *gained += i64::from(outcomes.rewards[which].to_bits());
             *length += 1;
@@ -156,7 +163,9 @@ impl Agent {
         let Self { player, critic, rollout, .. } = self;
         let mut codes = Vec::new();
         for _ in 0..ppo.passes {
-            let order = draw::shuffled(seed, self.passes, narrow(steps, "a rollout has few steps"));
+            let steps = narrow(steps, "a rollout has few steps");
+            let mut order = draw::shuffled(seed, self.passes, steps);
+            order.retain(|&step| rollout.acted(step as usize));
             self.passes += 1;
             for batch in order.chunks(minibatch) {
                 codes.clear();
@@ -171,7 +180,7 @@ impl Agent {
                 }
             }
         }
-        player.statistics.add(&rollout.shown);
+        player.statistics.add(&rollout.shown_to_actors(player.spec.values()));
         player.standard = player.statistics.freeze();
         rollout.clear();
         true

@@ -72,11 +72,16 @@ impl Critic {
         };
         let horizon = Horizon { discount: ppo.discount, trace: ppo.lambda };
         advantage::advantages(&happened, horizon, &mut rollout.advantages, &mut rollout.targets);
-        epoch.unexplained = unexplained(&values, &rollout.targets);
-        advantage::normalise(&mut rollout.advantages);
-        self.scale.update(&rollout.targets);
-        for target in &mut rollout.targets {
-            *target = self.scale.to_standard(*target);
+        // of steps in which nobody acted there is nothing to learn
+        let acted = Vec::from_iter((0..values.len()).filter(|&step| rollout.acted(step)));
+        let of = |all: &[Value]| Vec::from_iter(acted.iter().map(|&step| all[step]));
+        let (mut better, targets) = (of(&rollout.advantages), of(&rollout.targets));
+        epoch.unexplained = unexplained(&of(&values), &targets);
+        advantage::normalise(&mut better);
+        self.scale.update(&targets);
+        for ((step, better), target) in acted.into_iter().zip(better).zip(targets) {
+            rollout.advantages[step] = better;
+            rollout.targets[step] = self.scale.to_standard(target);
         }
     }
 

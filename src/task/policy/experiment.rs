@@ -108,7 +108,8 @@ impl PolicyExperiment {
     }
 
     /// The same on another environment: what is acted on, inputs of the first layers and outputs of the actor are as that has
-    /// them.
+    /// them. All else stays, the spread of actions that are numbers too: begin with an experiment on an environment that takes the
+    /// same kind of actions.
     #[must_use]
     pub fn facing(mut self, spec: &EnvSpec) -> Self {
         self.environment = spec.id.to_string();

@@ -113,7 +113,7 @@ enum Stage {
     /// Nothing was shown yet.
     Calibrate,
     /// Uniform actions are taken, and what is shown is kept.
-    Explore { seen: Observations, step: u64, chosen: Chosen },
+    Explore { seen: Observations, shown: Observations, step: u64, chosen: Chosen },
     /// Episodes are to begin, or to go on.
     Begin,
     /// Actions are due, or were told.
@@ -239,7 +239,7 @@ impl PolicyLearner {
         shown.check(self.environment(), self.count())?;
         match self.stage {
             Stage::Calibrate => {
-                self.stage = self.exploring(Observations::default(), shown, 0);
+                self.stage = self.exploring(Observations::default(), shown.clone(), 0);
             }
             Stage::Begin => {
                 self.agent.begin(shown);
@@ -250,11 +250,10 @@ impl PolicyLearner {
         Ok(())
     }
 
-    fn exploring(&self, mut seen: Observations, shown: &Observations, step: u64) -> Stage {
-        seen.append(shown);
+    fn exploring(&self, seen: Observations, shown: Observations, step: u64) -> Stage {
         let (taken, seed) = (self.environment().taken, self.experiment.seed);
         let chosen = start::uniform(taken, self.count(), seed, step);
-        Stage::Explore { seen, step, chosen }
+        Stage::Explore { seen, shown, step, chosen }
     }
 
     /// What came of the actions, in every environment. Of one whose episode ended, `reached` is what it ended with and `next`
@@ -264,12 +263,28 @@ impl PolicyLearner {
     /// When it is not their turn, or these are not outcomes of such environments. Nothing has moved then: the actions are still
     /// those to take.
     pub fn take(&mut self, outcomes: &Outcomes) -> Result<(), PolicyError> {
+        self.take_idle(outcomes, &[])
+    }
+
+    /// As [`PolicyLearner::take`], of environments that begin their next episode in the step after the one that ended: `idle` says
+    /// which of them did so now. Nobody acted there, so nothing is learnt from it, nor counted as a step of an episode; it is one
+    /// of the rollout.
+    ///
+    /// # Errors
+    /// As [`PolicyLearner::take`], and when one that was idle ended or earned something.
+    pub fn take_idle(&mut self, outcomes: &Outcomes, idle: &[bool]) -> Result<(), PolicyError> {
         outcomes.check(self.environment(), self.count())?;
+        outcomes.check_idle(self.environment(), idle)?;
         match &mut self.stage {
-            Stage::Explore { seen, step, .. } => {
+            Stage::Explore { seen, shown, step, .. } => {
+                for which in 0..self.experiment.environments as usize {
+                    if idle.get(which) != Some(&true) {
+                        seen.append_one(shown, which, &self.agent.player.spec);
+                    }
+                }
                 let (seen, step) = (std::mem::take(seen), *step + 1);
-                if step < start::steps(self.count()) {
-                    self.stage = self.exploring(seen, &outcomes.next, step);
+                if seen.count(&self.agent.player.spec) < start::CALIBRATION {
+                    self.stage = self.exploring(seen, outcomes.next.clone(), step);
                 } else {
                     self.calibrate(&seen);
                     self.stage = Stage::Begin;
@@ -277,7 +292,7 @@ impl PolicyLearner {
                 Ok(())
             }
             Stage::Act(chosen @ Some(_)) => {
-                self.agent.take(outcomes, &mut self.told)?;
+                self.agent.take(outcomes, idle, &mut self.told)?;
                 *chosen = None;
                 Ok(())
             }

@@ -1,6 +1,8 @@
 //! What is kept of a rollout: `[step][environment]` throughout.
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
+use std::borrow::Cow;
+
 use super::experiment::InputCoding;
 use super::number::{Advantage, LogProbability, Logit, Observed, Value};
 use super::observe::{self, Standard};
@@ -83,6 +85,8 @@ pub(super) struct Rollout {
     pub(super) reached: Vec<u8>,
     /// Which steps those are.
     pub(super) stopped: Vec<usize>,
+    /// Steps in which an environment began its next episode and nobody acted, rising: nothing is learnt from them.
+    pub(super) idle: Vec<usize>,
     pub(super) advantages: Vec<Advantage>,
     /// Value targets, standardised.
     pub(super) targets: Vec<Value>,
@@ -101,6 +105,7 @@ impl Rollout {
         self.truncated.clear();
         self.reached.clear();
         self.stopped.clear();
+        self.idle.clear();
         self.advantages.clear();
         self.targets.clear();
     }
@@ -108,5 +113,21 @@ impl Rollout {
     /// Steps of all environments.
     pub(super) fn len(&self) -> usize {
         self.rewards.len()
+    }
+
+    /// Whether somebody acted in that step.
+    pub(super) fn acted(&self, step: usize) -> bool {
+        self.idle.binary_search(&step).is_err()
+    }
+
+    /// What was shown where somebody acted, of `values` numbers each.
+    pub(super) fn shown_to_actors(&self, values: usize) -> Cow<'_, [Real]> {
+        if self.idle.is_empty() || values == 0 {
+            return Cow::Borrowed(&self.shown);
+        }
+        let each = self.shown.chunks_exact(values).enumerate();
+        Cow::Owned(
+            each.filter(|&(step, _)| self.acted(step)).flat_map(|(_, one)| one).copied().collect(),
+        )
     }
 }

@@ -22,7 +22,7 @@ use crate::num::tables::PolicyTables;
 use crate::task::environment::{EnvSpec, Observations, Real, Taken};
 
 /// Steps of all environments whose observations are looked at before anything is learnt.
-const CALIBRATION: usize = 256;
+pub(super) const CALIBRATION: usize = 256;
 
 /// Steps that so many environments take for that.
 pub(super) const fn steps(environments: usize) -> u64 {

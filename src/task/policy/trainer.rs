@@ -244,7 +244,7 @@ impl PolicyTrainer {
                     while !agent.is_full() {
                         let chosen = agent.act();
                         environments.step(chosen.actions(), outcomes)?;
-                        agent.take(outcomes, &mut told)?;
+                        agent.take(outcomes, &[], &mut told)?;
                     }
                     let progress = progress(steps, &told);
                     agent.learn(&mut told, &mut || go_on(progress))

@@ -1,7 +1,7 @@
 //! Policies that are driven from outside: the same bits as from inside, and nothing bad that stays.
 
 use super::*;
-use crate::task::environment::{Observations, Outcomes, Real, VecEnv};
+use crate::task::environment::{Actions, Observations, Outcomes, Real, VecEnv};
 
 fn learner(experiment: &PolicyExperiment) -> PolicyLearner {
     let spec = environment::make(&experiment.environment, 1, 1).unwrap().spec().clone();
@@ -155,4 +155,132 @@ fn evolution_is_refused_and_other_environments_are_fitted() {
     let fitted = experiment.facing(&other);
     assert_eq!(fitted.environment, "Mine-v0");
     assert!(PolicyLearner::new(fitted, other, Backend::best()).is_ok());
+}
+
+/// Carts that begin their next episode in the step after the one that ended, as Gymnasium's vector environments do by default.
+/// What they show at an end is `end`, where it is given.
+struct Later {
+    carts: Vec<Box<dyn VecEnv>>,
+    ended: Vec<bool>,
+    begins: Vec<Vec<Real>>,
+    end: Option<Real>,
+    /// Lengths of the episodes that ended.
+    lengths: Vec<u64>,
+    going: Vec<u64>,
+}
+
+impl Later {
+    fn new(count: u64, end: Option<Real>) -> Self {
+        let carts = (0..count).map(|seed| environment::make(IDS[0], seed, 1).unwrap()).collect();
+        let (ended, going) = (vec![false; count as usize], vec![0; count as usize]);
+        Self { carts, ended, begins: vec![vec![]; count as usize], end, lengths: vec![], going }
+    }
+
+    fn reset(&mut self) -> Observations {
+        let mut shown = Observations::default();
+        let mut all = Observations::default();
+        for cart in &mut self.carts {
+            cart.reset(&mut shown);
+            all.append(&shown);
+        }
+        self.ended.fill(false);
+        self.going.fill(0);
+        all
+    }
+
+    /// What came of it, and who was idle.
+    fn step(&mut self, actions: &[u16]) -> (Outcomes, Vec<bool>) {
+        let (mut all, mut one) = (Outcomes::default(), Outcomes::default());
+        let idle = self.ended.clone();
+        for (at, cart) in self.carts.iter_mut().enumerate() {
+            if idle[at] {
+                all.next.values.extend(&self.begins[at]);
+                all.rewards.push(Real::ZERO);
+                (self.ended[at], self.going[at]) = (false, 0);
+            } else {
+                cart.step(Actions::Discrete(&actions[at..=at]), &mut one).unwrap();
+                self.going[at] += 1;
+                self.ended[at] = one.terminated[0] || one.truncated[0];
+                all.rewards.push(one.rewards[0]);
+                let mut reached = one.reached.values.clone();
+                if self.ended[at] {
+                    self.begins[at].clone_from(&one.next.values);
+                    self.lengths.push(self.going[at]);
+                    // what a task ended with is worth nothing, so nothing may depend on it
+                    reached.iter_mut().for_each(|value| *value = self.end.unwrap_or(*value));
+                }
+                all.next.values.extend(reached);
+            }
+            all.terminated.push(self.ended[at]);
+            all.truncated.push(false);
+        }
+        all.reached = all.next.clone();
+        (all, idle)
+    }
+}
+
+#[test]
+fn nothing_is_learnt_from_a_step_in_which_nobody_acted() {
+    let experiment = experiment(IDS[0], Rule::Ed, None);
+    let train = |end: Option<i32>, say: bool| {
+        let mut own = Later::new(experiment.environments.into(), end.map(Real::from_num));
+        let mut learner = learner(&experiment);
+        let mut told = vec![];
+        loop {
+            match learner.turn() {
+                PolicyTurn::Begin => {
+                    let shown = own.reset();
+                    own.lengths.clear();
+                    learner.begin(&shown).unwrap();
+                }
+                PolicyTurn::Act(Actions::Discrete(actions)) => {
+                    let actions = actions.to_vec();
+                    let (outcomes, idle) = own.step(&actions);
+                    learner.take_idle(&outcomes, if say { &idle } else { &[] }).unwrap();
+                }
+                PolicyTurn::Learn => told.extend(learner.learn(&mut |_| true).unwrap()),
+                _ => break,
+            }
+        }
+        assert!(own.lengths.len() > 10, "{}", own.lengths.len());
+        let lengths = |told: &[PolicyEpoch]| {
+            let all = told.iter().map(|told| (told.lengths.count, told.lengths.sum));
+            all.fold((0, 0), |(a, b), (c, d)| (a + c, b + d))
+        };
+        let wanted = (own.lengths.len() as u64, own.lengths.iter().sum::<u64>() as i64);
+        (told.clone(), lines(&mut learner), lengths(&told) == wanted)
+    };
+    let wanted = train(None, true);
+    assert!(wanted.2, "episodes are as long as they were");
+    // faults that this catches: an idle step in the order of a pass, in the moments of advantages, in the scale of values, in
+    // the statistics of observations, or in what is calibrated on
+    assert_eq!(train(Some(1000), true), wanted);
+    assert_eq!(train(Some(-7), true), wanted);
+    // it has teeth: unsaid, what was shown there is learnt from
+    let unsaid = train(None, false);
+    assert!(!unsaid.2 && unsaid.1 != wanted.1);
+    assert_ne!(train(Some(1000), false).1, unsaid.1);
+}
+
+#[test]
+fn an_idle_environment_neither_ends_nor_earns() {
+    let experiment = experiment(IDS[0], Rule::Ed, None);
+    let (mut learner, mut own) = (learner(&experiment), environments(&experiment));
+    let (mut shown, mut outcomes) = (Observations::default(), Outcomes::default());
+    own.reset(&mut shown);
+    learner.begin(&shown).unwrap();
+    let PolicyTurn::Act(actions) = learner.turn() else { panic!("actions are due") };
+    own.step(actions, &mut outcomes).unwrap();
+    let mut idle = vec![false; experiment.environments as usize];
+    idle[1] = true;
+    let error = learner.take_idle(&outcomes, &idle).unwrap_err().to_string();
+    assert!(error.contains("environment 1") && error.contains("earns 1 in the step"), "{error}");
+    outcomes.rewards[1] = Real::ZERO;
+    outcomes.terminated[1] = true;
+    let error = learner.take_idle(&outcomes, &idle).unwrap_err().to_string();
+    assert!(error.contains("ends an episode in the step that begins it"), "{error}");
+    outcomes.terminated[1] = false;
+    let error = learner.take_idle(&outcomes, &idle[1..]).unwrap_err().to_string();
+    assert!(error.contains("are said to be idle or not"), "{error}");
+    learner.take_idle(&outcomes, &idle).unwrap();
 }
