@@ -27,6 +27,7 @@ macro_rules! tell {
     };
 }
 
+mod analyse;
 mod bench;
 mod data;
 mod export;
@@ -120,6 +121,8 @@ enum Command {
     Hw(hw::HwCommand),
     /// Every key of every file: what it takes, its default, its meaning
     Keys(keys::KeysArgs),
+    /// Say what the updates of a run's layers have to do with the gradient: how large they are, how much they agree with it
+    Analyse(analyse::AnalyseArgs),
     /// Write one update as waves: registers of a tile (VCD), operations of all tiles (Perfetto)
     Trace(trace::TraceArgs),
     /// Show episodes of a policy, step by step
@@ -284,6 +287,7 @@ pub fn run_with(arguments: Vec<OsString>) -> u8 {
         Command::Report(args) => report::execute(&args),
         Command::Data(command) => data::execute(&command),
         Command::Hw(command) => hw::execute(&command),
+        Command::Analyse(args) => analyse::execute(&args),
         Command::Trace(args) => trace::execute(&args),
         Command::Watch(args) => watch::execute(&args),
         Command::Bench(args) => bench::execute(&args),

@@ -1,5 +1,6 @@
 //! Everything around a run: files in, files out.
 
+pub mod analysis;
 pub mod config;
 pub mod data;
 pub mod near;

@@ -32,15 +32,15 @@ const HOUSE: [(&str, &[&str]); 6] = [
     (
         "lab",
         &[
-            "near", "data", "config", "store", "price", "table", "report", "run", "wave", "sweep",
-            "runs",
+            "near", "analysis", "data", "config", "store", "price", "table", "report", "run",
+            "wave", "sweep", "runs",
         ],
     ),
     (
         "cli",
         &[
             "out", "known", "progress", "table", "data", "hw", "keys", "run", "report", "sweep",
-            "export", "store", "price", "runs", "trace", "watch", "bench",
+            "export", "store", "price", "runs", "trace", "watch", "analyse", "bench",
         ],
     ),
 ];

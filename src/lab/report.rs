@@ -9,6 +9,7 @@
 //! Counts come as the records give them; all division happens here (docs/GLOSSARY.md, docs/MODEL.md, 4).
 //! A figure is one file under `report/figures/` and one line in `figures::ALL`.
 
+mod analysis;
 mod chart;
 mod colour;
 pub mod compare;
@@ -25,6 +26,7 @@ mod words;
 #[cfg(test)]
 mod sample;
 
+pub use analysis::analysis_page;
 pub use film::{Film, Frame};
 
 use super::config::Absent;
@@ -104,8 +106,8 @@ pub struct RunView<'a> {
     pub pictures: &'a [Picture],
     /// Inputs of a policy, in the order of the rows of the first layer.
     pub inputs: &'a [PolicyInput],
-    /// Whether the first layer is a convolution.
-    pub windows: bool,
+    /// The window of the first layer, where that is a convolution.
+    pub window: Option<Window>,
     /// An episode of a policy.
     pub film: Option<&'a Film>,
     /// Names of the classes; numbers stand in for missing ones.
@@ -137,6 +139,17 @@ impl RunView<'_> {
         layers.dedup();
         layers
     }
+}
+
+/// What one unit of a convolution sees at a position: rows in the order y, x, channel.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Window {
+    /// Rows and columns of pixels.
+    pub side: usize,
+    /// Channels of a pixel.
+    pub channels: usize,
+    /// Whether the second half of the channels carries what lies below the middle of the first.
+    pub halves: bool,
 }
 
 /// The page, complete.

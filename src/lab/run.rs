@@ -4,6 +4,7 @@
 //! one. Neither prints: callers get [`RunEvent`]s.
 
 mod again;
+mod analyse;
 mod classify;
 mod notes;
 mod policy;
@@ -19,6 +20,7 @@ mod watch;
 mod weigh;
 
 pub use again::{address_of, configuration, evaluate};
+pub use analyse::analyse;
 pub use notes::notes;
 pub use profile::{Act, ModeUse, Profile, profile};
 pub use proof::{records, untouched};
@@ -138,6 +140,24 @@ pub enum RunError {
     NoEpisodes {
         /// Folder of the run.
         path: String,
+    },
+    /// Errors of a task without labels.
+    #[error(
+        "{path} is a run of a policy, whose errors are those of its own steps; name a run of examples with labels"
+    )]
+    NoLabels {
+        /// Folder of the run.
+        path: String,
+    },
+    /// An epoch that the run does not have.
+    #[error("{path} has no epoch {epoch}; its states are those after 0 to {last} epochs")]
+    NoEpoch {
+        /// Folder of the run.
+        path: String,
+        /// Asked for.
+        epoch: u32,
+        /// Its last one.
+        last: usize,
     },
     /// The folder.
     #[error(transparent)]

@@ -5,6 +5,7 @@
     reason = "tests fail by panicking, and look at the files of runs"
 )]
 
+mod analysis;
 mod anchors;
 mod bad_input;
 mod bench;

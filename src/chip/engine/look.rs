@@ -1,6 +1,7 @@
-//! What units put out and hold, for whoever drives the chip from outside: registers of dense layers, unit by unit.
+//! What units put out and hold, for whoever drives the chip from outside or looks into it: registers, unit by unit.
 //!
-//! Units lie in blocks of 64 in registers; here they lie `[sample][unit]`.
+//! Units lie in blocks of 64 in registers; here they lie `[read][unit]`. A read is a sample; of a convolution, a position
+//! of one.
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
 use super::Engine;
@@ -9,9 +10,8 @@ use crate::chip::crossbar::layout::BLOCK_ROWS;
 use crate::chip::population::Stream;
 
 impl Engine {
-    /// Units by block of 64, `[block][sample][64]`, as `[sample][unit]`; what a layer does not have is empty.
-    fn unit_by_unit(&self, layer: usize, blocks: &[u8]) -> Vec<u8> {
-        let (units, samples) = (self.layers[layer].spec.units, self.samples);
+    /// Lines by block of 64, `[block][read][64]`, as `[read][line]`; what a layer does not have is empty.
+    fn line_by_line(units: usize, samples: usize, blocks: &[u8]) -> Vec<u8> {
         let mut out = Vec::with_capacity(units * samples);
         if blocks.len() < units.div_ceil(BLOCK_ROWS) * samples * BLOCK_ROWS {
             return out;
@@ -33,13 +33,45 @@ impl Engine {
             Some(above) => &above.drives[at][..],
             None => &self.registers[layer].activities[at],
         };
-        self.unit_by_unit(layer, blocks)
+        Self::line_by_line(self.layers[layer].spec.units, self.samples, blocks)
     }
 
-    /// Derivatives of units of a dense layer; the peak of a function is 255.
+    /// Derivatives of units; the peak of a function is 255.
     #[must_use]
     pub fn unit_slopes(&self, layer: usize, target: Stream) -> Vec<u8> {
-        self.unit_by_unit(layer, &self.registers[layer].derivatives[target.index()])
+        let slopes = &self.registers[layer].derivatives[target.index()];
+        Self::line_by_line(self.layers[layer].spec.units, self.reads(layer), slopes)
+    }
+
+    /// Codes of units in front of a pool; empty where nothing lies between them and what they drive.
+    #[must_use]
+    pub fn unit_maps(&self, layer: usize, target: Stream) -> Vec<u8> {
+        let maps = &self.registers[layer].maps[target.index()];
+        Self::line_by_line(self.layers[layer].spec.units, self.reads(layer), maps)
+    }
+
+    /// Codes of a set of drives, `[sample][code]` without a constant row: of a convolution those of its image without the
+    /// border, in the order y, x, channel.
+    #[must_use]
+    pub fn drive_codes(&self, layer: usize, set: Stream) -> Vec<u8> {
+        let (spec, registers) = (&self.layers[layer].spec, &self.registers[layer]);
+        let Some(shape) = spec.convolution else {
+            return Self::line_by_line(
+                spec.sample_inputs(),
+                self.samples,
+                &registers.drives[set.index()],
+            );
+        };
+        let line = shape.width * shape.channels;
+        let [_, across] = shape.padded();
+        let image = &registers.images[set.index()];
+        let rows = |sample: usize| {
+            (0..shape.height).flat_map(move |y| {
+                let first = sample * shape.pixels() + (y + shape.pad) * across + shape.pad;
+                &image[first * shape.channels..first * shape.channels + line]
+            })
+        };
+        (0..self.samples).flat_map(rows).copied().collect()
     }
 
     /// Gates of units of a dense layer: what an update multiplies drives by. Empty before error words came.

@@ -74,7 +74,7 @@ impl Sample {
             heats: &self.heats,
             pictures: &self.pictures,
             inputs: &[],
-            windows: false,
+            window: None,
             film: None,
             class_names: &self.class_names,
             ledger: self.ledger.as_ref(),

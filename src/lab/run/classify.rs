@@ -209,6 +209,10 @@ impl Task for Classify {
         self.trainer.middles().to_vec()
     }
 
+    fn words(&mut self, samples: usize) -> Option<Vec<i16>> {
+        Some(self.trainer.words(&self.train, samples))
+    }
+
     fn examples(&self) -> Option<&Examples> {
         Some(&self.test)
     }

@@ -17,7 +17,7 @@ use crate::chip::crossbar::kernel::Backend;
 use crate::lab::config::{Bias, Config, PolicySettings};
 use crate::lab::data::{self, DataRoot, ImageShape};
 use crate::lab::price::{Cost, Footprint, Pieces, price};
-use crate::lab::report::{self, Film, Heat, Picture, PolicyInput, RunView};
+use crate::lab::report::{self, Film, Heat, Picture, PolicyInput, RunView, Window};
 use crate::lab::store::checkpoint::{self, CheckpointError, Identity};
 use crate::lab::store::folder::{self, FolderError, RunFolder, names};
 use crate::lab::store::ledger::LedgerRecord;
@@ -210,7 +210,11 @@ impl Parts<'_> {
             heats: &heats,
             pictures: &pictures,
             inputs: &inputs,
-            windows: !self.config.convolutions.is_empty(),
+            window: self.config.convolutions.first().map(|first| Window {
+                side: first.shape.side,
+                channels: first.shape.channels,
+                halves: self.config.input.has_halves(),
+            }),
             film: self.film,
             class_names: &self.receipt.data.names,
             ledger: self.counted.map(|(ledger, _)| ledger),

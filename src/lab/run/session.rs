@@ -97,6 +97,11 @@ impl Session {
         self.task.infer()
     }
 
+    /// Reads the first samples that are learnt from; the words that their errors make, where they have labels.
+    pub(crate) fn words(&mut self, samples: usize) -> Option<Vec<i16>> {
+        self.task.words(samples)
+    }
+
     /// What environments showed since the last call, where that is recorded.
     pub(crate) fn take_record(&mut self) -> Option<Record> {
         self.task.take_record()

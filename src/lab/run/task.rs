@@ -100,6 +100,13 @@ pub(super) trait Task: fmt::Debug {
         vec![]
     }
 
+    /// Reads the first samples that are learnt from without learning; the words that their errors make, `[sample][output]`.
+    /// None where there are no labels.
+    fn words(&mut self, samples: usize) -> Option<Vec<i16>> {
+        let _ = samples;
+        None
+    }
+
     /// Test examples, where mistakes can be shown as pictures.
     fn examples(&self) -> Option<&Examples> {
         None

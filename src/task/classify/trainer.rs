@@ -138,7 +138,7 @@ impl Trainer {
         let mut moves = self.experiment.augment.map(|way| Moves::of(way, seed, self.epoch));
         let (mut correct, mut done) = (0, 0);
         let (mut codes, mut moved) = (Vec::new(), Vec::new());
-        let (mut sums, mut shares) = (Vec::new(), Vec::new());
+        let mut shares = Shares::default();
         self.driver.engine_mut().set_phase(Phase::Training);
         for batch in order.chunks(self.experiment.network.batch.get() as usize) {
             codes.clear();
@@ -156,22 +156,7 @@ impl Trainer {
             self.driver.learn(&codes, |engine, first, errors| {
                 for sample in 0..engine.samples() {
                     let label = train.labels()[batch[first + sample] as usize];
-                    let outputs = outputs(engine);
-                    match engine.error_unit().softmax() {
-                        Some(tables) => {
-                            sums.clear();
-                            sums.extend(
-                                (0..outputs).map(|at| engine.output_accumulator(sample, at)),
-                            );
-                            tables.share_out(&sums, &mut shares);
-                            error::errors(label, shares.iter().copied(), errors);
-                        }
-                        None => {
-                            let activity =
-                                (0..outputs).map(|at| engine.output_activity(sample, at));
-                            error::errors(label, activity, errors);
-                        }
-                    }
+                    shares.errors(engine, sample, label, errors);
                     correct += u64::from(predict(engine, sample).0 == usize::from(label));
                 }
             });
@@ -183,6 +168,24 @@ impl Trainer {
         }
         self.epoch += 1;
         Ok(correct)
+    }
+
+    /// Reads the first of these examples without learning, [`READ_BATCH`] at most; gives the words that their errors make,
+    /// `[example][output]`. A mean that runs over errors moves by them.
+    pub(crate) fn words(&mut self, examples: &Examples, count: usize) -> Vec<i16> {
+        let which = 0..count.min(examples.len()).min(READ_BATCH);
+        let phase = self.driver.engine().phase();
+        self.driver.engine_mut().set_phase(Phase::Evaluation);
+        let codes = self.codes(examples, which.clone());
+        self.driver.read(&codes);
+        let (mut errors, mut shares) = (Vec::new(), Shares::default());
+        for example in which {
+            let label = examples.labels()[example];
+            shares.errors(self.driver.engine(), example, label, &mut errors);
+        }
+        let words = self.driver.engine_mut().output_words(&errors);
+        self.driver.engine_mut().set_phase(phase);
+        words
     }
 
     /// Accumulators of the outputs for each example, `[example][output]`.
@@ -240,6 +243,32 @@ impl State for Trainer {
             self.epoch = u32::try_from(epoch[0]).expect("a visitor keeps to the range");
         }
         self.driver.visit(visitor)
+    }
+}
+
+/// What classes share, while errors are formed of it.
+#[derive(Default)]
+struct Shares {
+    sums: Vec<i64>,
+    shares: Vec<u8>,
+}
+
+impl Shares {
+    /// Appends the error of each output for a loaded sample.
+    fn errors(&mut self, engine: &Engine, sample: usize, label: u8, errors: &mut Vec<i32>) {
+        let outputs = 0..outputs(engine);
+        match engine.error_unit().softmax() {
+            Some(tables) => {
+                self.sums.clear();
+                self.sums.extend(outputs.map(|at| engine.output_accumulator(sample, at)));
+                tables.share_out(&self.sums, &mut self.shares);
+                error::errors(label, self.shares.iter().copied(), errors);
+            }
+            None => {
+                let activity = outputs.map(|at| engine.output_activity(sample, at));
+                error::errors(label, activity, errors);
+            }
+        }
     }
 }
 

@@ -15,6 +15,8 @@ use dalean::num::tables::{Decay, Positive};
 use dalean::task::classify::{Augment, Coding, Examples, Experiment, Trainer};
 use proptest::prelude::*;
 
+mod windows;
+
 use super::choose::{Numbers, activation, hardware, side};
 use super::config;
 

@@ -58,6 +58,11 @@ pub(crate) enum ImageInput {
 }
 
 impl ImageInput {
+    /// Whether a channel has two lines: above a middle, and below.
+    pub(crate) const fn has_halves(self) -> bool {
+        matches!(self, Self::OnOff | Self::White)
+    }
+
     /// What it makes of images of this shape, for a network that begins with a convolution or without one.
     pub(crate) const fn coding(self, image: [usize; 3], convolution: bool) -> Coding {
         match self {
