@@ -9,7 +9,7 @@ use crate::chip::hardware::Window;
 
 mod response;
 
-pub use response::{ResponseFile, SpreadFile};
+pub(super) use response::{ResponseFile, SpreadFile};
 
 keys! {
     /// `[device]`.

@@ -59,7 +59,7 @@ macro_rules! keys {
 
         impl $name {
             /// Each key and what it means.
-            pub(super) const MEANINGS: &'static [(&'static str, &'static str)] =
+            pub(in crate::lab::config) const MEANINGS: &'static [(&'static str, &'static str)] =
                 &[$($(#[cfg($when)])? (stringify!($field), concat!($($meaning),*)),)*];
         }
     )*};

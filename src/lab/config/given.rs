@@ -10,7 +10,7 @@ use crate::chip::crossbar::kernel::ConvShape;
 use crate::chip::device::{CellSpread, DeviceSpec, PulseNoise};
 use crate::chip::hardware::{
     Adc, AdcRange, CellSpec, DigitalSpec, DitherBits, DitherPattern, DriveSpec, FloorKind,
-    HardwareSpec, PulseCode, PulseNoise, Subtract, TileSpec, Timing, WriteScheme, WriteSpec,
+    HardwareSpec, PulseCode, Subtract, TileSpec, Timing, WriteScheme, WriteSpec,
 };
 use crate::chip::layer::{DrivenBy, Gain, Homeostasis, InitialLevels, LayerSpec, Optimiser, Pool};
 use crate::learn::error::{Centre, OutputError};
