@@ -244,7 +244,7 @@ def train(name: str, algorithm: str, seed: int, asked, state: Path | None) -> di
     if algorithm == "es":
         policy = Evolution(asked.hidden, seed).learn(env, asked.steps, lambda one: print(one.epochs[-1], flush=True))
     else:
-        policy = dalean.EDPolicy(asked.hidden, rule=algorithm, seed=seed, overrides={"environment.rollouts": 5, **asked.keys})
+        policy = dalean.EDPolicy(asked.hidden, horizon=asked.horizon, rule=algorithm, seed=seed, overrides={"environment.rollouts": 5, **asked.keys})
         kept = state.read_bytes() if state and state.exists() else None
         before = json.loads(state.with_suffix(".json").read_text()) if kept else 0.0
 
@@ -268,6 +268,7 @@ def train(name: str, algorithm: str, seed: int, asked, state: Path | None) -> di
         "asked": asked.steps,
         "hidden": asked.hidden,
         "envs": count,
+        "horizon": asked.horizon,
         "backend": asked.backend if name.startswith("brax/") else None,
         "keys": asked.keys,
         "return": statistics.mean(returns),
@@ -312,6 +313,7 @@ def main() -> None:
     ask.add_argument("--seeds", type=int, nargs="+", default=[1])
     ask.add_argument("--steps", type=int, default=1_000_000)
     ask.add_argument("--envs", type=int, default=16)
+    ask.add_argument("--horizon", type=int, default=128, help="steps of an environment in a rollout")
     ask.add_argument("--hidden", type=int, nargs="+", default=[64, 64])
     ask.add_argument("--episodes", type=int, default=20)
     ask.add_argument("--backend", default="spring", help="of Brax: spring, positional, generalized, mjx")
@@ -321,13 +323,13 @@ def main() -> None:
     asked = ask.parse_args()
     asked.keys = {key: json.loads(value) for key, value in (one.split("=", 1) for one in asked.pairs)}
     told = [json.loads(line) for line in asked.out.read_text().splitlines()] if asked.out and asked.out.exists() else []
-    same = ("env", "algorithm", "seed", "asked", "hidden", "backend", "keys")
+    same = ("env", "algorithm", "seed", "asked", "hidden", "backend", "horizon", "keys")
     done = {json.dumps([one[key] for key in same]) for one in told}
     for name in [] if asked.table else asked.env:
         for algorithm in asked.algorithms:
             for seed in asked.seeds:
                 backend = asked.backend if name.startswith("brax/") else None
-                which = json.dumps([name, algorithm, seed, asked.steps, asked.hidden, backend, asked.keys])
+                which = json.dumps([name, algorithm, seed, asked.steps, asked.hidden, backend, asked.horizon, asked.keys])
                 if which in done:
                     continue
                 print(f"{name}, {ALGORITHMS[algorithm]}, seed {seed}", flush=True)

@@ -226,10 +226,10 @@ Keys = TypedDict(
         "hw.error": Any,
         # Programming.
         "hw.write": Any,
-        # Cycles of what a tile does; without it no cycles are counted.
-        "hw.timing": Any,
         # What real cells and converters do that ideal ones do not.
         "hw.device": Any,
+        # Cycles of what a tile does; without it no cycles are counted.
+        "hw.timing": Any,
         # Joules of an event, by quantity and unit.
         "hw.energy": Any,
         # Watts that flow whatever happens.
@@ -332,34 +332,10 @@ Keys = TypedDict(
         "hw.write.source": Any,
         # How far to trust the numbers.
         "hw.write.kind": Literal["measured", "fitted", "assumed"],
-        # Megahertz of the clock that counts cycles. [MHz]
-        "hw.timing.clock_mhz": float,
-        # `T_A`: cycles to settle and sample; with `pulse_width`, cycles beside the slots of a phase. [cycles] Default: 1.
-        "hw.timing.settle_cycles": int,
-        # `T_C`: cycles of a conversion of `fixed` converters; others have `adc.step_cycles`. [cycles] Default: 1.
-        "hw.timing.convert_cycles": int,
-        # `S`: columns of a bank that share a converter. [columns] Default: 1.
-        "hw.timing.columns_per_adc": int,
-        # Whether a slice settles while the one before is converted. Default: false.
-        "hw.timing.overlap": bool,
-        # `U`: columns looked up, multiplied or accumulated at a time. [columns] Default: 1.
-        "hw.timing.lanes": int,
-        # `H`: cycles before the first error word arrives. [cycles] Default: 0.
-        "hw.timing.bus_hops": int,
-        # `T_W`: cycles of a pulse. [cycles] Default: 1.
-        "hw.timing.pulse_cycles": int,
-        # How many pulses a number of levels takes. Default: "unary".
-        "hw.timing.pulses": Literal["unary", "amplitude"],
-        # Whether every pulse is followed by a read of what it did. Default: false.
-        "hw.timing.verify": bool,
-        # `W`: cells that can be pulsed at a time. [cells]
-        "hw.timing.write_active_max": int,
-        # Cycles of a digital action: 1, or the symbols of a digital clock on an optical chip. [cycles] Default: 1.
-        "hw.timing.beat_cycles": int,
-        # Where the numbers come from.
-        "hw.timing.source": Any,
-        # How far to trust the numbers.
-        "hw.timing.kind": Literal["measured", "fitted", "assumed"],
+        # What a pulse does to a cell.
+        "hw.device.response": Any,
+        # How cells differ.
+        "hw.device.spread": Any,
         # Cells that hold one level.
         "hw.device.faults": Any,
         # Noise of conversions.
@@ -368,6 +344,48 @@ Keys = TypedDict(
         "hw.device.programming": Any,
         # What time does to levels, between programming and reading (`dalean eval --after`).
         "hw.device.drift": Any,
+        # How the step of a pulse depends on where the cell lies in its window.
+        "hw.device.response.curve": Literal["linear", "soft_bounds", "exponential", "neurosim", "measured"],
+        # Pulses of mean length across the window. Levels are the resolution that the cell is simulated with; rates count pulses. [pulses]
+        "hw.device.response.states": int,
+        # Steps up, in mean steps: at the floor and at the ceiling (linear), at the floor alone (soft_bounds). [mean steps]
+        "hw.device.response.up": Any,
+        # Steps down, in mean steps: at the floor and at the ceiling (linear), at the ceiling alone (soft_bounds). [mean steps]
+        "hw.device.response.down": Any,
+        # Of steps up and down: how much the exponential part takes off the mean step.
+        "hw.device.response.amplitude": Any,
+        # Of steps up and down: how fast the exponential part grows.
+        "hw.device.response.growth": Any,
+        # The argument of the exponential part at the floor and at the ceiling.
+        "hw.device.response.z": Any,
+        # Nonlinearity labels of rising and of falling pulses, as MLP+NeuroSim has them.
+        "hw.device.response.labels": Any,
+        # Rows of three: where a cell lies, 0 to 1 of the window and rising, and its steps up and down in windows. [windows]
+        "hw.device.response.points": Any,
+        # By which share steps up are longer than the curve says, and steps down shorter.
+        "hw.device.response.asymmetry": Any,
+        # Standard deviation of a step from pulse to pulse.
+        "hw.device.response.noise": float,
+        # What that is a share of.
+        "hw.device.response.noise_of": Literal["step", "window"],
+        # Where the numbers come from.
+        "hw.device.response.source": Any,
+        # How far to trust the numbers.
+        "hw.device.response.kind": Literal["measured", "fitted", "assumed"],
+        # Standard deviation of the factor of a cell's steps, or of its logarithm.
+        "hw.device.spread.step": float,
+        # The law of that factor, whose median is 1.
+        "hw.device.spread.step_law": Literal["normal", "log_normal"],
+        # Standard deviation of the share by which a cell's steps up are longer, and its steps down shorter.
+        "hw.device.spread.asymmetry": float,
+        # Standard deviation of a cell's ceiling, in windows. What would lie beyond the levels there are lies on their end: leave room. [windows]
+        "hw.device.spread.ceiling": float,
+        # Standard deviation of a cell's floor, in windows. [windows]
+        "hw.device.spread.floor": float,
+        # Where the numbers come from.
+        "hw.device.spread.source": Any,
+        # How far to trust the numbers.
+        "hw.device.spread.kind": Literal["measured", "fitted", "assumed"],
         # Share of the cells that are stuck at the floor. [of the cells]
         "hw.device.faults.stuck_floor": float,
         # Share of the cells that are stuck at the ceiling. [of the cells]
@@ -404,6 +422,34 @@ Keys = TypedDict(
         "hw.device.drift.source": Any,
         # How far to trust the numbers.
         "hw.device.drift.kind": Literal["measured", "fitted", "assumed"],
+        # Megahertz of the clock that counts cycles. [MHz]
+        "hw.timing.clock_mhz": float,
+        # `T_A`: cycles to settle and sample; with `pulse_width`, cycles beside the slots of a phase. [cycles] Default: 1.
+        "hw.timing.settle_cycles": int,
+        # `T_C`: cycles of a conversion of `fixed` converters; others have `adc.step_cycles`. [cycles] Default: 1.
+        "hw.timing.convert_cycles": int,
+        # `S`: columns of a bank that share a converter. [columns] Default: 1.
+        "hw.timing.columns_per_adc": int,
+        # Whether a slice settles while the one before is converted. Default: false.
+        "hw.timing.overlap": bool,
+        # `U`: columns looked up, multiplied or accumulated at a time. [columns] Default: 1.
+        "hw.timing.lanes": int,
+        # `H`: cycles before the first error word arrives. [cycles] Default: 0.
+        "hw.timing.bus_hops": int,
+        # `T_W`: cycles of a pulse. [cycles] Default: 1.
+        "hw.timing.pulse_cycles": int,
+        # How many pulses a number of levels takes. Default: "unary".
+        "hw.timing.pulses": Literal["unary", "amplitude"],
+        # Whether every pulse is followed by a read of what it did. Default: false.
+        "hw.timing.verify": bool,
+        # `W`: cells that can be pulsed at a time. [cells]
+        "hw.timing.write_active_max": int,
+        # Cycles of a digital action: 1, or the symbols of a digital clock on an optical chip. [cycles] Default: 1.
+        "hw.timing.beat_cycles": int,
+        # Where the numbers come from.
+        "hw.timing.source": Any,
+        # How far to trust the numbers.
+        "hw.timing.kind": Literal["measured", "fitted", "assumed"],
         # The least that is credible.
         "hw.energy.*.low": Any,
         # What is reckoned with.

@@ -10,6 +10,7 @@ import time
 import numpy as np
 
 import dalean
+from dalean import _dalean
 
 KINDS = ["u1", "i1", "u2", "i2", ">i2", "i4", "u4", "i8", "u8", ">i8", "f2", "f4", "f8", ">f8", "c8", "?", "O", "S3", "U2", "M8[s]"]
 SIZES = [0, 1, 2, 3, 4, 5, 7, 64, 70, 71]
@@ -59,6 +60,41 @@ def array(rng):
     return made
 
 
+POLICY = '''task = "policy"
+environment = { count = 2, horizon = 4, steps = 64, rollouts = 1 }
+network.hidden = [5]
+learning.batch = 4
+ppo.passes = 1
+'''
+
+
+def learner(active, discrete):
+    """A policy whose two environments show three numbers, or lines; calibrated, so that it is soon its turn to learn."""
+    made = _dalean.PolicyLearner("fuzz", POLICY, "ideal", [], 1, "Mine-v0", 3, active, discrete, 2, 10, 1, None)
+    good, begun, none = (np.ones((2, 3)) if active is None else dalean.Lines(np.array([0, 2]), np.array([1, 2]))), 0, [False, False]
+    while begun < 2:
+        if made.turn()[0] == "begin":
+            made.begin(good)
+            begun += 1
+        else:
+            made.take(good, [0, 0], none, none)
+    return made
+
+
+def shown(rng):
+    """What environments show, or nearly."""
+    way = rng.randrange(6)
+    if way < 2:
+        return np.asarray(np.random.default_rng(rng.randrange(9)).normal(size=(2, 3)))
+    if way < 4:
+        return dalean.Lines(np.array([0, rng.randrange(-1, 4)]), np.array([1, rng.choice([2, 2, 2, 1, 0, 3, -1, 2**40])]))
+    return array(rng) if way == 4 else (array(rng), array(rng))
+
+
+def flagged(rng):
+    return rng.choice([np.zeros(2, bool), np.zeros(2, bool), np.array([True, False]), [0, 1], array(rng)])
+
+
 def fuzz(calls, rng):
     """So many calls: how many were refused, how many done."""
     nets = [
@@ -70,9 +106,13 @@ def fuzz(calls, rng):
     stream = lambda: rng.choice(["p", "n", "p", "n", "", "pp", "é", None, 3])
     pathway = lambda: rng.choice(["pp", "np", "e", "i", "", "\0", "nn", 4])
     x = np.arange(20, dtype=np.uint8).reshape(4, 5)
+    policies = [learner(None, True), learner(None, False), learner(2, True)]
     refused = done = 0
-    for _ in range(calls):
-        net = rng.choice(nets)
+    for at in range(calls):
+        if at % 5000 == 0:
+            # those that are through with it begin anew
+            policies = [learner(None, True), learner(None, False), learner(2, True)]
+        net, policy = rng.choice(nets), rng.choice(policies)
         call = rng.choice(
             [
                 lambda: net.read(array(rng), rng.choice([True, False, 1, "x"])),
@@ -92,6 +132,15 @@ def fuzz(calls, rng):
                 lambda: net.load(whole(), pathway(), array(rng)),
                 lambda: net.put_back(rng.choice([b"", bytes(100), net.checkpoint(), net.checkpoint()[:-1], "x"])),
                 lambda: net.state_hash,
+                lambda: policy.turn(),
+                lambda: policy.turn(),
+                lambda: policy.begin(shown(rng)),
+                lambda: policy.take(shown(rng), rng.choice([[0, 0], [1.0, 0], array(rng)]), flagged(rng), flagged(rng), rng.choice([None, shown(rng)]), rng.choice([None, flagged(rng)])),
+                lambda: policy.take(shown(rng), [0, 0], [False, False], [False, False]),
+                lambda: policy.learn(),
+                lambda: policy.answer(shown(rng), rng.choice([0, 7, 2**63, -1])),
+                lambda: dalean.deploy([array(rng), array(rng)], array(rng)),
+                lambda: dalean.deploy([(np.ones((5, 3)), array(rng))], rng.choice([x, array(rng)]), to=rng.choice(["pairs", "dual", 3])),
                 lambda: dalean.Network(rng.choice(NETS), rng.choice(["ideal", "no"])),
             ]
         )

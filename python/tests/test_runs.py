@@ -220,10 +220,10 @@ def test_the_quick_start_notebook(examples, tmp_path):
 
 
 GRID = {
-    "base": {"network.hidden": [16], "learning.batch": 16, "learning.epochs": 6},
+    "base": {"network.hidden": [16], "learning.epochs": 6},
     "axis": [
         {"name": "bits", "key": "hw.cell.level_bits", "values": [3, 8]},
-        {"name": "seed", "key": "seed", "values": [1, 2, 3]},
+        {"name": "rates", "key": "learning.rate", "values": [12, 18, 24]},
     ],
 }
 

@@ -33,7 +33,7 @@ pub use defaults::{SET_DEFAULTS, SetDefaults};
 pub use device::Retention;
 pub use differs::{Difference, flat};
 pub use file::{ExperimentFile, HardwareFile};
-pub use hardware::{Model, builtin_models, load_model, model_names};
+pub use hardware::{Model, builtin_devices, builtin_models, device_names, load_model, model_names};
 pub use law::{Law, Setting, SettingValue};
 pub use layers::{Overlay, Sources, anchor, load, overlay, setting, setting_table};
 pub(crate) use policy::PolicySettings;

@@ -28,6 +28,10 @@ pub enum Site {
     InitialLevels = 1,
     /// Order of the samples in an epoch.
     Shuffle = 2,
+    /// What sets a cell apart from others of its device. Sub: 0 step, 1 asymmetry, 2 ceiling, 3 floor.
+    Variation = 3,
+    /// Noise of a device's pulse. Sub: the pulse of the write.
+    PulseNoise = 4,
     /// What a conversion reads beside the current.
     ReadNoise = 5,
     /// Drift of levels with time.
@@ -46,6 +50,8 @@ pub enum Site {
     RowTrain = 12,
     /// Pulse trains of columns.
     ColumnTrain = 13,
+    /// Rounding of the step that a pulse makes. Sub: the pulse of the write.
+    StepRounding = 14,
     /// Which cells are stuck, and where.
     StuckCell = 16,
     /// What a load leaves beside a level.
@@ -162,6 +168,18 @@ impl Place {
             "whole blocks of the columns"
         );
         self.fill((columns.start * blocks) as u64, bytes);
+    }
+
+    /// The 32-bit words of rows `16 * group ..` of a column.
+    #[must_use]
+    pub fn quads(&self, rows: usize, column: usize, group: usize) -> [u32; 16] {
+        let mut bytes = [0; BLOCK_BYTES];
+        self.fill(block(rows, column, group, BLOCK_BYTES / 4), &mut bytes);
+        let mut words = [0; 16];
+        for (word, of) in words.iter_mut().zip(bytes.as_chunks::<4>().0) {
+            *word = u32::from_le_bytes(*of);
+        }
+        words
     }
 
     /// 32-bit words one after the other, from block 0.
@@ -282,6 +300,9 @@ mod tests {
         let mut second = vec![0; 64 * 5];
         PLACE.columns(70, 1..2, 4, &mut second);
         assert_eq!(second, wide[64 * 5..]);
+        // and of 32-bit words five: row 69 is the sixth of the fifth, here of column 0
+        let quad = u32::from_le_bytes(all[4 * 64 + 4 * 5..][..4].try_into().unwrap());
+        assert_eq!(PLACE.quads(70, 0, 4)[5], quad);
     }
 
     #[test]

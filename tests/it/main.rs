@@ -13,6 +13,7 @@ mod browser;
 mod damage;
 mod defaults;
 mod deploy;
+mod devices;
 mod environments;
 mod examples;
 mod extending;

@@ -2,7 +2,7 @@
 //!
 //! To a kernel a stuck cell is one that is gone: it takes pulses, its remainder moves on as that of any cell, and its level
 //! stays. Where the floor absorbs, the marks of both lie in one plane; where it does not, what a write marked is taken back
-//! after it. A function of the place, no state. See docs/MODEL.md, 3.11.
+//! after it. A function of the place, no state. See docs/MODEL.md, 3.12.
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
 use super::kernel::Cells;

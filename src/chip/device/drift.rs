@@ -8,7 +8,7 @@
 //! ```
 //!
 //! Mean and sd are those of the level as it was programmed. Levels are the resolution: a fraction of one is kept with its chance. A
-//! function of the place and the moment. See docs/MODEL.md, 3.12.
+//! function of the place and the moment. See docs/MODEL.md, 3.13.
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
 use crate::num::fixed::rsh;

@@ -9,7 +9,7 @@
 //! ```
 //!
 //! Cells are numbered on the logical array, so tiles cannot move a fault. To a write a stuck cell is one that was pruned: it
-//! takes pulses and does not move; to statistics it is none. See docs/MODEL.md, 3.11.
+//! takes pulses and does not move; to statistics it is none. See docs/MODEL.md, 3.12.
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
 use crate::num::draw::{Place, Site, below};

@@ -6,7 +6,7 @@
 //! x      = level / ceiling, the conductance as a share of the greatest; each product is rsh(. level / ceiling)
 //! ```
 //!
-//! A function of the place: loading the same levels again gives the same cells. See docs/MODEL.md, 3.12.
+//! A function of the place: loading the same levels again gives the same cells. See docs/MODEL.md, 3.13.
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
 use crate::num::draw::{Place, Site};

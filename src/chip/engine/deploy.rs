@@ -6,7 +6,7 @@
 //! ```
 //!
 //! Global drift compensation: one factor a layer, from currents of all cells under the same drives. It is known exactly here; reading it
-//! is not charged. See docs/MODEL.md, 3.12.
+//! is not charged. See docs/MODEL.md, 3.13.
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
 use std::borrow::Cow;

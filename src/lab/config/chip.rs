@@ -103,10 +103,11 @@ pub(super) fn resolve(file: &mut HardwareFile, prefix: &str) -> Result<Hardware,
     let residual_bits = range(&key("write.residual_bits"), ResidualBits::new(bits))?;
 
     let scheme = scheme(write, &key, increments)?;
+    let device = device::resolve(file.device.as_ref(), window, &key)?;
     let slices = Slices { mode, converter, count: drive_bits.get().div_ceil(dac_bits), dac_bits };
     let timing = file.timing.as_mut().map(|table| timing(table, &slices, &key)).transpose()?;
-    let device::Device { faults, read_noise, programming, drift: _ } =
-        device::resolve(file.device.as_ref(), &key)?;
+    let device::Flaws { faults, read_noise, programming, drift: _ } =
+        device::flaws(file.device.as_ref(), &key)?;
     let spec = HardwareSpec {
         cell: CellSpec { level_bits, window, floor_kind },
         tile: TileSpec { rows: tile_rows, columns: tile_columns, count_max, transposed_read },
@@ -114,6 +115,7 @@ pub(super) fn resolve(file: &mut HardwareFile, prefix: &str) -> Result<Hardware,
         adc,
         digital: DigitalSpec { lut_bits, error_bits },
         write: WriteSpec { increment_max, dither_bits, dither_pattern, residual_bits, scheme },
+        device,
         timing,
         faults,
         read_noise,

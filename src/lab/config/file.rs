@@ -59,7 +59,7 @@ macro_rules! keys {
 
         impl $name {
             /// Each key and what it means.
-            pub(super) const MEANINGS: &'static [(&'static str, &'static str)] =
+            pub(in crate::lab::config) const MEANINGS: &'static [(&'static str, &'static str)] =
                 &[$($(#[cfg($when)])? (stringify!($field), concat!($($meaning),*)),)*];
         }
     )*};
@@ -313,10 +313,10 @@ keys! {
         error: ErrorFile,
         /// Programming.
         write: WriteFile,
-        /// Cycles of what a tile does; without it no cycles are counted.
-        timing: TimingFile,
         /// What real cells and converters do that ideal ones do not.
         device: DeviceFile,
+        /// Cycles of what a tile does; without it no cycles are counted.
+        timing: TimingFile,
         /// Joules of an event, by quantity and unit.
         energy: BTreeMap<EnergyKey, NumberFile>,
         /// Watts that flow whatever happens.

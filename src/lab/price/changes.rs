@@ -67,6 +67,7 @@ pub fn changes(run: &Hardware, other: &Hardware) -> Vec<Change> {
         adc,
         digital,
         write,
+        device,
         timing,
         faults,
         read_noise,
@@ -100,6 +101,7 @@ pub fn changes(run: &Hardware, other: &Hardware) -> Vec<Change> {
     differ("device.programming", *programming != other.programming, LEARNT, true);
     differ("device.read_noise", *read_noise != other.read_noise, LEARNT, true);
     differ("write.scheme", *scheme != other.write.scheme, SCHEME, true);
+    differ("device", *device != other.device, LEARNT, true);
 
     match (*timing, other.timing) {
         (None, None) => {}

@@ -8,7 +8,7 @@
 //! ```
 //!
 //! Every reading starts from the same counters, so chip k after t gives the same whatever was read before. Converter ranges, thresholds
-//! and tables stay as they were learnt. See docs/MODEL.md, 3.12.
+//! and tables stay as they were learnt. See docs/MODEL.md, 3.13.
 
 use std::path::Path;
 

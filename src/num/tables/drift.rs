@@ -7,7 +7,7 @@
 //! levels too;  e_i = floor(2^16 2^(-i / 4096) + 1/2)                             i = 0 ..= 4096
 //! ```
 //!
-//! See docs/MODEL.md, 3.12.
+//! See docs/MODEL.md, 3.13.
 #![expect(
     clippy::float_arithmetic,
     reason = "floats become integers here, before anything is read"

@@ -17,7 +17,7 @@ impl Tile {
     ) {
         let at = self.place(row, column);
         if !self.stuck[bank][at] {
-            self.level[bank][at] = level;
+            self.level[bank][at] = self.taken(bank, at, level);
         }
     }
 
