@@ -1,6 +1,7 @@
 //! The substrate: unsigned crossbars, their periphery, and the engine that drives them.
 
 pub mod crossbar;
+pub mod device;
 pub mod engine;
 pub mod hardware;
 pub mod layer;

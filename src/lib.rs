@@ -73,13 +73,19 @@ pub use crate::task::classify::{
 /// assert_eq!(chip.adc, adc);
 /// ```
 pub mod hardware {
+    pub use crate::chip::device::{CellSpread, DeviceError, DeviceSpec, PulseNoise};
     pub use crate::chip::hardware::{
         Adc, AdcRange, CellSpec, ConverterKind, DigitalSpec, DitherBits, DitherPattern, DriveSpec,
         FloorKind, PulseCode, SliceTime, SliceTimes, Subtract, TileSpec, Timing, Window,
         WriteScheme, WriteSpec,
     };
     pub use crate::num::fixed::{
-        AdcBits, DriveBits, ErrorBits, IncrementMax, LevelBits, LutBits, OutOfRange, ResidualBits,
+        AdcBits, DriveBits, ErrorBits, IncrementMax, LevelBits, LutBits, Millionths, OutOfRange,
+        ResidualBits,
+    };
+    pub use crate::num::tables::{
+        ExponentialSteps, LinearSteps, MeasuredSteps, NeurosimSteps, Response, SoftBoundSteps,
+        SpreadLaw,
     };
 }
 

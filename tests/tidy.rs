@@ -25,7 +25,17 @@ const HOUSE: [(&str, &[&str]); 6] = [
     ("num", &["fixed", "draw", "tables"]),
     (
         "chip",
-        &["state", "hardware", "ledger", "periphery", "crossbar", "population", "layer", "engine"],
+        &[
+            "state",
+            "device",
+            "hardware",
+            "ledger",
+            "periphery",
+            "crossbar",
+            "population",
+            "layer",
+            "engine",
+        ],
     ),
     ("learn", &["error", "route", "statistics", "rule", "driver", "network", "outside"]),
     ("task", &["classify", "environment", "policy"]),

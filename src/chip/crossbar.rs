@@ -12,7 +12,7 @@ use bitvec::prelude::*;
 
 use super::hardware::{FloorKind, Hardware, Window};
 
-use kernel::{Cells, Drives, Kernel};
+use kernel::{Cells, Drives, Half, Kernel};
 use layout::{BLOCK_CELLS, BLOCK_ROWS, HALF_CELLS, HALF_COLUMNS, Layout, PANEL_COLUMNS};
 
 mod form;
@@ -20,6 +20,7 @@ mod initial;
 pub mod kernel;
 pub mod layout;
 mod optimise;
+mod own;
 mod pulses;
 mod state;
 mod trains;
@@ -29,6 +30,7 @@ mod write;
 pub use form::{Form, LongSums, Met, SHORT_READS};
 pub use initial::{InitialLaw, initial_levels, initial_scale};
 pub use optimise::{Adam, Asks, Momentum};
+pub use own::{Made, OwnCells};
 pub use pulses::{Collect, Collected, RowPeaks};
 pub use trains::ColumnTrain;
 pub use write::{WriteRequest, Written};
@@ -44,6 +46,8 @@ pub struct Crossbar {
     residual: Option<Vec<u16>>,
     /// Which cells are gone for good, of absorbing floors: [`Cells::GONE`], or 0.
     pruned: Option<Vec<u8>>,
+    /// What cells are made of, if they are not ideal.
+    own: Option<Box<OwnCells>>,
 }
 
 /// The parts of some panels side by side that a write may change.
@@ -55,6 +59,7 @@ pub struct StripMut<'a> {
     high: Option<&'a mut [u8]>,
     residual: Option<&'a mut [u16]>,
     pruned: Option<&'a mut [u8]>,
+    own: Option<&'a OwnCells>,
 }
 
 /// A half block of a byte plane.
@@ -86,6 +91,7 @@ impl Crossbar {
             high: wide.then(|| avec![high; cells]),
             residual: (hardware.write.residual_bits.get() > 0).then(|| vec![0; cells]),
             pruned: (hardware.cell.floor_kind == FloorKind::Absorbing).then(|| vec![0; cells]),
+            own: None,
         }
     }
 
@@ -103,17 +109,22 @@ impl Crossbar {
         u16::from_le_bytes([self.low[at], self.high.as_ref().map_or(0, |high| high[at])])
     }
 
-    /// Loads a row of levels.
+    /// Loads a row of levels. Cells with a window of their own take them as far as that goes.
     ///
     /// # Panics
     /// When a level lies outside the window: levels are checked at the door.
     pub fn load_row(&mut self, row: usize, levels: &[u16]) {
         assert_eq!(levels.len(), self.layout.columns, "a row has one level a column");
         for (column, &level) in levels.iter().enumerate() {
-            assert!(
-                (self.window.floor()..=self.window.ceiling()).contains(&level),
-                "level {level} lies outside the window"
-            );
+            let own = self.own(row, column);
+            let [floor, ceiling] = match own {
+                Some(own) => {
+                    [own.floor.min(self.window.floor()), own.ceiling.max(self.window.ceiling())]
+                }
+                None => [self.window.floor(), self.window.ceiling()],
+            };
+            assert!((floor..=ceiling).contains(&level), "level {level} lies outside the window");
+            let level = own.map_or(level, |own| level.clamp(own.floor, own.ceiling));
             let at = self.layout.index(row, column);
             let [low, high] = level.to_le_bytes();
             self.low[at] = low;
@@ -262,6 +273,7 @@ impl Crossbar {
         let mut high = self.high.as_mut().map(|plane| plane.chunks_mut(cells));
         let mut residual = self.residual.as_mut().map(|plane| plane.chunks_mut(cells));
         let mut pruned = self.pruned.as_mut().map(|plane| plane.chunks_mut(cells));
+        let own = self.own.as_deref();
         (0..layout.panels()).step_by(panels).map(move |first| StripMut {
             first,
             layout,
@@ -269,6 +281,7 @@ impl Crossbar {
             high: high.as_mut().map(|chunks| chunks.next().expect("one chunk a strip")),
             residual: residual.as_mut().map(|chunks| chunks.next().expect("one chunk a strip")),
             pruned: pruned.as_mut().map(|chunks| chunks.next().expect("one chunk a strip")),
+            own,
         })
     }
 }

@@ -14,6 +14,7 @@
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
 use std::ops::Range;
+use std::sync::Arc;
 
 use aligned_vec::{AVec, CACHELINE_ALIGN};
 
@@ -29,6 +30,8 @@ use crate::num::tables::Scales;
 mod calibrate;
 mod columns;
 mod currents;
+#[cfg(test)]
+mod devices;
 mod each;
 mod error;
 mod forward;
@@ -276,12 +279,16 @@ impl Engine {
     /// # Panics
     /// When the layers do not follow one another: the plan checks that.
     #[must_use]
-    pub fn new(hardware: Hardware, backend: Backend, seed: u64, layers: Vec<Layer>) -> Self {
+    pub fn new(hardware: Hardware, backend: Backend, seed: u64, mut layers: Vec<Layer>) -> Self {
         let joined = layers.windows(2).all(|pair| pair[1].spec.follows(&pair[0].spec));
         assert!(joined && !layers.is_empty(), "layers follow one another");
         assert!(layers[0].spec.driven_by.is_shared(), "data drive both streams alike");
         let signed = |layer: &Layer| layer.spec.driven_by == DrivenBy::Signed;
         assert!(!layers[1..].iter().any(signed), "only data have a sign");
+        if let Some(device) = hardware.device() {
+            let device = Arc::new(device);
+            layers.iter_mut().for_each(|layer| layer.fit(&device, seed));
+        }
         let count = layers.len();
         let schedule = hardware.timing.map(|timing| Schedule::new(&hardware, timing, &layers));
         let ledger =

@@ -1,11 +1,13 @@
 //! What a chip is, as checked numbers. A hardware model file becomes one of these at the door.
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
+use super::device::{Device, DeviceError, DeviceSpec};
 use crate::num::fixed::{
     AdcBits, DriveBits, ErrorBits, IncrementMax, LevelBits, LutBits, OutOfRange, ResidualBits,
 };
 
 pub mod converter;
+mod driver;
 pub mod read_time;
 pub mod timing;
 
@@ -265,6 +267,8 @@ pub struct HardwareSpec {
     pub digital: DigitalSpec,
     /// Programming.
     pub write: WriteSpec,
+    /// What cells are made of; `None`: ideal ones, which a pulse moves by a level.
+    pub device: Option<DeviceSpec>,
     /// Cycles of what a tile does; `None`: no cycles are counted.
     pub timing: Option<Timing>,
 }
@@ -327,7 +331,7 @@ impl Hardware {
     /// When a number lies outside what a chip of this kind can have, or parts contradict one another.
     pub fn new(spec: HardwareSpec) -> Result<Self, HardwareError> {
         // without `..`: a new part is checked here or does not compile
-        let HardwareSpec { cell, tile, drive, adc, digital, write, timing } = &spec;
+        let HardwareSpec { cell, tile, drive, adc, digital, write, device, timing } = &spec;
         let CellSpec { level_bits, window, floor_kind: _ } = cell;
         let TileSpec { rows, columns, count_max, transposed_read: _ } = tile;
         let DriveSpec { bits: drive_bits, dac_bits } = drive;
@@ -361,6 +365,11 @@ impl Hardware {
                 let allowed = format!("a drive code of this chip is read in {slices}");
                 return Err(HardwareError { key: "timing.slices", found, allowed });
             }
+        }
+        if let Some(device) = device {
+            let wrong = |DeviceError { key, found, allowed }| HardwareError { key, found, allowed };
+            device.check().map_err(wrong)?;
+            driver::check_driver(*timing)?;
         }
         if let WriteScheme::Trains { slots_log2 } = *scheme {
             check_trains(slots_log2, *increment_max, *residual_bits, *timing)?;
@@ -411,6 +420,7 @@ impl Hardware {
                 residual_bits: ResidualBits::new(0).expect(INSIDE),
                 scheme: WriteScheme::Rounded,
             },
+            device: None,
             timing: None,
         };
         Self::new(spec).expect("the reference is a chip")
@@ -438,11 +448,36 @@ impl Hardware {
         self.0.drive.bits.get().div_ceil(self.0.drive.dac_bits)
     }
 
+    /// The greatest level that a cell of this chip can have: the ceiling, or where cells differ in theirs what a level holds.
+    #[must_use]
+    pub fn level_greatest(&self) -> u16 {
+        match &self.device {
+            Some(device) if device.spread.moves_window() => self.cell.level_bits.level_max(),
+            _ => self.cell.window.ceiling(),
+        }
+    }
+
+    /// The tables of its device, if it has one.
+    #[must_use]
+    pub(crate) fn device(&self) -> Option<Device> {
+        let ends = [self.cell.window.floor(), self.cell.window.ceiling()];
+        let of = |device| Device::new(device, ends, self.cell.level_bits.level_max());
+        self.device.as_ref().map(of)
+    }
+
+    /// Pulses across the window and levels they move a cell by, where those are not the same.
+    #[must_use]
+    pub fn pulses_of_window(&self) -> Option<[u32; 2]> {
+        let window = self.cell.window;
+        let span = u32::from(window.ceiling() - window.floor());
+        self.device.as_ref().map(|device| [device.states, span])
+    }
+
     /// The shift at which no current of a tile can saturate a converter of `bits`.
     #[must_use]
     pub(crate) fn full_shift(&self, bits: AdcBits, subtract: Subtract, rows: usize) -> u32 {
         let slice_max = (1i64 << self.drive.dac_bits.min(self.drive.bits.get())) - 1;
-        let worst = rows as i64 * i64::from(self.cell.window.ceiling()) * slice_max;
+        let worst = rows as i64 * i64::from(self.level_greatest()) * slice_max;
         let rail = match subtract {
             Subtract::Digital => (1i64 << bits.get()) - 1,
             Subtract::Current => (1i64 << (bits.get() - 1)) - 1,

@@ -6,13 +6,16 @@
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
 use std::ops::Range;
+use std::sync::Arc;
 
 use super::crossbar::Crossbar;
 use super::crossbar::kernel::{ConvShape, LookUp};
 use super::crossbar::layout::Layout;
+use super::device::Device;
 use super::hardware::{Adc, AdcRange, Hardware};
 use super::periphery;
 use super::population::{Stream, Wiring};
+use crate::num::draw::{Place, Site};
 use crate::num::fixed::DriveBits;
 use crate::num::tables::{Activation, FullDrive, Lut, Unit};
 
@@ -227,6 +230,16 @@ pub struct Layer {
 }
 
 impl Layer {
+    /// Makes its cells of a device, those of a seed.
+    pub(crate) fn fit(&mut self, device: &Arc<Device>, seed: u64) {
+        let pathways = self.spec.wiring.pathways();
+        for (array, pathway) in self.arrays.iter_mut().zip(pathways) {
+            let (layer, pathway) = (self.index, pathway.code);
+            let place = Place { layer, pathway, ..Place::global(seed, Site::Variation, 0) };
+            array.fit(Arc::clone(device), place);
+        }
+    }
+
     /// A layer with every cell on the floor.
     #[must_use]
     pub fn new(

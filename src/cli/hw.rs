@@ -7,10 +7,11 @@ use clap::{Args, Subcommand};
 use serde_json::json;
 
 use super::{Done, Failure, known, say, usage};
+use crate::chip::device::{CellSpread, PulseNoise};
 use crate::chip::hardware::{Adc, AdcRange, Hardware, PulseCode, Subtract, Timing};
 use crate::lab::config::{
-    self, Config, Constant, CostTable, Model, Sources, Standing, absent_words, builtin_models,
-    load_model, model_names,
+    self, Config, Constant, CostTable, Model, Sources, Standing, absent_words, builtin_devices,
+    builtin_models, device_names, load_model, model_names,
 };
 use crate::lab::price::{Convention, bounds, figures, peak, prefixed};
 
@@ -113,13 +114,14 @@ fn widths(text: &str) -> Result<Widths, String> {
 pub(super) fn execute(command: &HwCommand) -> Done {
     match command {
         HwCommand::List { json, quiet } => {
-            for Model { name, summary, .. } in builtin_models() {
+            for Model { name, summary, .. } in builtin_models().into_iter().chain(builtin_devices())
+            {
                 say(&match (json, quiet) {
                     (true, _) => {
                         json!({"event": "model", "name": name, "summary": summary}).to_string()
                     }
                     (_, true) => name,
-                    _ => format!("{name:12} {summary}"),
+                    _ => format!("{name:14} {summary}"),
                 });
             }
             Ok(())
@@ -154,7 +156,7 @@ fn new(name: &Path, json: bool, quiet: bool) -> Done {
         );
         return Err(usage(&message));
     }
-    if model_names().contains(&chip) {
+    if model_names().contains(&chip) || device_names().contains(&chip) {
         let message = format!("{chip} is a built-in model; give yours another name");
         return Err(usage(&message));
     }
@@ -407,6 +409,19 @@ fn on_off(hardware: &Hardware) -> String {
     }
 }
 
+/// What a pulse does to cells that are not ideal.
+fn pulse(hardware: &Hardware) -> Option<String> {
+    let device = hardware.device.as_ref()?;
+    let curve = device.response.name().replace('_', " ");
+    let noise = match device.noise {
+        PulseNoise::Off => String::new(),
+        PulseNoise::OfStep(share) => format!(", noise {share} of a step"),
+        PulseNoise::OfWindow(share) => format!(", noise {share} of the window"),
+    };
+    let differ = if device.spread == CellSpread::default() { "" } else { ", cells differ" };
+    Some(format!("{curve}, {} across the window{noise}{differ}", device.states))
+}
+
 fn numbers(hardware: &Hardware) -> Vec<(&'static str, String)> {
     let h = hardware;
     let converter = match h.adc {
@@ -426,7 +441,7 @@ fn numbers(hardware: &Hardware) -> Vec<(&'static str, String)> {
         }
     };
     let window = (h.cell.window.floor(), h.cell.window.ceiling());
-    vec![
+    let mut all = vec![
         ("cell", format!("{} bits, levels {}..={}", h.cell.level_bits.get(), window.0, window.1)),
         ("on/off", on_off(h)),
         ("tile", format!("{} x {} cells a bank", h.tile.rows, h.tile.columns)),
@@ -439,5 +454,7 @@ fn numbers(hardware: &Hardware) -> Vec<(&'static str, String)> {
         ("error word", format!("{} bits", h.digital.error_bits.get())),
         ("write", format!("at most {} pulses a cell", h.write.increment_max.get())),
         ("remainder", format!("{} bits", h.write.residual_bits.get())),
-    ]
+    ];
+    all.extend(pulse(h).map(|text| ("pulse", text)));
+    all
 }

@@ -183,6 +183,7 @@ impl NetworkSpec {
             error_bits: hardware.digital.error_bits,
             activation: spec.activation,
             unit: layer::unit(spec, hardware),
+            window: hardware.pulses_of_window(),
         })
     }
 

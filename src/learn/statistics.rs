@@ -66,8 +66,9 @@ pub type FloorMap = Vec<Vec<Vec<bool>>>;
 /// Where the floor is now.
 #[must_use]
 pub fn floor_map(engine: &Engine) -> FloorMap {
-    let floor = engine.hardware().cell.window.floor();
-    let of = |array: &Crossbar| array.levels().map(|level| level == floor).collect();
+    let of = |array: &Crossbar| {
+        array.levels().zip(array.floors()).map(|(level, floor)| level == floor).collect()
+    };
     engine.layers().iter().map(|layer| layer.arrays.iter().map(of).collect()).collect()
 }
 
@@ -122,15 +123,15 @@ fn of(array: &Crossbar, hardware: &Hardware, start: &[bool]) -> PathwayRecord {
         histogram: vec![0; bins],
         training: BTreeMap::new(),
     };
-    let floor = hardware.cell.window.floor();
-    let levels: Vec<u16> = array.levels().collect();
+    // a cell may have a floor of its own
+    let levels: Vec<_> = array.levels().zip(array.floors()).collect();
     let by_row = levels.chunks_exact(layout.columns).zip(start.chunks_exact(layout.columns));
     for (row, (levels, start)) in by_row.enumerate() {
         let parts = levels.chunks(tile_columns).zip(start.chunks(tile_columns));
         for (tile, (levels, start)) in parts.enumerate() {
             let mut idle = true;
             let columns = &mut columns[tile * tile_columns..];
-            for ((&level, &was), column) in levels.iter().zip(start).zip(columns) {
+            for ((&(level, floor), &was), column) in levels.iter().zip(start).zip(columns) {
                 let is = level == floor;
                 one.floor += u64::from(is);
                 one.zero += u64::from(level == 0);

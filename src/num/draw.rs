@@ -26,6 +26,10 @@ pub enum Site {
     InitialLevels = 1,
     /// Order of the samples in an epoch.
     Shuffle = 2,
+    /// What sets a cell apart from others of its device. Sub: 0 step, 1 asymmetry, 2 ceiling, 3 floor.
+    Variation = 3,
+    /// Noise of a device's pulse. Sub: the pulse of the write.
+    PulseNoise = 4,
     /// Actions that a policy tries.
     Exploration = 7,
     /// How episodes of an environment begin and go on.
@@ -40,6 +44,8 @@ pub enum Site {
     RowTrain = 12,
     /// Pulse trains of columns.
     ColumnTrain = 13,
+    /// Rounding of the step that a pulse makes. Sub: the pulse of the write.
+    StepRounding = 14,
 }
 
 /// Bytes of one block.
@@ -128,6 +134,18 @@ impl Place {
     #[must_use]
     pub fn half(&self, rows: usize, row: usize, column: usize) -> u16 {
         self.halves(rows, column, row / 32)[row % 32]
+    }
+
+    /// The 32-bit words of rows `16 * group ..` of a column.
+    #[must_use]
+    pub fn quads(&self, rows: usize, column: usize, group: usize) -> [u32; 16] {
+        let mut bytes = [0; BLOCK_BYTES];
+        self.fill(block(rows, column, group, BLOCK_BYTES / 4), &mut bytes);
+        let mut words = [0; 16];
+        for (word, of) in words.iter_mut().zip(bytes.as_chunks::<4>().0) {
+            *word = u32::from_le_bytes(*of);
+        }
+        words
     }
 
     /// 32-bit words one after the other, from block 0.
@@ -239,6 +257,9 @@ mod tests {
         assert_eq!(bytes, all[5 * 64..5 * 64 + 6]);
         let at = 64 * (3 + 2) + 2 * 5;
         assert_eq!(PLACE.half(70, 69, 1), u16::from_le_bytes([all[at], all[at + 1]]));
+        // and of 32-bit words five: row 69 is the sixth of the fifth, here of column 0
+        let quad = u32::from_le_bytes(all[4 * 64 + 4 * 5..][..4].try_into().unwrap());
+        assert_eq!(PLACE.quads(70, 0, 4)[5], quad);
     }
 
     #[test]

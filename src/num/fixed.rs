@@ -90,6 +90,30 @@ impl fmt::Display for OutOfRange {
 
 impl std::error::Error for OutOfRange {}
 
+/// A decimal number with six places behind the point, as files give it: an integer of millionths.
+///
+/// ```
+/// use dalean::hardware::Millionths;
+///
+/// assert_eq!(Millionths(-1_790_000).to_string(), "-1.79");
+/// assert_eq!(Millionths(3_000_000).to_string(), "3");
+/// ```
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Millionths(pub i64);
+
+impl Millionths {
+    /// One.
+    pub const ONE: Self = Self(1_000_000);
+}
+
+impl fmt::Display for Millionths {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (sign, size) = (if self.0 < 0 { "-" } else { "" }, self.0.unsigned_abs());
+        let text = format!("{sign}{}.{:06}", size / 1_000_000, size % 1_000_000);
+        write!(f, "{}", text.trim_end_matches('0').trim_end_matches('.'))
+    }
+}
+
 macro_rules! bounded {
     ($($(#[$doc:meta])* $name:ident = $key:literal in $min:literal ..= $max:literal;)*) => {$(
         $(#[$doc])*

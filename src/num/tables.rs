@@ -8,6 +8,7 @@
 //!            lut_a[i] = floor( (2 * 255 * i * 2^p + D) / (2 D) ),  p = lsh + log2(weight_max) - level_bits,  D = 2^drive_bits - 1
 //! softmax  of accumulators, by look-up: `softmax`
 //! k        of a rate: `rate`;  factors of a layer: `scales`
+//! steps    of pulses: `response`;  factors of cells: `spread`
 //! ```
 //!
 //! Elsewhere only `+ - * /` and the functions of the `libm` crate (pure Rust, pinned) are used, so the integers are the
@@ -20,15 +21,22 @@ mod policy;
 #[cfg(test)]
 pub(crate) mod precise;
 mod rate;
+mod response;
 mod scales;
 mod softmax;
+mod spread;
 mod unit;
 
 pub use gaussian::half_gaussian;
 pub use policy::PolicyTables;
 pub use rate::{Decay, LEVELS_SHIFT_MAX, Rate, RateOf, SHIFT_MAX};
+pub use response::{
+    ExponentialSteps, LinearSteps, MeasuredSteps, NeurosimSteps, Response, ResponseError,
+    STEP_BITS, SoftBoundSteps,
+};
 pub use scales::{Factor, Scales};
 pub use softmax::SoftmaxTables;
+pub use spread::{FACTOR_BITS, FACTOR_ONE, Quantiles, SpreadLaw};
 pub use unit::{FullDrive, Unit};
 
 use super::fixed::{LutBits, narrow, rsh};

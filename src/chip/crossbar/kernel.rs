@@ -48,6 +48,7 @@ mod peak;
 mod pulses;
 mod reads;
 mod requests;
+mod respond;
 mod scalar;
 mod sums;
 mod team;
@@ -73,6 +74,7 @@ pub use self::{
     offsets::{MiddleOf, OFFSET_MAX},
     optimise::{MEAN_BITS, SignLaw, Squares, joined},
     reads::ReadsScratch,
+    respond::{Answering, Answers},
     sums::Sums,
     team::Team,
 };
@@ -453,8 +455,10 @@ impl Kernel {
         assert!(write.residual_bits <= 15, "a remainder fits 16 bits");
         assert!(cells.residual.is_some() == (write.residual_bits > 0), "a remainder has bits");
         let fused = match sums {
-            Sums::Narrow(sums) => call!(self, fused(&mut cells, sums, write, dither)),
-            Sums::Wide(_) => None,
+            Sums::Narrow(sums) if cells.answering.is_none() => {
+                call!(self, fused(&mut cells, sums, write, dither))
+            }
+            _ => None,
         };
         fused.unwrap_or_else(|| self.program_in_steps(cells, sums, write, dither))
     }
@@ -480,6 +484,9 @@ impl Kernel {
     /// When the window is empty.
     pub fn levels(&self, mut cells: Cells<'_>, pulses: &Half<i8>, ends: Ends, groups: u16) -> u64 {
         assert!(ends.floor <= ends.ceiling, "the window is not empty");
+        if let Some(mut answering) = cells.answering.take() {
+            return respond::law(self, &mut cells, &mut answering, (pulses, groups), ends);
+        }
         call!(self, levels(&mut cells, pulses, ends, groups))
     }
 

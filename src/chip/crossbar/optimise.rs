@@ -16,7 +16,7 @@ pub use momentum::Momentum;
 
 use super::StripMut;
 use super::form::{Form, Former, LongSums, place};
-use super::kernel::{Draws, Half, Kernel, SignLaw, WriteCounts, WriteLaw};
+use super::kernel::{Answers, Draws, Half, Kernel, SignLaw, WriteCounts, WriteLaw};
 use super::layout::HALF_COLUMNS;
 use super::pulses::Collector;
 use super::words::Words;
@@ -129,6 +129,8 @@ struct Pass<'a> {
     request: WriteRequest<'a>,
     asks: Asks<'a>,
     words: Words,
+    /// Of pulses, where cells are not ideal.
+    answers: Option<Box<Answers>>,
     collector: Collector,
     counts: WriteCounts,
     /// First column.
@@ -144,7 +146,8 @@ impl<'a> Pass<'a> {
         let draws = Draws::new(request.place, strip.layout.rows);
         let (column, counts) = (columns.start, WriteCounts::default());
         let words = Words::new(&request, draws, columns);
-        Self { request, asks, words, collector, counts, column }
+        let answers = strip.answers(request.place);
+        Self { request, asks, words, answers, collector, counts, column }
     }
 
     /// Whether nothing is asked for, whatever the sums.
@@ -164,7 +167,7 @@ impl<'a> Pass<'a> {
         (half, block): (usize, usize),
         (mut sums, beyond): (&Half<i32>, Option<&Half<i64>>),
     ) {
-        let Self { request, asks, words, collector, counts, .. } = self;
+        let Self { request, asks, words, answers, collector, counts, .. } = self;
         let (bits, write) = (request.dither_bits.get(), &request.write);
         let column = self.column + half * HALF_COLUMNS;
         let held = beyond.map(|beyond| held(beyond, asks));
@@ -172,7 +175,9 @@ impl<'a> Pass<'a> {
             sums = held;
         }
         let at = place(half, block, strip.layout.blocks());
+        let answering = strip.answering(half, block, answers.as_deref_mut());
         let mut cells = strip.half(half, block);
+        cells.answering = answering;
         cells.pulses = collector.half(kernel, (column, block));
         let groups = if let &mut Asks::Signs(law, _) = asks {
             // what is held is loud, or 0

@@ -26,7 +26,8 @@ impl Crossbar {
         });
 
         let levels = format!("{name}.levels");
-        let window = i64::from(self.window.floor())..=i64::from(self.window.ceiling());
+        let [least, greatest] = self.reachable().map(i64::from);
+        let window = least..=greatest;
         let seen = visitor.halves(&piece(&levels, window), shape, &|| self.levels().collect())?;
         for (row, levels) in seen.iter().flat_map(|all| all.chunks(shape[1]).enumerate()) {
             self.load_row(row, levels);

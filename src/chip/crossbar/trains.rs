@@ -11,6 +11,7 @@
 use super::Crossbar;
 use super::kernel::{Backend, Cells, Ends, Half, Kernel, WriteCounts};
 use super::layout::{BLOCK_ROWS, HALF_CELLS, HALF_COLUMNS, in_half};
+use crate::num::draw::Place;
 
 /// What a column fires, and in which direction it moves cells.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -22,11 +23,11 @@ pub struct ColumnTrain {
 }
 
 impl Crossbar {
-    /// Pulses every cell where its row and its column fire.
+    /// Pulses every cell where its row and its column fire. `place` is that of the write.
     ///
     /// # Panics
     /// When there is not a train a row and a column.
-    pub fn coincide(&mut self, rows: &[u64], columns: &[ColumnTrain]) -> WriteCounts {
+    pub fn coincide(&mut self, rows: &[u64], columns: &[ColumnTrain], place: Place) -> WriteCounts {
         let layout = self.layout;
         assert_eq!((rows.len(), columns.len()), (layout.rows, layout.columns), "a train a line");
         // nothing is verified and no remainder is kept: that is what makes such a write fast on a chip
@@ -35,11 +36,13 @@ impl Crossbar {
         let law = Kernel::start(Backend::Scalar);
         let mut counts = WriteCounts::default();
         for mut strip in self.strips_mut(layout.panels()) {
+            let mut answers = strip.answers(place);
             for (half, columns) in columns.chunks(HALF_COLUMNS).enumerate() {
                 for (block, rows) in rows.chunks(BLOCK_ROWS).enumerate() {
                     let mut pulses = [0; HALF_CELLS];
                     let groups = coincidences(rows, columns, &mut pulses, &mut counts);
-                    let cells = Cells { residual: None, ..strip.half(half, block) };
+                    let answering = strip.answering(half, block, answers.as_deref_mut());
+                    let cells = Cells { residual: None, answering, ..strip.half(half, block) };
                     counts.effective += law.levels(cells, &pulses, ends, groups);
                 }
             }

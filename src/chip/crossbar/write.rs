@@ -9,7 +9,8 @@ use std::ops::Range;
 use super::StripMut;
 use super::form::{Form, Met};
 use super::kernel::{
-    Cells, Dither, Draws, Half, Kernel, OneSample, WriteCounts, WriteLaw, is_driven,
+    Answering, Answers, Cells, Dither, Draws, Half, Kernel, OneSample, WriteCounts, WriteLaw,
+    is_driven,
 };
 use super::layout::{BLOCK_CELLS, HALF_CELLS, HALF_COLUMNS, PANEL_COLUMNS};
 use super::optimise::Asks;
@@ -70,8 +71,8 @@ impl StripMut<'_> {
     /// whatever their words. A remainder alone is less than a pulse.
     pub fn write(&mut self, kernel: &Kernel, request: &WriteRequest<'_>, gates: &[i8]) -> Written {
         let turned = match request.met {
-            Met::Turned(turned) => turned,
-            Met::Windows { .. } => {
+            Met::Turned(turned) if self.own.is_none() => turned,
+            _ => {
                 return self.write_formed(kernel, request, (gates, Form::PLAIN), Asks::Narrow);
             }
         };
@@ -190,7 +191,30 @@ impl StripMut<'_> {
             residual: self.residual.as_deref_mut().map(|plane| half_mut(plane, at)),
             pruned: self.pruned.as_deref_mut().map(|plane| half_mut(plane, at)),
             pulses: None,
+            answering: None,
         }
+    }
+
+    /// What cells of a half block answer to pulses with, if they are not ideal.
+    pub(super) fn answering<'w>(
+        &self,
+        half: usize,
+        block: usize,
+        words: Option<&'w mut Answers>,
+    ) -> Option<Answering<'w>>
+    where
+        Self: 'w,
+    {
+        let (own, words) = (self.own?, words?);
+        let panel = (self.first + half / 2) * self.layout.panel_cells();
+        let made = own.half(panel + block * BLOCK_CELLS + half % 2 * HALF_CELLS);
+        let column = self.first * PANEL_COLUMNS + half * HALF_COLUMNS;
+        Some(Answering { made, words, at: (column, block) })
+    }
+
+    /// Where words of pulses come from, if cells are not ideal.
+    pub(super) fn answers(&self, place: Place) -> Option<Box<Answers>> {
+        self.own.map(|_| Box::new(Answers::new(place, self.layout.rows)))
     }
 }
 

@@ -190,7 +190,7 @@ impl<'a> Reader<'a> {
             slices: hardware.slices() as usize,
             greatest: Greatest {
                 // a low byte of more than 8 bits can be anything
-                level: u8::try_from(hardware.cell.window.ceiling()).unwrap_or(u8::MAX),
+                level: u8::try_from(hardware.level_greatest()).unwrap_or(u8::MAX),
                 code: if tiles == Tiles::Whole {
                     code_max
                 } else {
@@ -477,7 +477,7 @@ fn bound(
     pairs: usize,
     converters: Option<&(Vec<Converter>, Subtract)>,
 ) -> Option<u128> {
-    let ceiling = u128::from(hardware.cell.window.ceiling());
+    let ceiling = u128::from(hardware.level_greatest());
     // of codes of both phases one is taken off the other
     let (rows, pairs) = (layer.layout.rows, (pairs * layer.spec.driven_by.phases()) as u128);
     let current = |rows: usize, code: u32| rows as u128 * ceiling * u128::from(code);

@@ -87,7 +87,8 @@ impl Engine {
                 .zip(gates)
                 .map(|(slots, u)| ColumnTrain { slots, rises: (u > 0) == excites })
                 .collect();
-            let counts = self.layers[layer].arrays[at].coincide(&rows, &columns);
+            let written = place(Site::RowTrain);
+            let counts = self.layers[layer].arrays[at].coincide(&rows, &columns, written);
             // a row is pulsed in both phases, in every column of tiles
             let pulses: u64 = rows.iter().map(|train| u64::from(train.count_ones())).sum();
             fired[pathway.target.index()] += 2 * across * pulses;

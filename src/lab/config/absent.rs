@@ -6,6 +6,7 @@
 use serde::Serialize;
 
 use super::Config;
+use crate::chip::device::{CellSpread, PulseNoise};
 
 /// Which chips have an effect.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -116,6 +117,14 @@ impl Config {
         let has = |effect: &&Effect| match (effect.of, effect.key) {
             // a floor above 0 is a lowest level that conducts
             (_, "on_off") => self.hardware.cell.window.floor() == 0,
+            (_, "write_nonlinearity") => self.hardware.device.is_none(),
+            (_, "cycle_to_cycle") => {
+                self.hardware.device.as_ref().is_none_or(|of| of.noise == PulseNoise::Off)
+            }
+            (_, "device_to_device") => {
+                let device = self.hardware.device.as_ref();
+                device.is_none_or(|of| of.spread == CellSpread::default())
+            }
             (Substrate::Any, _) => true,
             (Substrate::Electronic, _) => !optical,
             (Substrate::Optical, _) => optical,
@@ -178,6 +187,17 @@ mod tests {
         let own = find(&all, "ageing").unwrap();
         assert_eq!((&*own.text(), own.real), ("3 % a year", None));
         assert!(absent_words(&all).starts_with(&format!("{} effects", all.len())));
+    }
+
+    #[test]
+    fn a_device_is_not_said_to_be_absent() {
+        let curved = absent(None, &["hw.device.response.curve=soft_bounds"]);
+        assert!(find(&curved, "write_nonlinearity").is_none());
+        assert!(find(&curved, "cycle_to_cycle").is_some());
+        let both = ["hw.device.response.noise=0.1", "hw.device.spread.step=0.2"];
+        let noisy = absent(None, &both);
+        assert!(find(&noisy, "cycle_to_cycle").is_none());
+        assert!(find(&noisy, "device_to_device").is_none());
     }
 
     #[test]

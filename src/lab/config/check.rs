@@ -373,6 +373,7 @@ fn mantissas(
                 drive_bits: hardware.drive.bits,
                 full_drive,
             },
+            window: hardware.pulses_of_window(),
         });
     learning::mantissas(file, &asked.collect::<Vec<_>>())
 }

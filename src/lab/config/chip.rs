@@ -1,11 +1,11 @@
 //! From the keys of a chip to checked numbers: defaults, ranges, and what fits with what.
 
-use super::ConfigError;
 use super::check::{between, range, word, wrong};
 use super::file::{
     AdcFile, AdcTable, CellFile, DriveFile, ErrorFile, HardwareFile, LutFile, RangeFile, TileFile,
     TimingFile, WriteFile,
 };
+use super::{ConfigError, device};
 use crate::chip::hardware::timing::CYCLES_MAX;
 use crate::chip::hardware::{
     Adc, AdcRange, CellSpec, ConverterKind, DigitalSpec, DitherBits, DitherPattern, DriveSpec,
@@ -103,6 +103,7 @@ pub(super) fn resolve(file: &mut HardwareFile, prefix: &str) -> Result<Hardware,
     let residual_bits = range(&key("write.residual_bits"), ResidualBits::new(bits))?;
 
     let scheme = scheme(write, &key, increments)?;
+    let device = device::resolve(file.device.as_ref(), window, &key)?;
     let slices = Slices { mode, converter, count: drive_bits.get().div_ceil(dac_bits), dac_bits };
     let timing = file.timing.as_mut().map(|table| timing(table, &slices, &key)).transpose()?;
     let spec = HardwareSpec {
@@ -112,6 +113,7 @@ pub(super) fn resolve(file: &mut HardwareFile, prefix: &str) -> Result<Hardware,
         adc,
         digital: DigitalSpec { lut_bits, error_bits },
         write: WriteSpec { increment_max, dither_bits, dither_pattern, residual_bits, scheme },
+        device,
         timing,
     };
     Hardware::new(spec)

@@ -12,7 +12,7 @@
 use super::changed::UnderModel;
 use super::defaults::FOLLOWING;
 use super::file::ExperimentFile;
-use super::hardware::{model_file, model_names, model_text};
+use super::hardware::{is_builtin, model_file, model_text};
 use super::{Config, check, keys, layers};
 
 /// Longest part of a name that says differences.
@@ -90,7 +90,7 @@ impl Config {
         layers::overlay(&mut table, layers::setting("learning.rule", rule));
         let hw = match &self.model {
             Some(model) => model.clone(),
-            None if model_names().contains(&self.model_name()) => {
+            None if is_builtin(self.model_name()) => {
                 let text = model_text(self.model_name()).ok()?;
                 model_file(self.model_name(), &text).ok()?;
                 toml::from_str(&text).ok()?

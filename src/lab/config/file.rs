@@ -6,6 +6,7 @@ use std::fmt;
 use serde::de::{self, Deserializer, MapAccess, Visitor};
 use serde::{Deserialize, Serialize};
 
+use super::device::DeviceFile;
 use super::law::{ScalesFile, Settings};
 use super::quantity::{AreaKey, EnergyKey, PowerKey};
 
@@ -58,7 +59,7 @@ macro_rules! keys {
 
         impl $name {
             /// Each key and what it means.
-            pub(super) const MEANINGS: &'static [(&'static str, &'static str)] =
+            pub(in crate::lab::config) const MEANINGS: &'static [(&'static str, &'static str)] =
                 &[$($(#[cfg($when)])? (stringify!($field), concat!($($meaning),*)),)*];
         }
     )*};
@@ -312,6 +313,8 @@ keys! {
         error: ErrorFile,
         /// Programming.
         write: WriteFile,
+        /// What real cells and converters do that ideal ones do not.
+        device: DeviceFile,
         /// Cycles of what a tile does; without it no cycles are counted.
         timing: TimingFile,
         /// Joules of an event, by quantity and unit.

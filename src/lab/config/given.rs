@@ -7,6 +7,7 @@
 
 use super::{Config, ConfigError, Select, TrainOn};
 use crate::chip::crossbar::kernel::ConvShape;
+use crate::chip::device::{CellSpread, DeviceSpec, PulseNoise};
 use crate::chip::hardware::{
     Adc, AdcRange, CellSpec, DigitalSpec, DitherBits, DitherPattern, DriveSpec, FloorKind,
     HardwareSpec, PulseCode, Subtract, TileSpec, Timing, WriteScheme, WriteSpec,
@@ -16,7 +17,7 @@ use crate::learn::error::{Centre, OutputError};
 use crate::learn::network::NetworkSpec;
 use crate::learn::route::Route;
 use crate::learn::rule::{Control, Rule, UpdateMode};
-use crate::num::tables::{Activation, Decay};
+use crate::num::tables::{Activation, Decay, SpreadLaw};
 use crate::task::classify::{Augment, Coding, Experiment, WHITE_NAME};
 use crate::task::policy::{Evaluating, Evolution, InputCoding, Method, PolicyExperiment, Ppo};
 
@@ -414,8 +415,36 @@ impl List {
         put("homeostasis_window_log2", window_log2);
     }
 
+    fn device(&mut self, device: &DeviceSpec) {
+        let DeviceSpec { response, states, asymmetry, noise, spread } = device;
+        let CellSpread { step_law, step, asymmetry: lean, ceiling, floor } = spread;
+        // millionths, as integers
+        let numbers: Vec<_> = response.numbers().iter().map(|n| n.0.to_string()).collect();
+        let response = format!("{} {}", response.name(), numbers.join(" "));
+        self.put("device.response", response);
+        self.put("device.states", states);
+        self.put("device.asymmetry", asymmetry.0);
+        let noise = match *noise {
+            PulseNoise::Off => "off".into(),
+            PulseNoise::OfStep(share) => format!("of_step {}", share.0),
+            PulseNoise::OfWindow(share) => format!("of_window {}", share.0),
+        };
+        self.put("device.noise", noise);
+        let law = match step_law {
+            SpreadLaw::Normal => "normal",
+            SpreadLaw::LogNormal => "log_normal",
+        };
+        if step.0 != 0 {
+            self.put("device.spread.step_law", law);
+        }
+        self.put("device.spread.step", step.0);
+        self.put("device.spread.asymmetry", lean.0);
+        self.put("device.spread.ceiling", ceiling.0);
+        self.put("device.spread.floor", floor.0);
+    }
+
     fn chip(&mut self, hardware: &HardwareSpec) {
-        let HardwareSpec { cell, tile, drive, adc, digital, write, timing } = hardware;
+        let HardwareSpec { cell, tile, drive, adc, digital, write, device, timing } = hardware;
         let CellSpec { level_bits, window, floor_kind } = cell;
         let TileSpec { rows, columns, count_max, transposed_read } = tile;
         let DriveSpec { bits: drive_bits, dac_bits } = drive;
@@ -474,6 +503,9 @@ impl List {
             WriteScheme::Trains { slots_log2 } => format!("rank1 {slots_log2}"),
         };
         self.put("write.scheme", scheme);
+        if let Some(device) = device {
+            self.device(device);
+        }
         if let Some(timing) = *timing {
             self.timing(timing);
         }

@@ -9,12 +9,20 @@ use crate::lab::near;
 
 /// The built-in models, by name, as their files are.
 macro_rules! models {
-    ($($name:literal)*) => {
-        [$(($name, include_str!(concat!("../../../hw_models/", $name, ".toml"))),)*]
+    ($folder:literal: $($name:literal)*) => {
+        [$(($name, include_str!(concat!("../../../hw_models/", $folder, $name, ".toml"))),)*]
     };
 }
 const BUILTIN: [(&str, &str); 13] = models!(
-    "ideal" "prime" "isaac" "reram" "pcm14" "ecram" "fefet" "sram" "neurram" "hermes" "mrr" "photonic_pcm" "mzi"
+    "": "ideal" "prime" "isaac" "reram" "pcm14" "ecram" "fefet" "sram" "neurram" "hermes" "mrr" "photonic_pcm" "mzi"
+);
+
+/// Devices that others have published, on the periphery of the ideal chip: not all of them learn by default, which is what they
+/// are there to show.
+const DEVICES: [(&str, &str); 18] = models!(
+    "devices/": "ag_asi" "taox_tiox" "taox_hfox" "pcmo" "alox_hfo2" "gst_pcm" "epiram" "hzo_fefet" "neurosim_ideal"
+    "aihwkit_reram_es" "aihwkit_reram_sb" "aihwkit_reram_array_om" "aihwkit_reram_array_hfo2" "aihwkit_capacitor"
+    "aihwkit_ecram_li" "aihwkit_ecram_mo" "aihwkit_gokmen_vlasov" "aihwkit_idealized"
 );
 
 /// A checked hardware model.
@@ -44,6 +52,27 @@ pub fn model_names() -> Vec<&'static str> {
     BUILTIN.iter().map(|(name, _)| *name).collect()
 }
 
+/// Names of published devices, each a model of its own.
+#[must_use]
+pub fn device_names() -> Vec<&'static str> {
+    DEVICES.iter().map(|(name, _)| *name).collect()
+}
+
+/// Whether a name is one of this program's.
+pub(super) fn is_builtin(name: &str) -> bool {
+    BUILTIN.iter().chain(&DEVICES).any(|(builtin, _)| *builtin == name)
+}
+
+/// Models of published devices.
+///
+/// # Panics
+/// When one of our own files is wrong: a test reads them all.
+#[must_use]
+pub fn builtin_devices() -> Vec<Model> {
+    let load = |(name, _): &(&str, &str)| load_model(name).expect("built-in models are valid");
+    DEVICES.iter().map(load).collect()
+}
+
 /// The built-in models.
 ///
 /// # Panics
@@ -56,11 +85,12 @@ pub fn builtin_models() -> Vec<Model> {
 
 /// Text of a model: a built-in name, or the path of a file.
 pub(super) fn model_text(name: &str) -> Result<String, ConfigError> {
-    if let Some((_, text)) = BUILTIN.iter().find(|(builtin, _)| *builtin == name) {
+    if let Some((_, text)) = BUILTIN.iter().chain(&DEVICES).find(|(builtin, _)| *builtin == name) {
         return Ok((*text).to_owned());
     }
-    let near = near::hint(name, model_names());
-    let hint = format!("built-in models are {}{near}", model_names().join(", "));
+    let near = near::hint(name, model_names().into_iter().chain(device_names()));
+    let (models, devices) = (model_names().join(", "), device_names().join(", "));
+    let hint = format!("built-in models are {models}, devices {devices}{near}");
     #[expect(clippy::disallowed_methods, reason = "models live in files")]
     std::fs::read_to_string(name).map_err(|error| ConfigError::Unreadable {
         path: name.into(),
@@ -128,6 +158,13 @@ fn provenance(file: &HardwareFile) -> Vec<(&'static str, Option<&str>, Option<&s
         )*};
     }
     table!(cell tile drive lut error write timing);
+    let device = file.device.as_ref();
+    if let Some(table) = device.and_then(|device| device.response.as_ref()) {
+        all.push(("device.response", table.source.as_deref(), table.kind.as_deref()));
+    }
+    if let Some(table) = device.and_then(|device| device.spread.as_ref()) {
+        all.push(("device.spread", table.source.as_deref(), table.kind.as_deref()));
+    }
     if let Some(super::file::AdcFile::Finite(table)) = &file.adc {
         all.push(("adc", table.source.as_deref(), table.kind.as_deref()));
     }
@@ -164,7 +201,10 @@ mod tests {
     fn the_built_in_models_are_valid_and_named_like_their_files() {
         let models = builtin_models();
         assert!(models.iter().map(|model| model.name.as_str()).eq(model_names()));
-        for model in models {
+        let devices = builtin_devices();
+        assert!(devices.iter().map(|model| model.name.as_str()).eq(device_names()));
+        assert!(devices.iter().all(|model| model.hardware.device.is_some()));
+        for model in models.into_iter().chain(devices) {
             assert!(!model.summary.is_empty() && model.hardware.timing.is_some(), "{}", model.name);
             assert_eq!(model.constants.complaints(), [""; 0], "{}", model.name);
         }

@@ -132,7 +132,7 @@ pub fn anchor(table: &mut toml::Table, folder: &Path) {
         model => model,
     };
     if let Some(toml::Value::String(model)) = model
-        && !hardware::model_names().contains(&&**model)
+        && !hardware::is_builtin(model)
     {
         *model = folder.join(&*model).display().to_string();
     }

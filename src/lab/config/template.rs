@@ -18,10 +18,18 @@ pub fn template(name: &str) -> String {
     );
     let tables = tables().filter(|table| table.file == KeyFileKind::Hardware);
     for table in tables.filter(|table| !["", "energy.*"].contains(&table.path)) {
-        text += &format!("\n# {}\n[{}]\n", table.about, table.path);
-        text += &keys_of(table);
-        text += "source = \"replace: where the numbers of this table are from\"\n";
-        text += "kind = \"assumed\"                  # measured, fitted or assumed\n";
+        if table.path == "device" {
+            continue;
+        }
+        let mut part = format!("[{}]\n{}", table.path, keys_of(table));
+        part += "source = \"replace: where the numbers of this table are from\"\n";
+        part += "kind = \"assumed\"                  # measured, fitted or assumed\n";
+        // cells are ideal until somebody says what they do
+        if table.path.starts_with("device.") {
+            let lines = part.lines().map(|line| format!("# {}\n", line.trim_start_matches("# ")));
+            part = lines.collect();
+        }
+        text += &format!("\n# {}\n{part}", table.about);
     }
     text += &numbers();
     text += "\n# Figures of this chip for what this program does not simulate (dalean hw show lists it): they stand beside every result.\n\
@@ -135,6 +143,14 @@ fn complete(hw: &mut HardwareFile, settings: &[String]) {
         )*};
     }
     tables!(cell tile drive lut error write timing);
+    if let Some(device) = &mut hw.device {
+        if let Some(table) = &mut device.response {
+            settle("device.response", &mut table.source, &mut table.kind);
+        }
+        if let Some(table) = &mut device.spread {
+            settle("device.spread", &mut table.source, &mut table.kind);
+        }
+    }
     if let Some(AdcFile::Finite(table)) = &mut hw.adc {
         settle("adc", &mut table.source, &mut table.kind);
     }
@@ -163,7 +179,10 @@ mod tests {
         assert_eq!(config.hardware_name, "mychip");
         assert!(config.hardware.timing.is_some() && config.constants.iter().count() > 10);
         let tables = tables().filter(|table| table.file == KeyFileKind::Hardware);
-        for key in tables.filter(|t| !["", "energy.*"].contains(&t.path)).flat_map(KeyTable::keys) {
+        for key in tables
+            .filter(|t| !["", "energy.*", "device"].contains(&t.path))
+            .flat_map(KeyTable::keys)
+        {
             assert!(text.contains(&format!("{} =", key.entry.name)), "{}", key.full());
         }
     }

@@ -60,7 +60,7 @@ pub fn changes(run: &Hardware, other: &Hardware) -> Vec<Change> {
         }
     };
     // without `..`: what a chip gets is a difference here or does not compile
-    let HardwareSpec { cell, tile, drive, adc, digital, write, timing } = &**run;
+    let HardwareSpec { cell, tile, drive, adc, digital, write, device, timing } = &**run;
     let CellSpec { level_bits, window, floor_kind } = cell;
     let TileSpec { rows, columns, count_max: _, transposed_read: _ } = tile;
     let DriveSpec { bits: drive_bits, dac_bits: _ } = drive;
@@ -86,6 +86,7 @@ pub fn changes(run: &Hardware, other: &Hardware) -> Vec<Change> {
     let remainders = *residual_bits != other.write.residual_bits;
     differ("write.residual_bits", remainders, REMAINDERS, true);
     differ("write.scheme", *scheme != other.write.scheme, SCHEME, true);
+    differ("device", *device != other.device, LEARNT, true);
 
     match (*timing, other.timing) {
         (None, None) => {}

@@ -5,6 +5,7 @@
 //! pulses    k* = -log2( rate )                                             L = 2^level_bits / weight_max
 //! requests  k* = 12 - log2( rate L / m )
 //! k(t)      = min( nearest( k* - log2 f(t) ), 30 );   f = 1,  (1 + cos(pi t / T)) / 2  or  1 - t / T
+//!           of a device, L = states 2^level_bits / ((ceiling - floor) weight_max): pulses, not levels
 //! levels    2^14 - c(t),  c = floor( 256 (log2(cells) / 2 + log2 rho) + 1/2 ),  rho = rate f(t) L / sqrt(fan_in)
 //! ```
 //!
@@ -66,6 +67,8 @@ pub struct Rate {
     pub activation: Activation,
     /// The layer's accumulator unit.
     pub unit: Unit,
+    /// Pulses across the window and the levels of it, of cells that a pulse does not move by a level.
+    pub window: Option<[u32; 2]>,
 }
 
 /// Greatest shift of a rate.
@@ -74,9 +77,11 @@ pub const SHIFT_MAX: u32 = 30;
 pub const LEVELS_SHIFT_MAX: u32 = 1 << 15;
 
 impl Rate {
-    /// Levels in a weight of 1.
-    fn levels(self) -> f64 {
-        libm::exp2(f64::from(self.unit.level_bits.get()))
+    /// Pulses in a weight of 1: levels of ideal cells.
+    fn pulses(self) -> f64 {
+        let [pulses, levels] = self.window.unwrap_or([1, 1]).map(f64::from);
+        // the factor is 1 and exact where a pulse is a level
+        pulses / levels * libm::exp2(f64::from(self.unit.level_bits.get()))
             / libm::exp2(f64::from(self.unit.weight_max_log2))
     }
 
@@ -94,12 +99,12 @@ impl Rate {
             RateOf::Levels { fan_in, cells } => {
                 #[expect(clippy::cast_precision_loss, reason = "sizes of arrays, below 2^40")]
                 let [fan_in, cells] = [fan_in, cells].map(|count| libm::log2(count as f64));
-                let rho = libm::log2(self.rate.0 * self.levels()) - 0.5 * fan_in;
+                let rho = libm::log2(self.rate.0 * self.pulses()) - 0.5 * fan_in;
                 return 64.0 - (0.5 * cells + rho);
             }
             RateOf::Requests => {
                 let mantissa = f64::from(self.mantissa.get());
-                return 12.0 - libm::log2(self.rate.0 / mantissa * self.levels());
+                return 12.0 - libm::log2(self.rate.0 / mantissa * self.pulses());
             }
         }
         let rail = f64::from((1u32 << (self.error_bits.get() - 1)) - 1);
@@ -107,7 +112,7 @@ impl Rate {
         let scale = libm::exp2(f64::from(self.error_bits.get()))
             / (codes * rail * 255.0 * self.activation.steepness());
         let samples = self.reads() * f64::from(self.mantissa.get());
-        -libm::log2(self.rate.0 / samples * scale * self.levels())
+        -libm::log2(self.rate.0 / samples * scale * self.pulses())
     }
 
     /// `k` before any decay: the integer nearest to the exact shift.
@@ -155,7 +160,7 @@ impl Rate {
             RateOf::Levels { .. } => return Ok(self.rate),
             RateOf::Requests => {
                 let mantissa = f64::from(self.mantissa.get());
-                return Ok(Positive(libm::exp2(12.0 - f64::from(k)) * mantissa / self.levels()));
+                return Ok(Positive(libm::exp2(12.0 - f64::from(k)) * mantissa / self.pulses()));
             }
         }
         let rail = f64::from((1u32 << (self.error_bits.get() - 1)) - 1);
@@ -243,6 +248,7 @@ mod tests {
                 drive_bits: DriveBits::new(8).unwrap(),
                 full_drive: FullDrive::One,
             },
+            window: None,
         }
     }
 

@@ -144,6 +144,7 @@ mod tests {
             activation: sigmoid,
             unit: unit(2, 8, 8, full_drive),
             of: RateOf::Sums,
+            window: None,
         };
         let (one, normalised) = (rate(FullDrive::One), rate(FullDrive::Normalised));
         assert_eq!(one.shift().unwrap(), normalised.shift().unwrap() + 3);

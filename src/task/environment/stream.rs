@@ -201,11 +201,11 @@ impl ShownStream {
                 at.values += shown.len();
                 outcomes.next.values.extend(shown.iter().map(|&value| Real::from_bits(value)));
             }
-            Shown::Sparse { .. } => {
+            Shown::Sparse { lines: all, .. } => {
                 let counts = self.line_counts.get(at.environments..)?.get(..count)?;
                 at.environments += count;
                 for &on in counts {
-                    let lines = self.lines.get(at.lines..)?.get(..on as usize)?;
+                    let lines = taken(&self.lines, at.lines, on, all)?;
                     at.lines += lines.len();
                     outcomes.next.active.extend_from_slice(lines);
                     outcomes.next.ends.push(outcomes.next.active.len());
@@ -243,10 +243,10 @@ impl ShownStream {
                     outcomes.reached.active.extend_from_slice(lines);
                     outcomes.reached.ends.push(outcomes.reached.active.len());
                 }
-                (Shown::Sparse { .. }, _) => {
+                (Shown::Sparse { lines: all, .. }, _) => {
                     let on = *self.reached_line_counts.get(at.reached)?;
                     at.reached += 1;
-                    let lines = self.reached_lines.get(at.reached_lines..)?.get(..on as usize)?;
+                    let lines = taken(&self.reached_lines, at.reached_lines, on, all)?;
                     at.reached_lines += lines.len();
                     outcomes.reached.active.extend_from_slice(lines);
                     outcomes.reached.ends.push(outcomes.reached.active.len());
@@ -255,6 +255,12 @@ impl ShownStream {
         }
         Some(())
     }
+}
+
+/// So many lines from a place on, if there are as many and each is one of `all`.
+fn taken(lines: &[u32], from: usize, count: u32, all: usize) -> Option<&[u32]> {
+    let lines = lines.get(from..)?.get(..count as usize)?;
+    lines.iter().all(|&line| (line as usize) < all).then_some(lines)
 }
 
 impl Record {
@@ -417,5 +423,39 @@ impl State for ReplayedEnv {
             let _ = visitor.numbers(&piece, &numbers)?;
         }
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What a record of two environments that are shown as lines gives, after a change of it: whether it begins, and whether it
+    /// has a step.
+    fn replayed(change: fn(&mut ShownStream)) -> (bool, bool) {
+        let (id, count) = ("Foray-v0", 2);
+        let record = Arc::default();
+        let source = EnvSource::Recorded(Arc::clone(&record));
+        let mut environments = source.make(id, 1, count, Purpose::Training).unwrap();
+        let (mut shown, mut outcomes) = (Observations::default(), Outcomes::default());
+        environments.reset(&mut shown);
+        environments.step(Actions::Discrete(&[0, 1]), &mut outcomes).unwrap();
+        let mut kept = Record::take(&record, &mut *environments);
+        change(&mut kept.training);
+        let replaying = Arc::<Mutex<Replaying>>::default();
+        lock(&replaying).begin(kept);
+        let source = EnvSource::Replayed(replaying);
+        let mut again = source.make(id, 1, count, Purpose::Training).unwrap();
+        let mut same = Observations::default();
+        again.reset(&mut same);
+        let stepped = again.step(Actions::Discrete(&[0, 1]), &mut outcomes);
+        (same == shown, stepped.is_ok())
+    }
+
+    #[test]
+    fn a_line_that_does_not_exist_is_no_line_of_a_record() {
+        assert_eq!(replayed(|_| {}), (true, true));
+        assert_eq!(replayed(|stream| stream.lines[0] = 190), (false, false));
+        assert_eq!(replayed(|stream| *stream.lines.last_mut().unwrap() = u32::MAX), (true, false));
     }
 }

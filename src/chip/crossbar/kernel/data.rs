@@ -2,6 +2,7 @@
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
 use super::chacha::Draws;
+use super::respond::Answering;
 use crate::chip::crossbar::layout::{BLOCK_ROWS, HALF_CELLS, PANEL_COLUMNS};
 
 /// Sums, or levels, of a half block. Sums lie row-major, `[64 rows][16 columns]`; levels, residuals
@@ -262,6 +263,8 @@ pub struct Cells<'a> {
     pub pruned: Option<&'a mut Half<u8>>,
     /// Where bounded pulses go, if they are wanted. Groups that are passed over put nothing there.
     pub pulses: Option<Pulsed<'a>>,
+    /// What cells answer to pulses with, if they are not ideal.
+    pub answering: Option<Answering<'a>>,
 }
 
 impl Cells<'_> {

@@ -214,6 +214,7 @@ fn programmed<'a>(
     [wide, absorbs]: [bool; 2],
 ) -> State {
     let cells = Cells {
+        answering: None,
         low: &mut state.low,
         high: wide.then_some(&mut state.high),
         residual: (write.residual_bits > 0).then_some(&mut state.residual),

@@ -12,6 +12,7 @@
 mod balance;
 mod command;
 mod config;
+mod device;
 mod events;
 mod network;
 mod optimise;
@@ -24,6 +25,7 @@ pub use balance::TileBalance;
 use balance::TileReadings;
 pub use command::Command;
 pub use config::{More, Squares, TileAdc, TileConfig, TileSize, TileUnits};
+pub(super) use device::{TileDevice, laws};
 pub use events::{BankEvents, TileEvents};
 use optimise::Kept;
 pub(super) use optimise::Said;
@@ -205,6 +207,8 @@ pub struct Tile {
     looked_up: bool,
     /// What lanes of units that keep to a middle have added up.
     readings: TileReadings,
+    /// What cells are made of, if they are not ideal.
+    device: Option<Box<TileDevice>>,
 }
 
 impl Tile {
@@ -258,6 +262,7 @@ impl Tile {
             trained: [vec![false; cells], vec![false; cells]],
             looked_up: false,
             readings: TileReadings::default(),
+            device: None,
             size,
             config,
             table,

@@ -2,6 +2,7 @@
 
 use super::KeyFileKind::Hardware;
 use super::{KeyEntry, KeyTable, KeyValues, flag, key, other, real, whole, words};
+use crate::lab::config::device::{DeviceFile, ResponseFile, SpreadFile};
 use crate::lab::config::file::{
     AdcTable, CellFile, DriveFile, ErrorFile, HardwareFile, LutFile, NumberFile, TileFile,
     TimingFile, WriteFile,
@@ -30,6 +31,24 @@ pub(super) const TABLES: &[KeyTable] = &[
     table("lut", "The table of the activation and its slope.", LutFile::MEANINGS, LUT),
     table("error", "The error bus.", ErrorFile::MEANINGS, ERROR),
     table("write", "How sums become pulses.", WriteFile::MEANINGS, WRITE),
+    table(
+        "device",
+        "What real cells and converters do that ideal ones do not; without a table of it, nothing of the kind.",
+        DeviceFile::MEANINGS,
+        DEVICE,
+    ),
+    table(
+        "device.response",
+        "What a pulse does to a cell: a curve of steps, and noise. What is not said makes every step the mean one.",
+        ResponseFile::MEANINGS,
+        RESPONSE,
+    ),
+    table(
+        "device.spread",
+        "How cells of the device differ, each for good; drawn by the seed of a run.",
+        SpreadFile::MEANINGS,
+        SPREAD,
+    ),
     table(
         "timing",
         "Cycles of what a tile does, in the words of docs/TILE.md; without it no cycles are counted.",
@@ -68,6 +87,7 @@ const ROOT: &[KeyEntry] = &[
     other("lut", "a table"),
     other("error", "a table"),
     other("write", "a table"),
+    other("device", "a table").otherwise("cells and reads are ideal"),
     other("timing", "a table").otherwise("no cycles are counted"),
     other("energy", "a table of physical numbers").otherwise("no energy is reckoned"),
     other("power", "a table of physical numbers"),
@@ -241,6 +261,81 @@ const WRITE: &[KeyEntry] = &[
         .default("4")
         .otherwise("the greatest power of two up to write.increment_max, at most 32")
         .only("with write.scheme = \"rank1\"", &["hw.write.scheme=rank1", "learning.mode=replay"]),
+    PROVENANCE[0],
+    PROVENANCE[1],
+];
+
+const DEVICE: &[KeyEntry] = &[
+    other("response", "a table").otherwise("a pulse moves a cell by one level"),
+    other("spread", "a table").otherwise("cells are alike"),
+];
+
+const LINES: &[&str] = &["hw.device.response.curve=linear"];
+const EXPONENTIAL: &[&str] = &["hw.device.response.curve=exponential"];
+
+const RESPONSE: &[KeyEntry] = &[
+    words(
+        "curve",
+        &[
+            ("linear", "a straight line from `up[0]` and `down[0]` at the floor to the second at the ceiling"),
+            ("soft_bounds", "steps shrink in proportion to what is left of the window"),
+            ("exponential", "1 - amplitude exp(growth z) mean steps, where that is above 0"),
+            ("neurosim", "the curves of MLP+NeuroSim, by their nonlinearity labels"),
+            ("measured", "straight lines between given points"),
+        ],
+    )
+    .otherwise("linear"),
+    whole("states", 1, 65_536).unit("pulses").otherwise("as many as the window has levels"),
+    other("up", "a list of one or two numbers, 0 to 1000")
+        .unit("mean steps")
+        .otherwise("[1, 1], of soft_bounds [2]")
+        .only("with curve = \"linear\" or \"soft_bounds\"", LINES),
+    other("down", "a list of one or two numbers, 0 to 1000")
+        .unit("mean steps")
+        .otherwise("[1, 1], of soft_bounds [2]")
+        .only("with curve = \"linear\" or \"soft_bounds\"", LINES),
+    other("amplitude", "a list of two numbers, -1000 to 1000")
+        .otherwise("[0, 0]")
+        .only("with curve = \"exponential\"", EXPONENTIAL),
+    other("growth", "a list of two numbers, -100 to 100")
+        .otherwise("[1, 1]")
+        .only("with curve = \"exponential\"", EXPONENTIAL),
+    other("z", "a list of two numbers, -5 to 5")
+        .otherwise("[0, 1]")
+        .only("with curve = \"exponential\"", EXPONENTIAL),
+    other("labels", "a list of two numbers, -9 to 9")
+        .otherwise("[0, 0]")
+        .only("with curve = \"neurosim\"", &["hw.device.response.curve=neurosim"]),
+    other("points", "rows of three numbers: 0 to 1 and rising, and two steps")
+        .unit("windows")
+        .otherwise("the mean step at both ends")
+        .only("with curve = \"measured\"", &["hw.device.response.curve=measured"]),
+    other("asymmetry", "a number between -1 and 1").otherwise("0"),
+    real("noise", 1e-6, 100.0).law("at most 1 of the window").otherwise("none"),
+    words(
+        "noise_of",
+        &[("step", "of the cell's own step there"), ("window", "of the chip's window")],
+    )
+    .otherwise("step")
+    .only("with device.response.noise", &["hw.device.response.noise=0.5"]),
+    PROVENANCE[0],
+    PROVENANCE[1],
+];
+
+const SPREAD: &[KeyEntry] = &[
+    real("step", 1e-6, 2.0).otherwise("none"),
+    words(
+        "step_law",
+        &[
+            ("normal", "1 + deviation x Gaussian, 0 where that is below"),
+            ("log_normal", "exp(deviation x Gaussian)"),
+        ],
+    )
+    .otherwise("normal")
+    .only("with device.spread.step", &["hw.device.spread.step=0.1"]),
+    real("asymmetry", 1e-6, 1.0).otherwise("none"),
+    real("ceiling", 1e-6, 1.0).unit("windows").otherwise("none"),
+    real("floor", 1e-6, 1.0).unit("windows").otherwise("none"),
     PROVENANCE[0],
     PROVENANCE[1],
 ];

@@ -80,7 +80,7 @@ fn sums(network: &NetworkSpec, hardware: &Hardware, at: usize, layer: &LayerSpec
     let pairs = layer.wiring.pairs(Stream::P).len() as u128;
     let exact = pairs
         * rows
-        * u128::from(hardware.cell.window.ceiling())
+        * u128::from(hardware.level_greatest())
         * u128::from(hardware.drive.bits.code_max());
     // a code rounds to no more than twice the current it stands for
     let most = if hardware.adc == Adc::Ideal { exact } else { 2 * exact };

@@ -115,6 +115,7 @@ proptest! {
         let run = |kernel: &Kernel| {
             let mut state = fresh.clone();
             let cells = Cells {
+                answering: None,
                 low: &mut state.low,
                 high: wide.then_some(&mut state.high),
                 residual: (write.residual_bits > 0).then_some(&mut state.residual),

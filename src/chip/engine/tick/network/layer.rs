@@ -159,6 +159,7 @@ impl TickLayer {
                 }
             }
         }
+        this.fit(hardware);
         this.load_state(layer);
         this.load_words(layer);
         this
@@ -474,6 +475,7 @@ impl TickLayer {
         }
         for tile in 0..self.tiles.len() {
             let command = command.filter(|command| self.concerns(command, tile));
+            self.tiles[tile].set_writes(self.writes);
             if let Some(slot) = self.tiles[tile].slot_ends() {
                 for bank in 0..2 {
                     let (rows, columns) = self.firing(tile, bank, slot);

@@ -16,7 +16,7 @@ impl Tile {
         level: u16,
     ) {
         let at = self.place(row, column);
-        self.level[bank][at] = level;
+        self.level[bank][at] = self.taken(bank, at, level);
     }
 
     pub(in super::super) fn restore(

@@ -78,10 +78,11 @@ impl Tile {
 
     /// With an absorbing floor, cells that were pulsed and lie on it stay there.
     fn settle_floor(&mut self) {
+        self.forget_pulses(0..self.trained[0].len());
         for bank in 0..2 {
             for at in 0..self.trained[bank].len() {
                 let pulsed = std::mem::take(&mut self.trained[bank][at]);
-                let rests = self.level[bank][at] == self.config.floor;
+                let rests = i64::from(self.level[bank][at]) == self.ends(bank, at)[0];
                 self.pruned[bank][at] |= self.config.absorbing && pulsed && rests;
             }
         }

@@ -304,9 +304,11 @@ impl Tile {
             let rest = (1 << fraction) - 1;
             let wanted = level + pulses;
             let left = sum - (pulses << fraction);
-            self.residual[bank][at] = if wanted < i64::from(self.config.floor) {
+            // of cells that are not ideal the last pulse says
+            let ideal = self.device.is_none();
+            self.residual[bank][at] = if ideal && wanted < i64::from(self.config.floor) {
                 0
-            } else if wanted > i64::from(self.config.ceiling) {
+            } else if ideal && wanted > i64::from(self.config.ceiling) {
                 rest
             } else {
                 left.clamp(0, rest)
@@ -384,6 +386,9 @@ impl Tile {
 
     /// A pulse of a cell: one level, or as many as its amplitude says.
     pub(super) fn move_cell(&mut self, bank: usize, column: usize, by: i64) {
+        if self.answers(bank, column, by > 0) {
+            return;
+        }
         let at = self.upd.row * self.size.columns + column;
         let before = i64::from(self.level[bank][at]);
         let (floor, ceiling) = (i64::from(self.config.floor), i64::from(self.config.ceiling));
@@ -401,13 +406,15 @@ impl Tile {
             for bank in 0..2 {
                 for column in 0..self.config.columns {
                     let at = self.upd.row * self.size.columns + column;
-                    let rests = self.level[bank][at] == self.config.floor;
+                    let rests = i64::from(self.level[bank][at]) == self.ends(bank, at)[0];
                     if rests && self.pulse[bank][column] != 0 {
                         self.pruned[bank][at] = true;
                     }
                 }
             }
         }
+        let first = self.upd.row * self.size.columns;
+        self.forget_pulses(first..first + self.size.columns);
         self.upd.phase = UpdPhase::Compute;
         self.next_row();
     }

@@ -1,6 +1,7 @@
 //! Draws of a layer's tiles, from the addresses of the logical array: dither of a row, lines that fire in a slot.
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
+use super::super::super::tile::{TileDevice, laws};
 use super::TickLayer;
 use crate::chip::hardware::{DitherPattern, Hardware};
 use crate::chip::layer::Layer;
@@ -13,6 +14,26 @@ pub(super) fn bits(hardware: &Hardware, layer: &Layer) -> u32 {
 }
 
 impl TickLayer {
+    /// Makes cells of the chip's device, if it has one.
+    pub(super) fn fit(&mut self, hardware: &Hardware) {
+        let Some(spec) = &hardware.device else { return };
+        let laws = laws(spec);
+        for tile in 0..self.tiles.len() {
+            let (down, across) = (tile / self.grid[1] % self.grid[0], tile % self.grid[1]);
+            let (rows, columns) = (self.tile_rows(down), self.tile_columns(across));
+            let places = self.codes(self.plane(tile)).map(|pathway| Place {
+                layer: self.index,
+                pathway,
+                ..Place::global(self.seed, Site::Variation, self.writes)
+            });
+            let first = [rows.start, columns.start];
+            let at = (self.rows, first);
+            let size = [rows.len(), columns.len()];
+            let device = TileDevice::new(hardware, (spec, &laws), places, at, size);
+            self.tiles[tile].set_device(device);
+        }
+    }
+
     /// The draws of the row that a tile is about to write.
     pub(super) fn draws(&self, tile: usize, bank: usize) -> Vec<u16> {
         let across = tile % self.grid[1];

@@ -1,0 +1,201 @@
+//! What a real cell does to a pulse, as data: tables of a device, and what sets one cell of it apart.
+//!
+//! ```text
+//! place   i = ((level - floor) reach + 2^15) >> 16            floor, ceiling: the cell's own;  i in 0 ..= N
+//! mean    m = rsh( table[polarity][i] factor[polarity], 24 )                  in 256ths of a level
+//! noise   s = m + rsh( g d, 12 ),  d = rsh(m c, 16)  or  b                    g: h of its upper 12 bits, minus where it is odd; 12 fractional bits
+//! move    up: (s + r) >> 8,   down: (r - s) >> 8                              r: a word of 8 bits
+//! ```
+//!
+//! `N = ceiling - floor` of the chip's window, `reach = (2^16 N + n/2) / n` with `n` levels in the cell's own. What follows, and
+//! that the window holds the cell after every pulse, is the last step of a write: `crossbar::kernel::respond`.
+//!
+//! ```text
+//! word    of 32 bits of the cell, site 3:  sub 0 step, 1 asymmetry, 2 ceiling, 3 floor       factors F of their laws, see `num::tables::spread`
+//! factor  up = rsh(F_0 A, 24),  down = rsh(F_0 (2 - A), 24),   A = min(F_1, 2)
+//! own     ceiling + rsh((F_2 - 1) N, 24) in 1 ..= level_max,   floor + rsh((F_3 - 1) N, 24) in 0 .. own ceiling
+//! ```
+//!
+//! What a cell is follows from its place alone: it is made again wherever it is wanted, and is no state. See docs/MODEL.md, 3.11.
+#![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
+
+use super::{DeviceSpec, PulseNoise};
+use crate::num::draw::{Place, Site};
+use crate::num::fixed::{Millionths, narrow, rsh};
+use crate::num::tables::{FACTOR_BITS, FACTOR_ONE, Quantiles, STEP_BITS, SpreadLaw, half_gaussian};
+
+#[cfg(test)]
+mod tests;
+
+/// Fractional bits of a cell's reach, and of noise as a share.
+const FINE: u32 = 16;
+/// Fractional bits of a Gaussian word.
+const GAUSSIAN_BITS: u32 = 12;
+
+/// The tables of a chip's device.
+#[derive(Debug, PartialEq, Eq)]
+pub struct Device {
+    /// Steps up and down in 256ths of a level, by level above the floor.
+    tables: [Vec<u32>; 2],
+    /// The chip's window, and the greatest level there is.
+    floor: u16,
+    span: u16,
+    level_max: u16,
+    /// `c` with 16 fractional bits, and `b` in 256ths of a level: one of them is 0.
+    noise: [i64; 2],
+    /// Absolute Gaussians, where there is noise.
+    gaussian: Vec<u16>,
+    /// Factors by sub of their word, where cells differ in it.
+    spread: [Option<Quantiles>; 4],
+    rounds: bool,
+}
+
+/// What sets a cell apart from others.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct OwnCell {
+    /// Factors of steps up and down, 24 fractional bits.
+    pub factors: [u32; 2],
+    /// Ends of its window.
+    pub floor: u16,
+    /// The other.
+    pub ceiling: u16,
+    /// Levels of the chip's window over levels of its own, 16 fractional bits.
+    pub reach: u32,
+}
+
+/// Words of a cell for a pulse.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct PulseWords {
+    /// Of site 14.
+    pub rounding: u8,
+    /// Of site 4.
+    pub noise: u16,
+}
+
+impl Device {
+    /// What makes cells differ, in the order of the sub of their words.
+    pub const SPREADS: u32 = 4;
+
+    /// Cells of a device whose window is `floor ..= ceiling`, of levels up to `level_max`.
+    ///
+    /// # Panics
+    /// When the window is empty.
+    #[must_use]
+    pub fn new(device: &DeviceSpec, [floor, ceiling]: [u16; 2], level_max: u16) -> Self {
+        let DeviceSpec { response, states, asymmetry, noise, spread } = device;
+        let span = ceiling - floor;
+        let scaled = |share: Millionths, whole: i64| (share.0 * whole + 500_000) / 1_000_000;
+        let noise = match *noise {
+            PulseNoise::Off => [0, 0],
+            PulseNoise::OfStep(share) => [scaled(share, 1 << FINE), 0],
+            PulseNoise::OfWindow(share) => [0, scaled(share, i64::from(span) << STEP_BITS)],
+        };
+        let quantiles = |law: SpreadLaw, deviation: Millionths| {
+            (deviation.0 != 0).then(|| Quantiles::new(law, deviation))
+        };
+        let spread = [
+            quantiles(spread.step_law, spread.step),
+            quantiles(SpreadLaw::Normal, spread.asymmetry),
+            quantiles(SpreadLaw::Normal, spread.ceiling),
+            quantiles(SpreadLaw::Normal, spread.floor),
+        ];
+        let tables = response.table(span, *states, *asymmetry);
+        let whole = |step: &u32| step.trailing_zeros() >= STEP_BITS;
+        let rounds = noise != [0, 0]
+            || spread[..2].iter().any(Option::is_some)
+            || !tables.iter().flatten().all(whole);
+        Self {
+            tables,
+            floor,
+            span,
+            level_max,
+            noise,
+            gaussian: if noise == [0, 0] { vec![] } else { half_gaussian() },
+            spread,
+            rounds,
+        }
+    }
+
+    /// Whether steps are rounded with a word, and whether they take one for noise.
+    #[must_use]
+    pub fn wants(&self) -> [bool; 2] {
+        [self.rounds, self.noise != [0, 0]]
+    }
+
+    /// Whether cells differ in their steps, and in their windows.
+    #[must_use]
+    pub fn differs(&self) -> [bool; 2] {
+        let [step, asymmetry, ceiling, floor] = self.spread.each_ref().map(Option::is_some);
+        [step || asymmetry, ceiling || floor]
+    }
+
+    /// Where the words of the cells of an array come from: `place` with the site, a sub for each.
+    #[must_use]
+    pub const fn place(place: Place, sub: u32) -> Place {
+        Place { site: Site::Variation, sub, count: 0, ..place }
+    }
+
+    /// A cell of which nothing is its own.
+    #[must_use]
+    pub const fn nominal(&self) -> OwnCell {
+        OwnCell {
+            factors: [FACTOR_ONE; 2],
+            floor: self.floor,
+            ceiling: self.floor + self.span,
+            reach: 1 << FINE,
+        }
+    }
+
+    /// Whether it takes a word of that sub.
+    #[must_use]
+    pub const fn takes(&self, sub: usize) -> bool {
+        self.spread[sub].is_some()
+    }
+
+    /// The cell of these words.
+    #[must_use]
+    pub fn cell(&self, words: [u32; 4]) -> OwnCell {
+        let factor = |sub: usize| {
+            let factor = self.spread[sub].as_ref().map(|of| of.factor(words[sub]));
+            i64::from(factor.unwrap_or(FACTOR_ONE))
+        };
+        let one = i64::from(FACTOR_ONE);
+        let (step, up) = (factor(0), factor(1).min(2 * one));
+        let factors = [up, 2 * one - up].map(|side| {
+            // a factor of nearly 2^8 twice is the only one that does not fit
+            narrow(rsh(step * side, FACTOR_BITS).min(u32::MAX.into()), "held to 32 bits")
+        });
+        let span = i64::from(self.span);
+        let moved = |sub: usize| rsh((factor(sub) - one) * span, FACTOR_BITS);
+        let ceiling = i64::from(self.floor) + span + moved(2);
+        let ceiling = ceiling.clamp(1, self.level_max.into());
+        let floor = (i64::from(self.floor) + moved(3)).clamp(0, ceiling - 1);
+        let own = ceiling - floor;
+        OwnCell {
+            factors,
+            floor: narrow(floor, "a level"),
+            ceiling: narrow(ceiling, "a level"),
+            reach: narrow(((span << FINE) + own / 2) / own, "2^12 windows at most"),
+        }
+    }
+
+    /// By how many levels a pulse moves a cell at a level of its own window, before the window holds it.
+    #[must_use]
+    #[inline]
+    pub fn moves(&self, cell: &OwnCell, level: u16, rises: bool, words: PulseWords) -> i64 {
+        let above = u64::from(level - cell.floor) * u64::from(cell.reach);
+        let at = usize::try_from((above + (1 << (FINE - 1))) >> FINE).expect("a level");
+        let polarity = usize::from(!rises);
+        let table = i64::from(self.tables[polarity][at]);
+        let mut step = rsh(table * i64::from(cell.factors[polarity]), FACTOR_BITS);
+        if self.noise != [0, 0] {
+            let half = i64::from(self.gaussian[usize::from(words.noise >> 4)]);
+            let gaussian = if words.noise & 1 == 0 { half } else { -half };
+            let [share, whole] = self.noise;
+            let deviation = rsh(step * share, FINE) + whole;
+            step += rsh(gaussian * deviation, GAUSSIAN_BITS);
+        }
+        let signed = if rises { step } else { -step };
+        (signed + i64::from(words.rounding)) >> STEP_BITS
+    }
+}
