@@ -226,6 +226,8 @@ Keys = TypedDict(
         "hw.error": Any,
         # Programming.
         "hw.write": Any,
+        # What real cells and converters do that ideal ones do not.
+        "hw.device": Any,
         # Cycles of what a tile does; without it no cycles are counted.
         "hw.timing": Any,
         # Joules of an event, by quantity and unit.
@@ -330,6 +332,52 @@ Keys = TypedDict(
         "hw.write.source": Any,
         # How far to trust the numbers.
         "hw.write.kind": Literal["measured", "fitted", "assumed"],
+        # What a pulse does to a cell.
+        "hw.device.response": Any,
+        # How cells differ.
+        "hw.device.spread": Any,
+        # How the step of a pulse depends on where the cell lies in its window.
+        "hw.device.response.curve": Literal["linear", "soft_bounds", "exponential", "neurosim", "measured"],
+        # Pulses of mean length across the window. Levels are the resolution that the cell is simulated with; rates count pulses. [pulses]
+        "hw.device.response.states": int,
+        # Steps up, in mean steps: at the floor and at the ceiling (linear), at the floor alone (soft_bounds). [mean steps]
+        "hw.device.response.up": Any,
+        # Steps down, in mean steps: at the floor and at the ceiling (linear), at the ceiling alone (soft_bounds). [mean steps]
+        "hw.device.response.down": Any,
+        # Of steps up and down: how much the exponential part takes off the mean step.
+        "hw.device.response.amplitude": Any,
+        # Of steps up and down: how fast the exponential part grows.
+        "hw.device.response.growth": Any,
+        # The argument of the exponential part at the floor and at the ceiling.
+        "hw.device.response.z": Any,
+        # Nonlinearity labels of rising and of falling pulses, as MLP+NeuroSim has them.
+        "hw.device.response.labels": Any,
+        # Rows of three: where a cell lies, 0 to 1 of the window and rising, and its steps up and down in windows. [windows]
+        "hw.device.response.points": Any,
+        # By which share steps up are longer than the curve says, and steps down shorter.
+        "hw.device.response.asymmetry": Any,
+        # Standard deviation of a step from pulse to pulse.
+        "hw.device.response.noise": float,
+        # What that is a share of.
+        "hw.device.response.noise_of": Literal["step", "window"],
+        # Where the numbers come from.
+        "hw.device.response.source": Any,
+        # How far to trust the numbers.
+        "hw.device.response.kind": Literal["measured", "fitted", "assumed"],
+        # Standard deviation of the factor of a cell's steps, or of its logarithm.
+        "hw.device.spread.step": float,
+        # The law of that factor, whose median is 1.
+        "hw.device.spread.step_law": Literal["normal", "log_normal"],
+        # Standard deviation of the share by which a cell's steps up are longer, and its steps down shorter.
+        "hw.device.spread.asymmetry": float,
+        # Standard deviation of a cell's ceiling, in windows. What would lie beyond the levels there are lies on their end: leave room. [windows]
+        "hw.device.spread.ceiling": float,
+        # Standard deviation of a cell's floor, in windows. [windows]
+        "hw.device.spread.floor": float,
+        # Where the numbers come from.
+        "hw.device.spread.source": Any,
+        # How far to trust the numbers.
+        "hw.device.spread.kind": Literal["measured", "fitted", "assumed"],
         # Megahertz of the clock that counts cycles. [MHz]
         "hw.timing.clock_mhz": float,
         # `T_A`: cycles to settle and sample; with `pulse_width`, cycles beside the slots of a phase. [cycles] Default: 1.

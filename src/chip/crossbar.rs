@@ -30,7 +30,7 @@ mod write;
 pub use form::{Form, LongSums, Met, SHORT_READS};
 pub use initial::{InitialLaw, initial_levels, initial_scale};
 pub use optimise::{Adam, Asks, Momentum};
-pub use own::{Made, OwnCells};
+pub use own::{CellsMade, OwnCells};
 pub use pulses::{Collect, Collected, RowPeaks};
 pub use trains::ColumnTrain;
 pub use write::{WriteRequest, Written};

@@ -12,6 +12,7 @@ mod bench;
 mod browser;
 mod damage;
 mod defaults;
+mod devices;
 mod environments;
 mod examples;
 mod extending;

@@ -29,7 +29,7 @@ struct OwnWindows {
 
 /// What a half block of cells is made of.
 #[derive(Debug, Clone, Copy)]
-pub struct Made<'a> {
+pub struct CellsMade<'a> {
     /// The device.
     pub device: &'a Device,
     /// Factors of steps up and down, if cells differ in them.
@@ -38,7 +38,7 @@ pub struct Made<'a> {
     pub windows: Option<([&'a Half<u16>; 2], &'a Half<u32>)>,
 }
 
-impl Made<'_> {
+impl CellsMade<'_> {
     /// A cell, in the order of levels.
     #[must_use]
     #[inline]
@@ -93,10 +93,10 @@ impl OwnCells {
     }
 
     /// The half block that begins at a place of the planes.
-    pub(super) fn half(&self, at: usize) -> Made<'_> {
+    pub(super) fn half(&self, at: usize) -> CellsMade<'_> {
         let factors = self.factors.as_ref();
         let windows = self.windows.as_ref();
-        Made {
+        CellsMade {
             device: &self.device,
             factors: factors.map(|of| of.each_ref().map(|factors| half(factors, at))),
             windows: windows

@@ -256,7 +256,7 @@ fn cells(engine: &Engine) -> Vec<(Vec<u16>, Option<Vec<u16>>, Vec<bool>)> {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(96))]
 
-    /// Faults this catches, tried by hand: words of the pulse before, a remainder held by any pulse but the last, the window
+    /// Faults this is made for: words of the pulse before, a remainder held by any pulse but the last, the window
     /// of the chip in place of the cell's, a column drawn alone from its neighbour's block.
     #[test]
     fn a_device_answers_in_tick_as_in_every_kernel(case in case()) {

@@ -13,7 +13,7 @@
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
 use super::{Cells, Draws, Ends, Half, Kernel};
-use crate::chip::crossbar::Made;
+use crate::chip::crossbar::CellsMade;
 use crate::chip::crossbar::layout::{BLOCK_ROWS, HALF_CELLS, HALF_COLUMNS, in_half};
 use crate::chip::device::PulseWords;
 use crate::num::draw::{Place, Site};
@@ -39,7 +39,7 @@ pub struct Answers {
 #[derive(Debug)]
 pub struct Answering<'a> {
     /// What they are made of.
-    pub made: Made<'a>,
+    pub made: CellsMade<'a>,
     /// Where words come from.
     pub words: &'a mut Answers,
     /// First column, and block of rows.
@@ -146,7 +146,7 @@ pub(super) fn law(
 /// A pulse of a cell. Returns by how many levels it moved.
 fn one(
     cells: &mut Cells<'_>,
-    made: &Made<'_>,
+    made: &CellsMade<'_>,
     at: usize,
     (rises, last, words): (bool, bool, PulseWords),
     ends: Ends,
