@@ -3,7 +3,7 @@
     python examples/python/custom_env.py
 
 A ball falls through 7 columns, a bat below moves left, stays or moves right; whoever is under the ball at the end gets 1, else -1.
-A vector environment of Gymnasium's kind: many side by side, in NumPy. Chance gets a third to a half of the balls.
+A vector environment of Gymnasium's kind: many side by side, in NumPy. Chance gets one ball in seven.
 """
 
 import gymnasium

@@ -244,7 +244,9 @@ def train(name: str, algorithm: str, seed: int, asked, state: Path | None) -> di
     if algorithm == "es":
         policy = Evolution(asked.hidden, seed).learn(env, asked.steps, lambda one: print(one.epochs[-1], flush=True))
     else:
-        policy = dalean.EDPolicy(asked.hidden, horizon=asked.horizon, rule=algorithm, seed=seed, overrides={"environment.rollouts": 5, **asked.keys})
+        # without memory the likeliest action walks in circles where there is a world
+        unsaid = {"environment.rollouts": 5, "evaluation.deterministic": not name.startswith("craftax/")}
+        policy = dalean.EDPolicy(asked.hidden, horizon=asked.horizon, rule=algorithm, seed=seed, overrides={**unsaid, **asked.keys})
         kept = state.read_bytes() if state and state.exists() else None
         before = json.loads(state.with_suffix(".json").read_text()) if kept else 0.0
 

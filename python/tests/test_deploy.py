@@ -67,6 +67,17 @@ def test_a_window_with_a_floor_holds_the_same_differences():
     assert np.corrcoef(forward(pairs, x).ravel(), sums(net, x).ravel())[0, 1] > 0.98
 
 
+@pytest.mark.parametrize("to", ["pairs", "dual"])
+@pytest.mark.parametrize("hw", ["ideal", "reram", "isaac", "prime", "ecram", "mrr", "mzi"])
+def test_chips_of_all_kinds_take_it_as_it_is(hw, to):
+    """Electronic and photonic, of 2 to 10 bits, converters as they have them. Answers by chance agree in a quarter of the cases."""
+    pairs, x = layers(sizes=(20, 30, 4))
+    wanted = forward(pairs, x).argmax(1)
+    net = dalean.deploy(pairs, x, hw, to=to)
+    net.read(x, learn=False)
+    assert np.mean(dalean.outputs(net).argmax(1) == wanted) > (0.6 if net.level_bits < 4 else 0.85)
+
+
 def test_where_a_network_comes_from_makes_no_difference(tmp_path):
     pairs, x = layers()
     named = {}
