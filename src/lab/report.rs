@@ -107,7 +107,7 @@ pub struct RunView<'a> {
     /// Inputs of a policy, in the order of the rows of the first layer.
     pub inputs: &'a [PolicyInput],
     /// The window of the first layer, where that is a convolution.
-    pub window: Option<Window>,
+    pub window: Option<Sight>,
     /// An episode of a policy.
     pub film: Option<&'a Film>,
     /// Names of the classes; numbers stand in for missing ones.
@@ -143,7 +143,7 @@ impl RunView<'_> {
 
 /// What one unit of a convolution sees at a position: rows in the order y, x, channel.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Window {
+pub struct Sight {
     /// Rows and columns of pixels.
     pub side: usize,
     /// Channels of a pixel.

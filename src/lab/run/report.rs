@@ -17,7 +17,7 @@ use crate::chip::crossbar::kernel::Backend;
 use crate::lab::config::{Bias, Config, PolicySettings};
 use crate::lab::data::{self, DataRoot, ImageShape};
 use crate::lab::price::{Cost, Footprint, Pieces, price};
-use crate::lab::report::{self, Film, Heat, Picture, PolicyInput, RunView, Window};
+use crate::lab::report::{self, Film, Heat, Picture, PolicyInput, RunView, Sight};
 use crate::lab::store::checkpoint::{self, CheckpointError, Identity};
 use crate::lab::store::folder::{self, FolderError, RunFolder, names};
 use crate::lab::store::ledger::LedgerRecord;
@@ -210,7 +210,7 @@ impl Parts<'_> {
             heats: &heats,
             pictures: &pictures,
             inputs: &inputs,
-            window: self.config.convolutions.first().map(|first| Window {
+            window: self.config.convolutions.first().map(|first| Sight {
                 side: first.shape.side,
                 channels: first.shape.channels,
                 halves: self.config.input.has_halves(),

@@ -4,7 +4,7 @@
 use super::Figure;
 use crate::lab::report::image::indexed;
 use crate::lab::report::number::place;
-use crate::lab::report::{Heat, RunView, Window, colour};
+use crate::lab::report::{Heat, RunView, Sight, colour};
 
 /// Fields drawn at most.
 const FIELDS_MAX: usize = 40;
@@ -132,7 +132,7 @@ fn field(plus: &Heat, minus: &Heat, column: usize, shape: Shape) -> Vec<f64> {
     (0..pixels).map(of_pixel).collect()
 }
 
-impl Window {
+impl Sight {
     /// Channels that are drawn: halves are one.
     const fn colours(self) -> usize {
         if self.halves { self.channels / 2 } else { self.channels }
@@ -140,7 +140,7 @@ impl Window {
 }
 
 /// One column of a window as an image: its channels beside one another, a column of nothing between.
-fn filter(plus: &Heat, minus: &Heat, column: usize, window: Window) -> Vec<f64> {
+fn filter(plus: &Heat, minus: &Heat, column: usize, window: Sight) -> Vec<f64> {
     let net = |row: usize| {
         let cell = row * plus.columns + column;
         f64::from(plus.levels[cell]) - f64::from(minus.levels[cell])
@@ -174,11 +174,11 @@ mod tests {
             levels,
         };
         let (plus, minus) = (heat((0..16).map(|row| 10 * row).collect()), heat(vec![1; 16]));
-        let window = Window { side: 2, channels: 4, halves: false };
+        let window = Sight { side: 2, channels: 4, halves: false };
         let whole = filter(&plus, &minus, 0, window);
         assert_eq!(whole[..6], [-1.0, 39.0, 0.0, 9.0, 49.0, 0.0]);
         assert_eq!(whole.len(), 2 * (2 * 4 + 3));
-        let halves = filter(&plus, &minus, 0, Window { halves: true, ..window });
+        let halves = filter(&plus, &minus, 0, Sight { halves: true, ..window });
         // every second half of a pixel's channels lies 20 levels higher
         assert_eq!(halves, [-20.0, -20.0, 0.0, -20.0, -20.0, -20.0, -20.0, 0.0, -20.0, -20.0]);
     }
