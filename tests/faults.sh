@@ -101,7 +101,7 @@ fault "1 lanes absorb without a pulse" $kernel/levels.rs \
 fault "1 converter truncates" src/chip/periphery.rs \
     'let steps = rsh(current, self.shift);' 'let steps = current >> self.shift;' laws::law_1
 fault "1 stream n not negated" $error \
-    'let negate = target == Stream::N;' 'let negate = false;' laws::law_1
+    'let negate = target == Stream::N && !alike;' 'let negate = alike;' laws::law_1
 fault "1 a batch is not divided by its size" src/chip/engine/unit.rs \
     'let m = samples << (9 - bits);' 'let m = 1i64 << (9 - bits);' laws::law_1
 fault "1 write count stands still" $update \
@@ -154,7 +154,7 @@ fault "3 an event that tiling moves is hashed" src/chip/ledger.rs \
 fault "3 a section has another one's tag" $layer_state \
     '&writes, Section::WriteCounts,' '&writes, Section::Device,' golden_run
 fault "3 a draw depends on the tile" $update \
-    'layer: index,' 'layer: index + (self.hardware.tile.rows & 1) as u16,' laws::runs
+    'layer: this.index,' 'layer: this.index + (self.hardware.tile.rows & 1) as u16,' laws::runs
 fault "4 layers wait for one another" $schedule \
     '(*again).max(shape.positions * front).max(shape.stage)' '*again + shape.positions * front + shape.stage' laws::law_4
 fault "4 updates one after the other" $schedule \
@@ -185,8 +185,7 @@ fault "4 the current has no limit" src/chip/engine/passes.rs \
 fault "5 a tile loses its last row" src/chip/engine/read/tiles.rs \
     'codes[to..].fill(0);' 'codes[to - 1..].fill(0);' laws::product
 fault "5 transposed banks add" $columns \
-    'backward.extend(rows.map(|(e, i)| e - i));' \
-    'backward.extend(rows.map(|(e, i)| e + i));' laws::product
+    'arrays.iter().zip([false, true])' 'arrays.iter().zip([false, false])' laws::product
 fault "run verify ignores the ledger" $verify \
     'same(names::LEDGER, kept, &ledger)?;' 'let _ = (kept, &ledger);' damage
 fault "run verify ignores records" $verify \
