@@ -22,6 +22,8 @@ use dalean::{
 
 const CONTROLS: [Control; 3] = [Control::FrozenHidden, Control::SameSign, Control::SameSignHidden];
 
+#[path = "device.rs"]
+mod device;
 #[path = "outside.rs"]
 mod outside;
 
@@ -142,7 +144,7 @@ fn hardware(c: &mut Choices<'_>) -> Hardware {
     });
     let timing = timing.map(|timing| if c.one_in(3) { unequal(c, timing) } else { timing });
     let trains = c.one_in(4);
-    let spec = HardwareSpec {
+    let mut spec = HardwareSpec {
         cell: CellSpec {
             level_bits,
             window,
@@ -177,8 +179,19 @@ fn hardware(c: &mut Choices<'_>) -> Hardware {
             },
         },
         timing,
+        ..base
     };
-    or(Hardware::new(spec), reference)
+    let ideal = spec.clone();
+    if c.one_in(2) {
+        device::devices(c, &mut spec);
+    }
+    match Hardware::new(spec) {
+        Ok(hardware) => hardware,
+        Err(error) => {
+            assert!(!error.to_string().is_empty());
+            or(Hardware::new(ideal), reference)
+        }
+    }
 }
 
 /// A number that stands for a rate or a width, most often a usual one.

@@ -1,0 +1,77 @@
+//! Cells of any kind.
+
+use dalean::HardwareSpec;
+use dalean::hardware::{
+    CellSpread, Chance, DeviceSpec, ExponentialSteps, Faults, LinearSteps, MeasuredSteps,
+    Millionths, NeurosimSteps, Programming, PulseNoise, ReadNoise, Response, SoftBoundSteps,
+    SpreadLaw,
+};
+
+use super::Choices;
+
+/// Most often below 4, or any number at all.
+fn part(c: &mut Choices<'_>) -> Millionths {
+    Millionths(c.near(-500_000, 4_000_000))
+}
+
+fn parts<const N: usize>(c: &mut Choices<'_>) -> [Millionths; N] {
+    std::array::from_fn(|_| part(c))
+}
+
+fn response(c: &mut Choices<'_>) -> Response {
+    match c.byte() % 5 {
+        0 => Response::Linear(LinearSteps { up: parts(c), down: parts(c) }),
+        1 => Response::SoftBounds(SoftBoundSteps { up: part(c), down: part(c) }),
+        2 => Response::Exponential(ExponentialSteps {
+            amplitude: parts(c),
+            growth: parts(c),
+            z: parts(c),
+        }),
+        3 => Response::Neurosim(NeurosimSteps { labels: parts(c) }),
+        _ => {
+            let points = (0..c.byte() % 5).map(|_| parts(c)).collect();
+            Response::Measured(MeasuredSteps { points })
+        }
+    }
+}
+
+fn spread(c: &mut Choices<'_>) -> CellSpread {
+    let small = |c: &mut Choices<'_>| match c.byte() % 3 {
+        0 => Millionths(0),
+        _ => Millionths(c.near(0, 1_000_000)),
+    };
+    CellSpread {
+        step_law: c.of(&[SpreadLaw::Normal, SpreadLaw::LogNormal]),
+        step: small(c),
+        asymmetry: small(c),
+        ceiling: small(c),
+        floor: small(c),
+    }
+}
+
+fn chance(c: &mut Choices<'_>) -> Chance {
+    let some = c.near(0, 1 << 32).unsigned_abs() >> (c.byte() % 33);
+    Chance::new(some).unwrap_or(Chance::NEVER)
+}
+
+/// Gives a chip cells that are not ideal.
+pub(super) fn devices(c: &mut Choices<'_>, spec: &mut HardwareSpec) {
+    spec.device = c.one_in(2).then(|| DeviceSpec {
+        response: response(c),
+        states: c.near(1, 1 << 16) as u32,
+        asymmetry: part(c),
+        noise: match c.byte() % 3 {
+            0 => PulseNoise::Off,
+            1 => PulseNoise::OfStep(part(c)),
+            _ => PulseNoise::OfWindow(part(c)),
+        },
+        spread: spread(c),
+    });
+    if c.one_in(2) {
+        spec.faults = Faults { floor: chance(c), ceiling: chance(c), any: chance(c) };
+    }
+    spec.read_noise = c.one_in(3).then(|| ReadNoise { sigma: c.near(0, 16 << 16) as u32 });
+    let coefficient = |c: &mut Choices<'_>| c.near(-(4 << 24), 4 << 24);
+    spec.programming =
+        c.one_in(3).then(|| Programming { coefficients: std::array::from_fn(|_| coefficient(c)) });
+}
