@@ -349,6 +349,10 @@ impl Schedule {
             return;
         }
         let (t, shape) = (self.timing, self.shapes[layer]);
+        if matches!(&self.segment, Segment::Rounds { written, .. } if samples.start < written[layer])
+        {
+            self.settle(cycles);
+        }
         let busy = shape.drivings() * t.accumulate(shape.rows, shape.columns);
         for round in self.rounds(cycles, samples) {
             round.join(Doing::Adding, layer, t.accept() + busy, false);

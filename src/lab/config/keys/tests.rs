@@ -98,7 +98,17 @@ fn each_default_is_what_saying_nothing_gives() {
         let config = if key.full() == "data.set" {
             load(&Sources::default()).unwrap()
         } else {
-            with(&beside).unwrap_or_else(|error| panic!("{}: {error}", key.full()))
+            match with(&beside) {
+                Ok(config) => config,
+                // what a table needs has no default
+                Err(error)
+                    if key.entry.default.is_empty()
+                        && error.to_string().contains(&format!("`{}` is missing", key.full())) =>
+                {
+                    continue;
+                }
+                Err(error) => panic!("{}: {error}", key.full()),
+            }
         };
         let mut at = Some(toml::Value::try_from(&config.resolved).unwrap());
         for part in key.full().split('.') {

@@ -86,6 +86,10 @@ fn fits(list: &[&Operation<'_>], operation: &Operation<'_>) -> bool {
     if read(operation) {
         return before.next().is_none();
     }
+    if let Operation::Update { layer, write: Write::Add, samples, .. } = operation {
+        // what is added does not come before a write that it came after
+        return before.all(|(l, s)| l != *layer || s < samples.start);
+    }
     let Some((layer, sample)) = written(operation) else {
         return true;
     };
