@@ -93,7 +93,7 @@ impl Noise {
 
     /// The same for reads of which the first is number `read` of these.
     #[must_use]
-    pub fn from_read(&self, read: usize) -> Self {
+    pub fn starting_at(&self, read: usize) -> Self {
         Self { first: self.first + read as u64, ..self.clone() }
     }
 
@@ -189,7 +189,7 @@ mod tests {
         for (at, one) in all.iter().enumerate() {
             assert!(all[..at].iter().all(|other| other != one), "{at}");
         }
-        let moved = base.from_read(3);
+        let moved = base.starting_at(3);
         assert_eq!(of(&moved, NoisePlace { read: 1, ..AT }), all[0]);
         // more tiles than a block has words
         let tall = noise(1 << 16, 1, 0, 40);

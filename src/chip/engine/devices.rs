@@ -243,8 +243,10 @@ impl Case {
     }
 }
 
-/// Everything of the arrays that a write changes.
-fn cells(engine: &Engine) -> Vec<(Vec<u16>, Option<Vec<u16>>, Vec<bool>)> {
+/// Everything of an array that a write changes: levels, remainders, pruned cells.
+type CellsOf = (Vec<u16>, Option<Vec<u16>>, Vec<bool>);
+
+fn cells(engine: &Engine) -> Vec<CellsOf> {
     let arrays = engine.layers()[0].arrays.iter();
     let of = |array: &crate::chip::crossbar::Crossbar| {
         let pruned = array.pruned().map(|bits| bits.iter().by_vals().collect());

@@ -255,7 +255,7 @@ impl Engine {
                 let drives = |source: Stream| &near[this.spec.drives_of(source).index()][..];
                 let samples = some.len();
                 let reader = |&target| {
-                    let mode = (mode, beside.from_read(some.start));
+                    let mode = (mode, beside.starting_at(some.start));
                     let mut reader = Reader::new(this, hardware, target, samples, mode, drives);
                     reader.prepare(kernel);
                     let middle = Middle::of(this, target, &reader, notes);

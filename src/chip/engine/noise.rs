@@ -31,8 +31,8 @@ pub(super) struct Beside {
 
 impl Beside {
     /// The same for reads of which the first is number `read` of these.
-    pub(super) fn from_read(&self, read: usize) -> Self {
-        Self { noise: self.noise.as_ref().map(|noise| noise.from_read(read)), ..*self }
+    pub(super) fn starting_at(&self, read: usize) -> Self {
+        Self { noise: self.noise.as_ref().map(|noise| noise.starting_at(read)), ..*self }
     }
 
     /// Whether there is nothing.

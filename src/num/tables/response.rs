@@ -122,7 +122,7 @@ impl Response {
         assert!(span > 0 && states > 0, "a window is crossed in some pulses");
         let (steps, whole) = (self.curve().steps(1.0 / f64::from(states)), f64::from(span));
         let entry = |step: f64| {
-            let levels = step.max(0.0).min(1.0) * whole;
+            let levels = step.clamp(0.0, 1.0) * whole;
             // a half that doubles miss by little is one
             let half = 0.5 + libm::exp2(-20.0);
             let fine = libm::floor(levels * libm::exp2(f64::from(STEP_BITS)) + half);

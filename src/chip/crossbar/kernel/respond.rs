@@ -129,8 +129,8 @@ pub(super) fn law(
         }
         words.draw(kernel, pulse, *place, (columns, wants));
         for group in (0..HALF_CELLS / 64).filter(|group| groups >> group & 1 == 1) {
-            for at in group * 64..group * 64 + 64 {
-                let all = pulses[at];
+            let here = pulses.iter().enumerate().skip(group * 64).take(64);
+            for (at, &all) in here {
                 if all.unsigned_abs() <= beyond {
                     continue;
                 }
