@@ -3,7 +3,7 @@
 use super::chart::{Chart, Series};
 use super::colour::hue;
 use super::figures::Figure;
-use super::number::{escape, significant};
+use super::number::escape;
 use super::page::Sheet;
 use super::scale::Axis;
 use crate::lab::analysis::{Analysed, LayerAnalysis};
@@ -59,8 +59,8 @@ fn sizes(states: &[Analysed]) -> Option<Figure> {
         return None;
     }
     let y = Axis::powers(0.8 * low, 1.25 * high, "gate (log scale)");
-    let mut chart = Chart::new(560.0, 320.0, 90.0, Axis::epochs(first, last), y);
-    chart.series(&lines, significant);
+    let mut chart = Chart::new(560.0, 320.0, 130.0, Axis::epochs(first, last), y);
+    chart.series(&lines, |gate| format!("{gate:.3}"));
     Some(Figure {
         id: "sizes",
         title: "How large updates are",
@@ -89,9 +89,9 @@ fn agreements(states: &[Analysed]) -> Option<Figure> {
         let values = lines.iter().flat_map(|line| &line.points).map(|point| point.1);
         let low = values.fold(0.0, f64::min);
         let y = Axis::round(low.min(-0.1) - 0.05, 1.0, "agreement");
-        let mut chart = Chart::new(372.0, 270.0, 124.0, Axis::epochs(first, last), y);
+        let mut chart = Chart::new(480.0, 300.0, 170.0, Axis::epochs(first, last), y);
         chart.rule(0.0, "none");
-        chart.series(&lines, significant);
+        chart.series(&lines, |cos| format!("{cos:.2}"));
         let alt =
             format!("Agreement with the gradient in layer {} by route over epochs", one.layer);
         body += &format!("<div><h3>layer {}</h3>{}</div>", one.layer, chart.finish(&alt));
