@@ -10,7 +10,7 @@ mod programming;
 mod read_noise;
 mod response;
 
-pub use cell::{Device, OwnCell, PulseWords};
+pub use cell::{Device, DeviceLanes, OwnCell, PLACES, PulseWords};
 pub use faults::{Chance, Faults, StuckCell};
 pub use programming::{Programming, cell_words};
 pub use read_noise::{Direction, Noise, NoisePlace, ReadNoise};

@@ -48,6 +48,7 @@ mod passes;
 mod pulses;
 mod read;
 mod readout;
+mod refresh;
 mod schedule;
 mod state;
 mod tape;

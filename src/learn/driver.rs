@@ -4,6 +4,8 @@
 //! engine counts. It is driven with drive codes and labels, or, by other tasks, with drive codes and errors.
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
+use std::num::NonZeroU32;
+
 use super::error::ErrorUnit;
 use super::rule::{Control, Rule, Step, UpdateMode};
 use crate::chip::engine::{Engine, Operation, Side, Write, WritesDone};
@@ -18,6 +20,8 @@ pub(crate) struct Learning {
     pub(crate) mode: UpdateMode,
     /// What is taken from it.
     pub(crate) control: Control,
+    /// Updates from a refresh to the next.
+    pub(crate) refresh: Option<NonZeroU32>,
     /// Shifts of each layer: `(first update, k)`, in order.
     pub(crate) shifts: Vec<Vec<(u64, u32)>>,
 }
@@ -101,7 +105,16 @@ impl Driver {
                 }
             }
         }
+        self.updated();
+    }
+
+    /// An update is over: time for a refresh, now and then.
+    fn updated(&mut self) {
         self.updates += 1;
+        if self.learning.refresh.is_some_and(|every| self.updates % u64::from(every.get()) == 0) {
+            self.engine.refresh();
+            self.engine.settle();
+        }
     }
 
     /// Writes what the loaded samples' errors ask for.
@@ -156,7 +169,7 @@ impl Driver {
             UpdateMode::Accumulate | UpdateMode::Replay => WritesDone::Batch,
             UpdateMode::Online => WritesDone::Sample,
         });
-        self.updates += 1;
+        self.updated();
     }
 
     /// When a batch is written.
@@ -224,7 +237,7 @@ mod tests {
         let layers = layers.collect();
         let engine = Engine::new(hardware, Backend::Scalar, 1, layers);
         let shifts = vec![shifts.to_vec(); 2];
-        let learning = Learning { rule, mode, control: Control::None, shifts };
+        let learning = Learning { rule, mode, control: Control::None, refresh: None, shifts };
         Driver::new(engine, learning, ErrorUnit::new(Centre::None, bits, 2))
     }
 

@@ -13,6 +13,8 @@ mod tests;
 
 pub use check::{GAIN_64THS, WEIGHT_MAX_LOG2};
 
+use std::num::NonZeroU32;
+
 use super::driver::{Driver, Learning};
 use super::error::{Centre, ErrorUnit, OutputError};
 use super::route::Route;
@@ -63,6 +65,8 @@ pub struct NetworkSpec {
     pub centred: Vec<bool>,
     /// What is taken from it, to see whether it is needed.
     pub control: Control,
+    /// After how many updates, again and again, what both cells of a pair hold is taken off both; see MODEL 3.14.
+    pub refresh: Option<NonZeroU32>,
 }
 
 /// Where a network stands in a run.
@@ -107,6 +111,7 @@ pub enum HiddenWords {
 ///     optimisers: vec![],
 ///     centred: vec![],
 ///     control: Control::None,
+///     refresh: None,
 /// };
 /// let error = nothing.check(&Hardware::reference()).unwrap_err();
 /// assert_eq!(error.key(), "network.hidden");
@@ -244,8 +249,8 @@ impl NetworkSpec {
             }
             _ => ErrorUnit::new(self.centre, bits, self.outputs()),
         };
-        let Self { rule, mode, control, .. } = *self;
-        let learning = Learning { rule, mode, control, shifts };
+        let Self { rule, mode, control, refresh, .. } = *self;
+        let learning = Learning { rule, mode, control, refresh, shifts };
         Ok(Driver::new(engine, learning, unit))
     }
 

@@ -157,6 +157,7 @@ fn experiment(s: &Value) -> Experiment {
         optimisers: vec![Optimiser::Plain; widths.len() - 1],
         centred: vec![false; widths.len() - 1],
         control: Control::None,
+        refresh: None,
     };
     Experiment {
         seed: text(&s["seed_decimal"]).parse().unwrap(),

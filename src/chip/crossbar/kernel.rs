@@ -485,7 +485,7 @@ impl Kernel {
     pub fn levels(&self, mut cells: Cells<'_>, pulses: &Half<i8>, ends: Ends, groups: u16) -> u64 {
         assert!(ends.floor <= ends.ceiling, "the window is not empty");
         if let Some(mut answering) = cells.answering.take() {
-            return respond::law(self, &mut cells, &mut answering, (pulses, groups), ends);
+            return respond::respond(self, &mut cells, &mut answering, (pulses, groups), ends);
         }
         call!(self, levels(&mut cells, pulses, ends, groups))
     }

@@ -24,7 +24,6 @@ pub struct OwnCells {
 struct OwnWindows {
     floor: Vec<u16>,
     ceiling: Vec<u16>,
-    reach: Vec<u32>,
 }
 
 /// What a half block of cells is made of.
@@ -34,8 +33,8 @@ pub struct CellsMade<'a> {
     pub device: &'a Device,
     /// Factors of steps up and down, if cells differ in them.
     pub factors: Option<[&'a Half<u32>; 2]>,
-    /// Floors, ceilings and reaches, if cells differ in them.
-    pub windows: Option<([&'a Half<u16>; 2], &'a Half<u32>)>,
+    /// Floors and ceilings, if cells differ in them.
+    pub windows: Option<[&'a Half<u16>; 2]>,
 }
 
 impl CellsMade<'_> {
@@ -45,10 +44,11 @@ impl CellsMade<'_> {
     pub fn cell(&self, at: usize) -> OwnCell {
         let nominal = self.device.nominal();
         let factors = self.factors.map_or(nominal.factors, |of| of.map(|factors| factors[at]));
-        let Some(([floor, ceiling], reach)) = self.windows else {
+        let Some(ends) = self.windows else {
             return OwnCell { factors, ..nominal };
         };
-        OwnCell { factors, floor: floor[at], ceiling: ceiling[at], reach: reach[at] }
+        let [floor, ceiling] = ends.map(|ends| ends[at]);
+        OwnCell { factors, floor, ceiling, reach: self.device.reach(ceiling - floor) }
     }
 }
 
@@ -62,7 +62,6 @@ impl OwnCells {
         let mut windows = windows.then(|| OwnWindows {
             floor: vec![nominal.floor; cells],
             ceiling: vec![nominal.ceiling; cells],
-            reach: vec![nominal.reach; cells],
         });
         if factors.is_some() || windows.is_some() {
             for column in 0..layout.columns {
@@ -83,7 +82,6 @@ impl OwnCells {
                         if let Some(windows) = &mut windows {
                             windows.floor[at] = cell.floor;
                             windows.ceiling[at] = cell.ceiling;
-                            windows.reach[at] = cell.reach;
                         }
                     }
                 }
@@ -99,8 +97,7 @@ impl OwnCells {
         CellsMade {
             device: &self.device,
             factors: factors.map(|of| of.each_ref().map(|factors| half(factors, at))),
-            windows: windows
-                .map(|of| ([half(&of.floor, at), half(&of.ceiling, at)], half(&of.reach, at))),
+            windows: windows.map(|of| [half(&of.floor, at), half(&of.ceiling, at)]),
         }
     }
 }

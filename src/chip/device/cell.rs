@@ -1,7 +1,7 @@
 //! What a real cell does to a pulse, as data: tables of a device, and what sets one cell of it apart.
 //!
 //! ```text
-//! place   i = ((level - floor) reach + 2^15) >> 16            floor, ceiling: the cell's own;  i in 0 ..= N
+//! place   i = ((level - floor) reach + 2^15) >> 16            floor, ceiling: the cell's own;  held to 0 ..= N, as a stuck level may lie outside
 //! mean    m = rsh( table[polarity][i] factor[polarity], 24 )                  in 256ths of a level
 //! noise   s = m + rsh( g d, 12 ),  d = rsh(m c, 16)  or  b                    g: h of its upper 12 bits, minus where it is odd; 12 fractional bits
 //! move    up: (s + r) >> 8,   down: (r - s) >> 8                              r: a word of 8 bits
@@ -31,12 +31,16 @@ mod tests;
 const FINE: u32 = 16;
 /// Fractional bits of a Gaussian word.
 const GAUSSIAN_BITS: u32 = 12;
+/// Levels that a table has room for: those of 12 bits.
+pub const PLACES: usize = 1 << 12;
+/// Absolute Gaussians of a word's upper 12 bits.
+const GAUSSIANS: usize = 1 << 12;
 
 /// The tables of a chip's device.
 #[derive(Debug, PartialEq, Eq)]
 pub struct Device {
-    /// Steps up and down in 256ths of a level, by level above the floor.
-    tables: [Vec<u32>; 2],
+    /// Steps in 256ths of a level: those up by level above the floor, and from [`PLACES`] on those down.
+    steps: Box<[u32; 2 * PLACES]>,
     /// The chip's window, and the greatest level there is.
     floor: u16,
     span: u16,
@@ -44,10 +48,14 @@ pub struct Device {
     /// `c` with 16 fractional bits, and `b` in 256ths of a level: one of them is 0.
     noise: [i64; 2],
     /// Absolute Gaussians, where there is noise.
-    gaussian: Vec<u16>,
+    gaussian: Box<[u16; GAUSSIANS]>,
     /// Factors by sub of their word, where cells differ in it.
     spread: [Option<Quantiles>; 4],
     rounds: bool,
+    /// Levels of the chip's window over those of a cell's own, by how many it has.
+    reaches: Box<[u32; PLACES]>,
+    /// Whether every number of a pulse fits a lane of 32 bits, and every product one of 64.
+    fits_lanes: bool,
 }
 
 /// What sets a cell apart from others.
@@ -61,6 +69,19 @@ pub struct OwnCell {
     pub ceiling: u16,
     /// Levels of the chip's window over levels of its own, 16 fractional bits.
     pub reach: u32,
+}
+
+/// What pulses of a device are made of, for cells side by side.
+#[derive(Debug, Clone, Copy)]
+pub struct DeviceLanes<'a> {
+    /// Steps up by level above the floor, and from [`PLACES`] on steps down.
+    pub steps: &'a [u32; 2 * PLACES],
+    /// The last level above the floor.
+    pub last: u32,
+    /// `c` and `b`.
+    pub noise: [u32; 2],
+    /// Absolute Gaussians by the upper 12 bits of a word.
+    pub gaussian: &'a [u16; GAUSSIANS],
 }
 
 /// Words of a cell for a pulse.
@@ -100,20 +121,25 @@ impl Device {
             quantiles(SpreadLaw::Normal, spread.floor),
         ];
         let tables = response.table(span, *states, *asymmetry);
+        let mut steps = Box::new([0; 2 * PLACES]);
+        for (of, table) in steps.chunks_exact_mut(PLACES).zip(&tables) {
+            of[..table.len()].copy_from_slice(table);
+        }
         let whole = |step: &u32| step.trailing_zeros() >= STEP_BITS;
         let rounds = noise != [0, 0]
             || spread[..2].iter().any(Option::is_some)
             || !tables.iter().flatten().all(whole);
-        Self {
-            tables,
-            floor,
-            span,
-            level_max,
-            noise,
-            gaussian: if noise == [0, 0] { vec![] } else { half_gaussian() },
-            spread,
-            rounds,
+        let mut gaussian = Box::new([0; GAUSSIANS]);
+        if noise != [0, 0] {
+            gaussian.copy_from_slice(&half_gaussian());
         }
+        let mut reaches = Box::new([0; PLACES]);
+        for (own, reach) in (0u64..).zip(reaches.iter_mut()).skip(1) {
+            let wide = ((u64::from(span) << FINE) + own / 2) / own;
+            *reach = narrow(wide, "2^12 windows at most");
+        }
+        let fits_lanes = fits_lanes(&steps[..], &spread, noise);
+        Self { reaches, fits_lanes, steps, floor, span, level_max, noise, gaussian, spread, rounds }
     }
 
     /// Whether steps are rounded with a word, and whether they take one for noise.
@@ -175,18 +201,39 @@ impl Device {
             factors,
             floor: narrow(floor, "a level"),
             ceiling: narrow(ceiling, "a level"),
-            reach: narrow(((span << FINE) + own / 2) / own, "2^12 windows at most"),
+            reach: self.reach(narrow(own, "a level")),
         }
+    }
+
+    /// What a pulse is made of, where every number of it fits a lane of 32 bits and every product one of 64.
+    #[must_use]
+    #[inline]
+    pub fn lanes(&self) -> Option<DeviceLanes<'_>> {
+        let narrow = |of: i64| u32::try_from(of).expect("below 2^23, and a window of steps");
+        self.fits_lanes.then(|| DeviceLanes {
+            steps: &self.steps,
+            last: u32::from(self.span),
+            noise: self.noise.map(narrow),
+            gaussian: &self.gaussian,
+        })
+    }
+
+    /// Levels of the chip's window over so many of a cell's own, 16 fractional bits.
+    #[must_use]
+    #[inline]
+    pub fn reach(&self, own: u16) -> u32 {
+        self.reaches[usize::from(own) % PLACES]
     }
 
     /// By how many levels a pulse moves a cell at a level of its own window, before the window holds it.
     #[must_use]
     #[inline]
     pub fn moves(&self, cell: &OwnCell, level: u16, rises: bool, words: PulseWords) -> i64 {
-        let above = u64::from(level - cell.floor) * u64::from(cell.reach);
+        let above = u64::from(level.saturating_sub(cell.floor)) * u64::from(cell.reach);
         let at = usize::try_from((above + (1 << (FINE - 1))) >> FINE).expect("a level");
+        let at = at.min(self.span.into());
         let polarity = usize::from(!rises);
-        let table = i64::from(self.tables[polarity][at]);
+        let table = i64::from(self.steps[polarity * PLACES + at]);
         let mut step = rsh(table * i64::from(cell.factors[polarity]), FACTOR_BITS);
         if self.noise != [0, 0] {
             let half = i64::from(self.gaussian[usize::from(words.noise >> 4)]);
@@ -198,4 +245,17 @@ impl Device {
         let signed = if rises { step } else { -step };
         (signed + i64::from(words.rounding)) >> STEP_BITS
     }
+}
+
+/// Whether the numbers of any pulse fit 32 bits: noise is below four deviations.
+fn fits_lanes(steps: &[u32], spread: &[Option<Quantiles>; 4], noise: [i64; 2]) -> bool {
+    let longest = u128::from(steps.iter().copied().max().unwrap_or_default());
+    let one = u128::from(FACTOR_ONE);
+    let most = |sub: usize| spread[sub].as_ref().map_or(FACTOR_ONE, Quantiles::greatest).into();
+    let (step, up): (u128, u128) = (most(0), most(1));
+    let up = if up > one { 2 * one } else { one };
+    let mean = ((longest * step * up) >> (2 * FACTOR_BITS)) + 2;
+    let [share, whole] = noise.map(|of| u128::from(of.unsigned_abs()));
+    let deviation = ((mean * share) >> FINE) + whole + 1;
+    mean + 4 * deviation + 256 < 1 << 31
 }

@@ -1,7 +1,7 @@
 //! A target of more than two banks: read, written and timed like any other.
 
 use super::tick::Network;
-use super::{Engine, Operation, Phase, Side, Write};
+use super::{Engine, Operation, Phase, Recorded, Side, Write};
 use crate::chip::crossbar::kernel::Backend;
 use crate::chip::hardware::timing::{PulseCode, Timing};
 use crate::chip::hardware::{Adc, AdcRange, Hardware, Subtract};
@@ -137,6 +137,54 @@ fn what_all_pairs_read_adds_up_and_tick_agrees() {
                 }
             }
         }
+    }
+}
+
+#[test]
+fn a_refresh_takes_what_both_cells_hold_off_both() {
+    let mut engine = engine(Adc::Ideal, Backend::Scalar);
+    let pathways = engine.layers()[0].arrays.len();
+    for (layer, array) in (0..2).flat_map(|layer| (0..pathways).map(move |array| (layer, array))) {
+        for row in 0..engine.layers()[layer].layout.rows {
+            let levels: Vec<u16> =
+                (0..UNITS).map(|column| level(layer, array, row, column)).collect();
+            engine.execute(&Operation::LoadWeights { layer, array, row, levels: &levels });
+        }
+    }
+    let chip = engine.hardware().clone();
+    let mut tick = Network::new(&chip, 1, engine.layers(), SAMPLES);
+    let levels = |layers: &[Layer], layer: usize, array: usize| -> Vec<u16> {
+        layers[layer].arrays[array].levels().collect()
+    };
+    let before = engine.layers().to_vec();
+    engine.set_phase(Phase::Evaluation);
+    tick.set_phase(Phase::Evaluation);
+    engine.record(true);
+    engine.refresh();
+    engine.settle();
+    let floor = chip.cell.window.floor();
+    let mut moved = 0;
+    for (layer, of) in before.iter().enumerate() {
+        for (_, [e, i]) in of.spec.wiring.planes() {
+            let was = [e, i].map(|array| levels(&before, layer, array));
+            let is = [e, i].map(|array| levels(engine.layers(), layer, array));
+            for cell in 0..was[0].len() {
+                let off = was.each_ref().map(|of| i32::from(of[cell]));
+                let now = is.each_ref().map(|of| i32::from(of[cell]));
+                assert_eq!(off[0] - off[1], now[0] - now[1], "{layer} {e} {i} {cell}");
+                assert_eq!(now[0].min(now[1]), i32::from(floor));
+                moved += u64::from(off != now);
+            }
+        }
+    }
+    assert!(moved > 100, "{moved}");
+    // what was done is a list of loads, of every cell, and Tick does the same
+    let tape = engine.record(false);
+    assert!(tape.iter().all(|of| matches!(of, Recorded::LoadWeights { .. })), "{}", tape.len());
+    tick.play_tape(&tape);
+    assert_eq!(engine.ledger(Phase::Evaluation), tick.ledger(Phase::Evaluation));
+    for (layer, array) in (0..2).flat_map(|layer| (0..pathways).map(move |array| (layer, array))) {
+        assert!(levels(engine.layers(), layer, array).into_iter().eq(tick.levels(layer, array)));
     }
 }
 

@@ -58,6 +58,7 @@ fn network(mut layers: Vec<LayerSpec>, centred: bool) -> Driver {
         optimisers: vec![Optimiser::Rms; count],
         centred: vec![centred; count],
         control: Control::None,
+        refresh: None,
     };
     let place = NetworkPlace { seed: 3, first_layer: 0, updates: 10 };
     spec.build(&Hardware::reference(), Backend::Scalar, place).unwrap()

@@ -4,6 +4,7 @@
 use std::collections::BTreeMap;
 use std::fmt::Display;
 use std::iter;
+use std::num::NonZeroU32;
 
 use super::changed::{self, UnderModel};
 use super::file::{ChipFile, DataFile, ExperimentFile, LearningFile, NetworkFile, PerLayer};
@@ -111,6 +112,8 @@ pub struct Config {
     pub(crate) centre: Centre,
     /// What is taken from a network, to see whether it is needed.
     pub(crate) control: Control,
+    /// Updates from a refresh of all pairs to the next.
+    pub(crate) refresh: Option<NonZeroU32>,
     /// Whether all layers learn from what differs from the mean of a row; of policies, [`PolicySettings`] says which.
     pub(crate) centred: bool,
     /// How errors reach hidden layers; `None` with back-propagation.
@@ -235,8 +238,19 @@ pub(super) fn config(mut file: ExperimentFile, model: &UnderModel) -> Result<Con
     let Learnt { data, input, convolutions, hidden, outputs, .. } = learnt;
     let Learnt { network, learning, mantissas, policy, .. } = learnt;
     let Network { activations, weight_max_log2, bias, gain_64ths, homeostasis } = network;
-    let Learning { kind, mode, centre, control, route, batch, rates, decay, optimiser, .. } =
-        learning;
+    let Learning {
+        kind,
+        mode,
+        centre,
+        control,
+        refresh,
+        route,
+        batch,
+        rates,
+        decay,
+        optimiser,
+        ..
+    } = learning;
     let Learning { error, centred, epochs, shift_pixels, flip, train_on, select, .. } = learning;
     #[cfg(feature = "grown")]
     file.learning.get_or_insert_default().grown.get_or_insert(0);
@@ -257,6 +271,7 @@ pub(super) fn config(mut file: ExperimentFile, model: &UnderModel) -> Result<Con
         error,
         centre,
         control,
+        refresh,
         centred,
         route,
         batch,

@@ -324,12 +324,17 @@ impl Config {
             return Ok(Source::Environment(policy.environment.id.to_string()));
         }
         let data = &self.data;
-        if data.format.is_some() {
-            return Ok(Source::Files(Box::new(own(data)?)));
-        }
-        let name = data.set.as_deref().unwrap_or("optdigits");
-        let unknown = |error| wrong("data.set", format!("is \"{name}\""), error);
-        Ok(Source::Named(name.parse().map_err(unknown)?))
+        let whole = if data.format.is_some() {
+            Source::Files(Box::new(own(data)?))
+        } else {
+            let name = data.set.as_deref().unwrap_or("optdigits");
+            let unknown = |error| wrong("data.set", format!("is \"{name}\""), error);
+            Source::Named(name.parse().map_err(unknown)?)
+        };
+        Ok(match data.middle {
+            Some(sides) => Source::Middle(Box::new(whole), sides),
+            None => whole,
+        })
     }
 
     /// The configuration as the file of a run in `folder`: with what was told from its files, and paths as that folder

@@ -159,6 +159,7 @@ impl Config {
             optimisers: vec![self.optimiser; count],
             centred: vec![self.centred; count],
             control: self.control,
+            refresh: self.refresh,
         }
     }
 

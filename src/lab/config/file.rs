@@ -117,6 +117,8 @@ keys! {
         classes: usize,
         /// Height, width and channels of examples that are pictures; a table's values lie row after row, the channels of a pixel side by side.
         shape: [usize; 3],
+        /// Pictures: rows and pixels of a row that are kept of their middle.
+        middle: [usize; 2],
         /// CSV: `first`, `last`, a number from 0, or a header; default: told from the table, and said.
         label_column: ColumnFile,
         /// CSV: columns left out, each a number from 0 or a header; default: those without a name that number the rows.
@@ -223,6 +225,8 @@ keys! {
         centre: String,
         /// What is taken away, to see whether it is needed.
         control: String,
+        /// Updates after which, again and again, what both cells of a pair hold is taken off both by loads: for cells that only rise.
+        refresh: u32,
         /// How errors reach hidden units.
         route: String,
         /// Words a hidden unit adds.

@@ -5,6 +5,8 @@
 //! program later changes no list of a run that does not use it. [`FROZEN`] is never edited, only added to: when what
 //! users get by saying nothing changes, the key is written into the resolved configuration instead.
 
+use std::num::NonZeroU32;
+
 use super::{Config, ConfigError, Select, TrainOn};
 use crate::chip::crossbar::kernel::ConvShape;
 use crate::chip::device::{CellSpread, DeviceSpec, Faults, PulseNoise};
@@ -78,6 +80,9 @@ const FROZEN: &[(&str, &str)] = &[
     ("learning.control", "none"),
     ("actor.control", "none"),
     ("critic.control", "none"),
+    ("learning.refresh", "0"),
+    ("actor.refresh", "0"),
+    ("critic.refresh", "0"),
     ("ppo.noise_steps", "1"),
     ("layer.pool", "none"),
     ("layer.threshold", "false"),
@@ -275,6 +280,7 @@ impl List {
             optimisers,
             centred,
             control,
+            refresh,
         } = network;
         for (number, (layer, rate)) in (first..).zip(layers.iter().zip(rates)) {
             self.layer(number, layer);
@@ -327,6 +333,7 @@ impl List {
             Control::SameSign => "same_sign",
         };
         self.put(&format!("{head}.control"), control);
+        self.put(&format!("{head}.refresh"), refresh.map_or(0, NonZeroU32::get));
         self.put(&format!("{head}.rule"), rule);
         self.put(&format!("{head}.mode"), mode);
         let error = match error {

@@ -19,10 +19,10 @@ const BUILTIN: [(&str, &str); 13] = models!(
 
 /// Devices that others have published, on the periphery of the ideal chip: not all of them learn by default, which is what they
 /// are there to show.
-const DEVICES: [(&str, &str); 18] = models!(
+const DEVICES: [(&str, &str); 19] = models!(
     "devices/": "ag_asi" "taox_tiox" "taox_hfox" "pcmo" "alox_hfo2" "gst_pcm" "epiram" "hzo_fefet" "neurosim_ideal"
     "aihwkit_reram_es" "aihwkit_reram_sb" "aihwkit_reram_array_om" "aihwkit_reram_array_hfo2" "aihwkit_capacitor"
-    "aihwkit_ecram_li" "aihwkit_ecram_mo" "aihwkit_gokmen_vlasov" "aihwkit_idealized"
+    "aihwkit_ecram_li" "aihwkit_ecram_mo" "aihwkit_gokmen_vlasov" "aihwkit_idealized" "aihwkit_pcm"
 );
 
 /// A checked hardware model.

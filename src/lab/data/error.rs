@@ -29,6 +29,25 @@ pub enum DataError {
         /// Which part differs.
         part: &'static str,
     },
+    /// A middle of what is no picture.
+    #[error(
+        "data.middle: these examples are no pictures ({description}); take it out, or say their sides with data.shape"
+    )]
+    NoPictures {
+        /// What the examples are.
+        description: String,
+    },
+    /// A middle that a picture does not have.
+    #[error(
+        "data.middle is {sides:?}; pictures of {} x {} have a middle of 1..={} rows of 1..={} pixels",
+        .whole.height, .whole.width, .whole.height, .whole.width
+    )]
+    NoMiddle {
+        /// Rows and pixels of a row that were asked for.
+        sides: [usize; 2],
+        /// What the pictures are.
+        whole: ImageShape,
+    },
     /// Keys that name no data.
     #[error("{0}")]
     Keys(String),

@@ -126,6 +126,7 @@ pub fn load(source: &Source, root: &DataRoot) -> Result<Data, DataError> {
             None => own::load(files),
             Some(place) => own::load(&files.moved(place)?),
         },
+        Source::Middle(of, sides) => middle(load(of, root)?, *sides),
         Source::Environment(id) => match root.files() {
             None => acting::describe(id),
             Some(place) => Err(DataError::NoFiles { id: id.clone(), path: place.into() }),
@@ -155,6 +156,31 @@ fn named(set: NamedSet, root: &DataRoot) -> Result<Data, DataError> {
         }
     };
     Ok(finish(&set.to_string(), split, image, note))
+}
+
+/// The middle of each picture.
+fn middle(data: Data, [height, width]: [usize; 2]) -> Result<Data, DataError> {
+    let Some(whole) = data.image else {
+        return Err(DataError::NoPictures { description: data.description });
+    };
+    let Some(image) = whole.middle([height, width]) else {
+        return Err(DataError::NoMiddle { sides: [height, width], whole });
+    };
+    let [top, left] = [(whole.height - height) / 2, (whole.width - width) / 2];
+    let part = |part: &Examples| {
+        let rows = part.all_values().chunks_exact(whole.width);
+        let wanted =
+            rows.enumerate().filter(|(row, _)| (top..top + height).contains(&(row % whole.height)));
+        let values = wanted.flat_map(|(_, row)| &row[left..left + width]).copied().collect();
+        let (labels, values_each) = (part.labels().to_vec(), image.values().expect("smaller"));
+        Examples::new(values, labels, values_each, part.full_scale(), part.classes())
+            .expect("as many pictures, of values that were there")
+    };
+    let Split { train, validation, test } = &data.split;
+    let split = Split { train: part(train), validation: part(validation), test: part(test) };
+    let note = format!("{}; the middle {height} x {width} of each picture", data.description);
+    let hash = content_hash(&split);
+    Ok(Data { split, description: note, hash, image: Some(image), ..data })
 }
 
 const TAIL_NOTE: &str = "; validation is the last twelfth of the training half";
@@ -331,6 +357,33 @@ mod tests {
         for (at, hash) in hashes.iter().enumerate() {
             assert!(!hashes[..at].contains(hash));
         }
+    }
+
+    #[test]
+    fn the_middle_of_pictures_is_cut_from_every_plane() {
+        let image = ImageShape { height: 4, width: 5, channels: 2 };
+        let part = |first: u8| {
+            let values = (0..80).map(|value| first + value).collect();
+            Examples::new(values, vec![1, 0], 40, 255, 2).unwrap()
+        };
+        let split = Split { train: part(0), validation: part(80), test: part(160) };
+        let data = finish("mine", split, Some(image), "");
+        let cut = middle(data.clone(), [1, 2]).unwrap();
+        // row 1 of 0..4 and pixels 1 and 2 of 0..5, of two planes of 20 values and two pictures of 40
+        assert_eq!(cut.split.train.all_values(), [6, 7, 26, 27, 46, 47, 66, 67]);
+        assert_eq!(cut.split.test.all_values()[..2], [166, 167]);
+        assert_eq!(cut.split.validation.labels(), [1, 0]);
+        assert_eq!(cut.image, Some(ImageShape { height: 1, width: 2, channels: 2 }));
+        assert!(cut.description.ends_with("; the middle 1 x 2 of each picture"));
+        assert_ne!(cut.hash, data.hash);
+        assert_eq!(middle(data.clone(), [4, 5]).unwrap().hash, data.hash);
+        for sides in [[5, 1], [1, 6], [0, 1], [1, 0]] {
+            let error = middle(data.clone(), sides).unwrap_err().to_string();
+            assert!(error.contains("4 x 5"), "{error}");
+        }
+        let flat = Data { image: None, ..data };
+        let error = middle(flat, [1, 1]).unwrap_err().to_string();
+        assert!(error.contains("data.shape"), "{error}");
     }
 
     #[test]

@@ -15,6 +15,8 @@ pub enum Source {
     Named(NamedSet),
     /// Files of the user's own.
     Files(Box<FileSet>),
+    /// The middle of each picture of another source: rows and pixels of a row.
+    Middle(Box<Source>, [usize; 2]),
     /// No examples at all: what a policy acts on, by name.
     Environment(String),
 }
@@ -270,6 +272,14 @@ impl ImageShape {
     #[must_use]
     pub fn values(self) -> Option<usize> {
         self.height.checked_mul(self.width)?.checked_mul(self.channels)
+    }
+
+    /// The middle of it, `height` rows of `width` pixels; where a border is odd, the part above or to the left is the smaller
+    /// one. `None` when it has no such middle.
+    #[must_use]
+    pub const fn middle(self, [height, width]: [usize; 2]) -> Option<Self> {
+        let fits = height > 0 && width > 0 && height <= self.height && width <= self.width;
+        if fits { Some(Self { height, width, ..self }) } else { None }
     }
 }
 

@@ -41,6 +41,7 @@ fn plain() -> NetworkSpec {
         optimisers: vec![Optimiser::Plain; 2],
         centred: vec![false; 2],
         control: Control::None,
+        refresh: None,
     }
 }
 

@@ -38,6 +38,7 @@ fn network(rule: Rule, mode: UpdateMode) -> NetworkSpec {
         optimisers: vec![Optimiser::Plain; 2],
         centred: vec![false; 2],
         control: Control::None,
+        refresh: None,
     }
 }
 

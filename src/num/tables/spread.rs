@@ -61,6 +61,12 @@ impl Quantiles {
         Self(all.map(factor).collect())
     }
 
+    /// The greatest factor.
+    #[must_use]
+    pub fn greatest(&self) -> u32 {
+        self.0.last().copied().unwrap_or_default()
+    }
+
     /// The factor of a word.
     #[must_use]
     pub fn factor(&self, word: u32) -> u32 {

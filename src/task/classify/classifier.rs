@@ -55,6 +55,7 @@ use crate::learn::network::NetworkError;
 ///     optimisers: vec![Optimiser::Plain; 2],
 ///     centred: vec![false; 2],
 ///     control: Control::None,
+///     refresh: None,
 /// };
 /// let hardware = Hardware::reference();
 /// let coding = Coding::Values;

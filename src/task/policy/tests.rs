@@ -119,6 +119,7 @@ fn network(inputs: usize, outputs: usize, rule: Rule) -> NetworkSpec {
         optimisers: vec![Optimiser::Sign { dead_zone: true }; 2],
         centred: vec![outputs > 1, false],
         control: Control::None,
+        refresh: None,
     }
 }
 

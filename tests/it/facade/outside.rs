@@ -62,6 +62,7 @@ pub(super) fn policy(c: &mut Choices<'_>) {
         optimisers: vec![Optimiser::Sign { dead_zone: true }; 2],
         centred: vec![false; 2],
         control: Control::None,
+        refresh: None,
         layers: [(1, 4), (4, outputs)]
             .into_iter()
             .map(|(inputs, units)| LayerSpec {

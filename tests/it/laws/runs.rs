@@ -1,5 +1,7 @@
 //! Law 3: a run has one state, however it is carried out.
 
+use std::num::NonZeroU32;
+
 use dalean::chip::crossbar::kernel::Backend;
 use dalean::chip::hardware::{Adc, AdcRange, HardwareSpec};
 use dalean::chip::layer::{DrivenBy, Homeostasis, InitialLevels, LayerSpec, Optimiser, Pool};
@@ -146,6 +148,8 @@ fn run() -> impl Strategy<Value = Run> {
                 optimisers: vec![Optimiser::Plain; count],
                 centred: vec![false; count],
                 control,
+                // every update, every second, every third, or never
+                refresh: NonZeroU32::new((seed >> 7) as u32 % 4),
             };
             let augment = image.then(|| moved(sides[0])).flatten();
             let coding = Coding::Values;

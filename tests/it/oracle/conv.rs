@@ -156,6 +156,7 @@ fn experiment(s: &Value) -> Experiment {
         optimisers: layers.iter().map(optimiser).collect(),
         centred: layers.iter().map(|a| a["centred"] == true).collect(),
         control: Control::None,
+        refresh: None,
     };
     Experiment {
         seed: text(&s["seed_decimal"]).parse().unwrap(),

@@ -62,6 +62,7 @@ pub(super) const OPS: Ops = Ops {
     may_move: fused::may_move,
     pulses,
     levels,
+    pulse: Some(pulse),
     offset,
     index_squares,
     centre: normalise::centre,

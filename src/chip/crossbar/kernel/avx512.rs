@@ -75,6 +75,7 @@ pub(super) const OPS: Ops = Ops {
     may_move: fused::may_move,
     pulses,
     levels,
+    pulse: Some(pulse),
     offset,
     index_squares,
     stream_squares: normalise::stream_squares,

@@ -17,7 +17,9 @@ use std::arch::{asm, is_aarch64_feature_detected};
 use std::ops::Range;
 
 use super::ops::Ops;
-use super::{Drives, Extremes, Half, Peaks, lanes, levels, normalise, offsets, pulses, scalar};
+use super::{
+    Drives, Extremes, Half, Peaks, lanes, levels, normalise, offsets, pulses, respond, scalar,
+};
 use crate::chip::crossbar::layout::{BLOCK_CELLS, BLOCK_ROWS, HALF_CELLS, HALF_COLUMNS, Layout};
 
 mod dither;
@@ -80,6 +82,7 @@ const fn table<M: Multiply>() -> Ops {
         may_move: pulses::may_move_twin,
         pulses: pulses::twin,
         levels: levels::twin,
+        pulse: Some(respond::pulse),
         offset: offsets::offset,
         index_squares: offsets::index_squares,
         stream_squares: normalise::stream_squares,

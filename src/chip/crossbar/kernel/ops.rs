@@ -12,11 +12,13 @@
 
 use std::ops::Range;
 
+use super::respond::{Sent, Words};
 use super::{
     Banks, Cells, Conversion, Dither, Draws, Drives, Ends, Extremes, Half, HandOn, Image, LookUp,
     MiddleOf, OneSample, Peaks, Rails, Scratch, SignLaw, Squares, Sums, WriteCounts, WriteLaw,
 };
 use crate::chip::crossbar::layout::{BLOCK_ROWS, HALF_COLUMNS, Layout, PANEL_COLUMNS};
+use crate::chip::device::DeviceLanes;
 use crate::num::fixed::ErrorBits;
 
 /// The operations of a back end.
@@ -82,6 +84,8 @@ pub(super) struct Ops {
     pub(super) pulses:
         unsafe fn(Sums<'_>, &WriteLaw, Dither<'_>, &mut Cells<'_>, &mut Half<i8>) -> WriteCounts,
     pub(super) levels: unsafe fn(&mut Cells<'_>, &Half<i8>, Ends, u16) -> u64,
+    /// A pulse of cells that are not ideal, where a back end does that side by side.
+    pub(super) pulse: Option<unsafe fn(&mut Sent, &DeviceLanes<'_>, Words<'_>, usize) -> u64>,
     pub(super) centre: unsafe fn(&mut Half<i32>, &[i32; BLOCK_ROWS], &[i32; HALF_COLUMNS]),
     pub(super) gate_totals: unsafe fn(&[i8]) -> [i32; HALF_COLUMNS],
     pub(super) drive_totals: unsafe fn(&[u8], usize) -> [u32; BLOCK_ROWS],
@@ -126,6 +130,16 @@ macro_rules! twins {
         #[target_feature(enable = $features)]
         fn levels(cells: &mut Cells<'_>, pulses: &Half<i8>, ends: Ends, groups: u16) -> u64 {
             crate::chip::crossbar::kernel::levels::twin(cells, pulses, ends, groups)
+        }
+
+        #[target_feature(enable = $features)]
+        fn pulse(
+            sent: &mut crate::chip::crossbar::kernel::respond::Sent,
+            device: &crate::chip::device::DeviceLanes<'_>,
+            words: crate::chip::crossbar::kernel::respond::Words<'_>,
+            active: usize,
+        ) -> u64 {
+            crate::chip::crossbar::kernel::respond::pulse(sent, device, words, active)
         }
 
         #[target_feature(enable = $features)]

@@ -9,15 +9,20 @@
 //! words      of the cell, site 4 (16 bits) and 14 (8 bits), sub: the pulse of the write, from 0
 //! ```
 //!
-//! Words that no cell of a column takes are not drawn. See docs/MODEL.md, 3.11.
+//! Words that no cell of a column takes are not drawn. [`law`] goes cell by cell; where a back end has a twin of its pulse
+//! and a device's numbers fit 32 bits, [`side_by_side`] does the same. See docs/MODEL.md, 3.11.
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
-use super::{Cells, Draws, Ends, Half, Kernel};
+use super::{Cells, Draws, Ends, Half, Kernel, call};
 use crate::chip::crossbar::CellsMade;
 use crate::chip::crossbar::layout::{BLOCK_ROWS, HALF_CELLS, HALF_COLUMNS, in_half};
 use crate::chip::device::PulseWords;
 use crate::num::draw::{Place, Site};
 use crate::num::fixed::narrow;
+
+mod lanes;
+
+pub(super) use lanes::{Sent, Words, pulse};
 
 /// So many columns with a pulse make it worth drawing the words of all sixteen at once.
 const ALL_AT_ONCE: u32 = 4;
@@ -33,6 +38,8 @@ pub struct Answers {
     rows: usize,
     /// By pulse: words of rounding and of noise.
     draws: Vec<[Draws; 2]>,
+    /// Cells with a pulse.
+    sent: Sent,
 }
 
 /// What cells of a half block answer to pulses with.
@@ -50,7 +57,8 @@ impl Answers {
     /// Those of a write of an array of so many rows, at the place of its dither.
     #[must_use]
     pub const fn new(place: Place, rows: usize) -> Self {
-        Self { rounding: [0; HALF_CELLS], noise: [0; HALF_CELLS], place, rows, draws: vec![] }
+        let (rounding, noise) = ([0; HALF_CELLS], [0; HALF_CELLS]);
+        Self { rounding, noise, place, rows, draws: vec![], sent: Sent::NONE }
     }
 
     /// Draws the words of a pulse for the columns of a mask.
@@ -94,6 +102,52 @@ impl Answers {
             }
         }
     }
+}
+
+/// What cells of a half block answer. Returns by how many levels pulses moved them.
+pub(super) fn respond(
+    kernel: &Kernel,
+    cells: &mut Cells<'_>,
+    answering: &mut Answering<'_>,
+    (pulses, groups): (&Half<i8>, u16),
+    ends: Ends,
+) -> u64 {
+    let device = answering.made.device;
+    match (kernel.ops.pulse, device.lanes()) {
+        (Some(pulse), Some(lanes)) => {
+            // of the kernel's own table
+            let pulse = |sent: &mut Sent, words: Words<'_>, active| {
+                call!(pulse, (sent, &lanes, words, active))
+            };
+            side_by_side(kernel, cells, answering, (pulses, groups), (ends, &pulse))
+        }
+        _ => law(kernel, cells, answering, (pulses, groups), ends),
+    }
+}
+
+/// [`law`] with all cells of a pulse beside one another.
+fn side_by_side(
+    kernel: &Kernel,
+    cells: &mut Cells<'_>,
+    answering: &mut Answering<'_>,
+    (pulses, groups): (&Half<i8>, u16),
+    (ends, pulse): (Ends, &dyn Fn(&mut Sent, Words<'_>, usize) -> u64),
+) -> u64 {
+    let Answering { made, words, at: place } = answering;
+    let wants = made.device.wants();
+    words.sent.collect(cells, made, pulses, groups);
+    let mut effective = 0;
+    for number in 0.. {
+        let (active, columns) = words.sent.beyond(number);
+        if active == 0 {
+            break;
+        }
+        words.draw(kernel, number, *place, (columns, wants));
+        let Answers { rounding, noise, sent, .. } = &mut **words;
+        effective += pulse(sent, Words { rounding, noise }, active);
+    }
+    words.sent.settle(cells, made, ends);
+    effective
 }
 
 /// Columns of a half block with a cell of more than so many pulses in some groups, a bit each.

@@ -52,6 +52,7 @@ pub(super) const OPS: Ops = Ops {
     may_move: pulses::may_move,
     pulses: pulses::law,
     levels: levels::law,
+    pulse: None,
     centre: optimise::centre,
     gate_totals: optimise::gate_totals,
     drive_totals: optimise::drive_totals,

@@ -7,6 +7,7 @@ use super::*;
 use crate::chip::crossbar::layout::{HALF_CELLS, HALF_COLUMNS, in_half};
 use crate::num::draw::{BLOCK_BYTES, Place, Site};
 
+mod answers;
 mod reads;
 mod steps;
 

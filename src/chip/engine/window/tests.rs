@@ -439,14 +439,22 @@ proptest! {
         let stride = stride_of(windows.len());
         let pixels = (net.samples * shape.height * shape.width) as i64;
         for (array, stream) in [(0, Stream::P), (2, Stream::N)] {
-            for (unit, row) in [(0, 0), (net.units[0] - 1, shape.rows() - 1)] {
+            // the row behind those of the window is driven everywhere, with the greatest code
+            let constant = net.constant_row.then_some((0, shape.rows()));
+            let cells = [(0, 0), (net.units[0] - 1, shape.rows() - 1)];
+            for (unit, row) in cells.into_iter().chain(constant) {
                 let gates: Vec<i64> = (0..windows.len())
                     .map(|read| registers.gates[stream.index()][packed_at(stride, read, unit)].into())
                     .collect();
-                let products = windows.iter().zip(&gates).map(|(rows, u)| i64::from(rows[row]) * u);
-                let channel = row % shape.channels;
-                let all = codes.iter().skip(channel).step_by(shape.channels);
-                let sum: i64 = all.map(|&code| i64::from(code)).sum();
+                let most = net.chip.drive.bits.code_max();
+                let drive = |rows: &[u8]| rows.get(row).copied().unwrap_or(most);
+                let products = windows.iter().zip(&gates).map(|(r, u)| i64::from(drive(r)) * u);
+                let sum = if row < shape.rows() {
+                    let all = codes.iter().skip(row % shape.channels).step_by(shape.channels);
+                    all.map(|&code| i64::from(code)).sum()
+                } else {
+                    pixels * i64::from(most)
+                };
                 let mean = (2 * (sum << 4) + pixels) / (2 * pixels);
                 let want = (products.sum::<i64>() << 4) - mean * gates.iter().sum::<i64>();
                 let layout = engine.layers()[0].layout;

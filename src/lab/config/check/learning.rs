@@ -1,5 +1,7 @@
 //! `[learning]`: rule, batches, rates, and which state is kept.
 
+use std::num::NonZeroU32;
+
 use super::style::Style;
 use super::{
     Select, TrainOn, between, one_a_layer, per_layer, positive, range, route, word, wrong,
@@ -100,6 +102,7 @@ pub(super) struct Learning {
     pub(super) mode: UpdateMode,
     pub(super) centre: Centre,
     pub(super) control: Control,
+    pub(super) refresh: Option<NonZeroU32>,
     pub(super) centred: bool,
     pub(super) error: OutputError,
     pub(super) route: Option<Route>,
@@ -122,6 +125,7 @@ impl Learning {
             mode: UpdateMode::Accumulate,
             centre: Centre::None,
             control: Control::None,
+            refresh: None,
             centred: false,
             error: OutputError::OneVsAll,
             route: Some(Route::Modulo { taps: 1, shift: None }),
@@ -177,6 +181,7 @@ pub(super) fn resolve(
         mode,
         centre,
         control: word("learning.control", &mut file.control, "none", &CONTROLS)?,
+        refresh: refresh(file)?,
         centred: *file.centred.get_or_insert(style.keeps_middles()),
         error,
         route: route::resolve(file, kind.rule, style.taps())?,
@@ -190,6 +195,14 @@ pub(super) fn resolve(
         train_on,
         select,
     })
+}
+
+/// Updates from a refresh to the next.
+pub(super) fn refresh(file: &LearningFile) -> Result<Option<NonZeroU32>, ConfigError> {
+    let Some(every) = file.refresh else { return Ok(None) };
+    let allowed = "it is a number of updates from 1 on; leave it out for none";
+    let every = NonZeroU32::new(every);
+    every.map(Some).ok_or_else(|| wrong("learning.refresh", "is 0", allowed))
 }
 
 /// What the error of an output is, with a key that belongs to one of them.

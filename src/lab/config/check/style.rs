@@ -5,7 +5,7 @@ use super::wrong;
 use crate::lab::config::ConfigError;
 use crate::lab::config::defaults::SetDefaults;
 use crate::lab::config::file::{DataFile, PerLayer};
-use crate::lab::data::{CatalogEntry, NamedSet};
+use crate::lab::data::{CatalogEntry, ImageShape, NamedSet};
 
 /// Whose defaults.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -112,6 +112,20 @@ fn nearest_weight(fan_in: usize) -> f64 {
 
 /// The sizes of pictures that are known before they are read.
 fn image(data: &DataFile) -> Result<Option<[usize; 3]>, ConfigError> {
+    let whole = whole(data)?;
+    let (Some(sides), Some([height, width, channels])) = (data.middle, whole) else {
+        return Ok(whole);
+    };
+    let of = ImageShape { height, width, channels };
+    let Some(ImageShape { height, width, channels }) = of.middle(sides) else {
+        let allowed = format!("it is [rows, pixels of a row], at most [{height}, {width}]");
+        return Err(wrong("data.middle", format!("is {sides:?}"), allowed));
+    };
+    Ok(Some([height, width, channels]))
+}
+
+/// The same before their middle is cut out.
+fn whole(data: &DataFile) -> Result<Option<[usize; 3]>, ConfigError> {
     if let Some(shape) = data.shape {
         if shape.iter().any(|side| !(1..=4096).contains(side)) {
             let allowed = "it is [height, width, channels], each 1..=4096";

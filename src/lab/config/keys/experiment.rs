@@ -166,6 +166,9 @@ const DATA: &[KeyEntry] = &[
     other("shape", "[height, width, channels], each 1..=4096")
         .only("with data.format", CSV)
         .otherwise("what the file says; a table says nothing"),
+    other("middle", "[rows, pixels of a row], each 1 to what a picture has")
+        .otherwise("whole pictures")
+        .law("needs pictures: a set of them, or files that tell their sides"),
     other("label_column", "`first`, `last`, a number from 0, or a header")
         .only("with data.format = \"csv\"", CSV)
         .otherwise("told from the table, and said"),
@@ -450,6 +453,7 @@ const LEARNING: &[KeyEntry] = &[
         ],
     )
     .default("\"none\""),
+    whole("refresh", 1, u32::MAX as i64).unit("updates").otherwise("never"),
     words(
         "route",
         &[

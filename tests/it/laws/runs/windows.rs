@@ -107,6 +107,7 @@ fn windows() -> impl Strategy<Value = Run> {
                 optimisers: vec![optimiser; count],
                 centred: vec![centred; count],
                 control: Control::None,
+                refresh: None,
             };
             let experiment = Experiment {
                 seed,

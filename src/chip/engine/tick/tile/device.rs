@@ -118,7 +118,8 @@ impl TileDevice {
         let own = cell.ceiling - cell.floor;
         // as far up its own window as this is up that of the chip, in steps of 2^-16 of its levels
         let reach = ((self.span << 16) + own / 2) / own;
-        let place = rsh((level - cell.floor) * reach, 16);
+        // a stuck cell may rest outside the window of its own
+        let place = rsh((level - cell.floor).max(0) * reach, 16).min(self.span);
         let side = usize::from(!rises);
         let mean = i128::from(self.tables[side][usize::try_from(place).expect("inside")]);
         let mean = rsh(mean * cell.factors[side], 24);
