@@ -99,7 +99,9 @@ pub enum MeasureError {
     #[error(transparent)]
     Table(#[from] CsvError),
     /// No line.
-    #[error("holds no reads; it has a line of names, such as `device,pulse,polarity,conductance`, and a line a read")]
+    #[error(
+        "holds no reads; it has a line of names, such as `device,pulse,polarity,conductance`, and a line a read"
+    )]
     Empty,
     /// No names.
     #[error(
@@ -164,7 +166,9 @@ pub enum MeasureError {
         limit: usize,
     },
     /// Too many pulses between two reads.
-    #[error("line {line} lies {found} pulses behind the read before it, at most {limit} are followed; is the column of pulses right?")]
+    #[error(
+        "line {line} lies {found} pulses behind the read before it, at most {limit} are followed; is the column of pulses right?"
+    )]
     Between {
         /// Line, from 1.
         line: u64,
@@ -174,7 +178,9 @@ pub enum MeasureError {
         limit: i64,
     },
     /// One conductance.
-    #[error("{device} has the same conductance in every line, {found}: nothing moves it; take it out")]
+    #[error(
+        "{device} has the same conductance in every line, {found}: nothing moves it; take it out"
+    )]
     Still {
         /// Which.
         device: String,
@@ -191,7 +197,9 @@ pub enum MeasureError {
         found: [usize; 2],
     },
     /// Pulses that move the wrong way.
-    #[error("pulses {way} move the conductance the other way on the mean; exchange the words of the column `polarity`")]
+    #[error(
+        "pulses {way} move the conductance the other way on the mean; exchange the words of the column `polarity`"
+    )]
     Backwards {
         /// Which.
         way: &'static str,
@@ -249,8 +257,20 @@ impl MeasuredDevice {
         let digest = blake3::hash(bytes).to_hex()[..12].to_owned();
         let file = file.chars().map(|c| if c.is_control() { '?' } else { c }).collect();
         Ok(Self {
-            file, digest, devices, reads, pulses, window, ends, factors, rows, steps, kinds, device,
-            read_noise, said,
+            file,
+            digest,
+            devices,
+            reads,
+            pulses,
+            window,
+            ends,
+            factors,
+            rows,
+            steps,
+            kinds,
+            device,
+            read_noise,
+            said,
         })
     }
 
@@ -271,14 +291,28 @@ impl MeasuredDevice {
     pub fn reason(&self) -> String {
         let best = self.best();
         let name = best.response.name();
-        let Some(next) = self.kinds.get(1) else { return format!("{name} is the only kind") };
-        format!(
-            "{name}: of all kinds its residual is worth its {} numbers best (Schwarz's criterion {:.1} below {}, which takes {})",
-            best.numbers,
-            next.worth - best.worth,
-            next.response.name(),
-            next.numbers,
-        )
+        let least = self.kinds.iter().min_by(|a, b| a.worth.total_cmp(&b.worth));
+        let alike: Vec<_> = self.kinds[1..].iter().filter(|kind| kind.near).collect();
+        match least {
+            Some(least) if least.response != best.response => format!(
+                "{name}: within 3 % of a step of {}, whose criterion is the least, with {} numbers in place of {}",
+                least.response.name(),
+                best.numbers,
+                least.numbers,
+            ),
+            _ if alike.is_empty() => {
+                format!(
+                    "{name}: its criterion is the least, and no other kind comes within 3 % of a step of it"
+                )
+            }
+            _ => {
+                let names: Vec<_> = alike.iter().map(|kind| kind.response.name()).collect();
+                format!(
+                    "{name}: its criterion is the least; as near to 3 % of a step, but with more numbers: {}",
+                    names.join(", ")
+                )
+            }
+        }
     }
 }
 
@@ -301,7 +335,9 @@ fn spread(settled: &Settled, ends: &[[f64; 2]], said: &mut Vec<String>) -> CellS
     let none = CellSpread::default();
     if ends.len() < DEVICES_MIN {
         let count = if ends.len() == 1 { "one device says" } else { "two devices say" };
-        said.push(format!("{count} nothing of how cells differ: without `device.spread` all are alike"));
+        said.push(format!(
+            "{count} nothing of how cells differ: without `device.spread` all are alike"
+        ));
         return none;
     }
     let wide = settled.is_wide();

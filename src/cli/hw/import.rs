@@ -40,7 +40,9 @@ pub(super) fn execute(args: &ImportArgs) -> Done {
     let place = args.table.display().to_string();
     #[expect(clippy::disallowed_methods, reason = "the table the user named")]
     let bytes = std::fs::read(&args.table).map_err(|error| {
-        usage(&format!("cannot read {place}: {error}; name a table, such as examples/devices/pulses.csv"))
+        usage(&format!(
+            "cannot read {place}: {error}; name a table, such as examples/devices/pulses.csv"
+        ))
     })?;
     let name = name(args)?;
     let file = args.table.file_name().map_or_else(|| place.clone(), |n| n.to_string_lossy().into());
@@ -51,7 +53,8 @@ pub(super) fn execute(args: &ImportArgs) -> Done {
     let made = std::fs::File::create_new(&out)
         .and_then(|mut file| file.write_all(device.hardware_toml(&name).as_bytes()));
     made.map_err(|error| {
-        let message = format!("cannot write {written}: {error}; choose another with --out, or remove it");
+        let message =
+            format!("cannot write {written}: {error}; choose another with --out, or remove it");
         Failure { code: 1, message }
     })?;
     if let Some(figure) = &args.figure {
@@ -85,7 +88,8 @@ fn name(args: &ImportArgs) -> Result<String, Failure> {
         }
     };
     if name.is_empty() || model_names().contains(&&*name) || device_names().contains(&&*name) {
-        let message = format!("{name:?} cannot be the name of your chip; choose another with --name");
+        let message =
+            format!("{name:?} cannot be the name of your chip; choose another with --name");
         return Err(usage(&message));
     }
     Ok(name)
@@ -134,12 +138,20 @@ fn spread(spread: &CellSpread) -> String {
 }
 
 fn show(device: &MeasuredDevice, written: &str, figure: Option<&Path>) {
-    let ratio = device.on_off().map_or("no ratio: the least is 0".into(), |r| format!("on/off {r:.2}"));
-    say(&format!("{}, conductance {} to {} ({ratio})", device.source(), device.window[0], device.window[1]));
+    let ratio =
+        device.on_off().map_or("no ratio: the least is 0".into(), |r| format!("on/off {r:.2}"));
+    say(&format!(
+        "{}, conductance {} to {} ({ratio})",
+        device.source(),
+        device.window[0],
+        device.window[1]
+    ));
     for said in &device.said {
         say(&format!("note     {said}"));
     }
-    say("\nkind          numbers  states  off by, of the window: a step   pulse by pulse   criterion");
+    say(
+        "\nkind          numbers  states  off by, of the window: a step   pulse by pulse   criterion",
+    );
     let least = device.best().worth;
     for kind in &device.kinds {
         say(&format!(
@@ -158,7 +170,10 @@ fn show(device: &MeasuredDevice, written: &str, figure: Option<&Path>) {
     say(&format!("states   {} pulses of mean length across the window", best.states));
     say(&format!("noise    {}", noise(device.device.noise)));
     if device.read_noise > 0.0 {
-        say(&format!("reads    miss by {} of the window, as it seems; not simulated", percent(device.read_noise)));
+        say(&format!(
+            "reads    miss by {} of the window, as it seems; not simulated",
+            percent(device.read_noise)
+        ));
     }
     say(&format!("spread   {}", spread(&device.device.spread)));
     if let Some(figure) = figure {

@@ -24,7 +24,8 @@ impl Cloud {
             // a cast saturates
             let at = ((x * PARTS as f64) as usize).min(PARTS - 1);
             let sums = &mut all[at];
-            for (sum, term) in sums.iter_mut().zip([weight, weight * x, weight * y, weight * y * y]) {
+            for (sum, term) in sums.iter_mut().zip([weight, weight * x, weight * y, weight * y * y])
+            {
                 *sum += term;
             }
         }
@@ -180,7 +181,8 @@ mod tests {
         for (found, wanted) in cloud.knots(4).iter().zip(row) {
             assert!((found - wanted).abs() < 1e-6, "{found} for {wanted}");
         }
-        assert!(cloud.squares(|x| between(&row, x)) < 1e-3);
+        // what is left is the slope inside a part
+        assert!(cloud.squares(|x| between(&row, x)) < 1e-4 * cloud.squares(|_| 0.0));
     }
 
     #[test]

@@ -5,8 +5,9 @@
 //! worth       n ln(v + e^2) + k ln n                       k numbers of the kind;  e: a hundredth of the mean step, which is no difference
 //! ```
 //!
-//! The kind with the least worth (Schwarz's criterion) is proposed: a number more has to take its share off the squares. A kind
-//! asks the law itself for its steps ([`Response::steps`]), so what is fitted is what a chip does.
+//! A number more has to take its share off the squares: the least worth is best (Schwarz's criterion). Of many pulses it tells
+//! differences that nobody would mind; so the kind with fewest numbers is proposed among those that come as near to the steps as
+//! the best one, to 3 % of a step. A kind asks the law itself for its steps ([`Response::steps`]): what is fitted is what a chip does.
 
 use super::cloud::{Cloud, between, least_of_many};
 use super::settle::{NONE, Settled};
@@ -20,6 +21,10 @@ use crate::num::tables::{
 const AMPLITUDE_MAX: f64 = 20.0;
 /// Growths of it, at most.
 const GROWTH_MAX: f64 = 12.0;
+/// Least growth: what grows less is a line.
+const GROWTH_MIN: f64 = 0.5;
+/// How near two kinds are alike, as a share of a step.
+const ALIKE: f64 = 0.03;
 /// Parts that a table may cut the window into.
 const PARTS: [usize; 3] = [4, 8, 16];
 
@@ -34,8 +39,12 @@ pub struct KindFit {
     pub asymmetry: Millionths,
     /// Numbers that were fitted.
     pub numbers: usize,
-    /// Schwarz's criterion; the least is proposed.
+    /// Schwarz's criterion: less is better.
     pub worth: f64,
+    /// Weighted mean square of what steps differ from it by.
+    pub(super) squares: f64,
+    /// Whether it is as near to the steps as the kind of the least worth, to 3 % of a step.
+    pub near: bool,
     /// Root mean square of what measured steps differ from it by, in windows.
     pub step_rms: f64,
     /// The same of conductances, pulse by pulse from the beginning of each row.
@@ -63,7 +72,7 @@ fn steps_of(value: f64, states: u32) -> Millionths {
     millionths(value * f64::from(states), [0.0, 1000.0])
 }
 
-/// All kinds, the best first.
+/// All kinds, the proposed one first, then by worth.
 pub(super) fn all(settled: &Settled, rows: &[PulseRow], ends: &[[f64; 2]]) -> Vec<KindFit> {
     let clouds = settled.clouds();
     let states = libm::round(1.0 / settled.mean).clamp(1.0, 65_536.0) as u32;
@@ -73,19 +82,31 @@ pub(super) fn all(settled: &Settled, rows: &[PulseRow], ends: &[[f64; 2]]) -> Ve
         let steps = response.steps(states);
         let squares = clouds[0].squares(|x| steps(x)[0] * (1.0 + lean))
             + clouds[1].squares(|x| steps(x)[1] * (1.0 - lean));
-        let none = NONE * settled.mean;
-        pulses * libm::log(squares / pulses + none * none) + size(numbers) * libm::log(pulses)
+        let (none, squares) = (NONE * settled.mean, squares / pulses);
+        let worth = pulses * libm::log(squares + none * none) + size(numbers) * libm::log(pulses);
+        (worth, squares)
     };
     let kind = |(response, states, asymmetry, numbers): (Response, u32, Millionths, usize)| {
-        let worth = worth(&response, states, asymmetry, numbers);
-        let mut fit =
-            KindFit { response, states, asymmetry, numbers, worth, step_rms: 0.0, curve_rms: 0.0 };
-        [fit.step_rms, fit.curve_rms] = residuals(&fit, settled, rows, ends);
-        fit
+        let (worth, squares) = worth(&response, states, asymmetry, numbers);
+        let (near, step_rms, curve_rms) = (false, 0.0, 0.0);
+        let fit = KindFit {
+            response,
+            states,
+            asymmetry,
+            numbers,
+            worth,
+            squares,
+            near,
+            step_rms,
+            curve_rms,
+        };
+        let [step_rms, curve_rms] = residuals(&fit, settled, rows, ends);
+        KindFit { step_rms, curve_rms, ..fit }
     };
     let none = Millionths(0);
     let tables = PARTS.into_iter().filter(|parts| 16.0 * size(*parts) <= pulses);
-    let tables = tables.map(|parts| kind((table(&clouds, states, parts), states, none, 2 * parts + 2)));
+    let tables =
+        tables.map(|parts| kind((table(&clouds, states, parts), states, none, 2 * parts + 2)));
     let table = tables.reduce(|a, b| if b.worth < a.worth { b } else { a });
     let (neurosim, own_states) = neurosim(&clouds, states);
     let (exponential, other_states, lean) = exponential(&clouds, states);
@@ -97,6 +118,14 @@ pub(super) fn all(settled: &Settled, rows: &[PulseRow], ends: &[[f64; 2]]) -> Ve
     ];
     let mut all: Vec<KindFit> = named.map(kind).into_iter().chain(table).collect();
     all.sort_by(|a, b| a.worth.total_cmp(&b.worth));
+    let least = all[0].squares;
+    let whole = (clouds[0].squares(|_| 0.0) + clouds[1].squares(|_| 0.0)) / pulses - least;
+    for kind in &mut all {
+        kind.near = kind.squares - least <= ALIKE * ALIKE * whole;
+    }
+    let fewest = (0..all.len()).filter(|&at| all[at].near).min_by_key(|&at| all[at].numbers);
+    let proposed = all.remove(fewest.unwrap_or(0));
+    all.insert(0, proposed);
     all
 }
 
@@ -187,17 +216,14 @@ fn exponential(clouds: &[Cloud; 2], states: u32) -> (Response, u32, Millionths) 
         step * (1.0 - amplitude * libm::exp(growth * x)).max(0.0)
     };
     let sides = [&clouds[0], &clouds[1]].map(|cloud| {
-        let growth = least_of_many(
-            |growth| {
-                // without growth it is no part of its own
-                let growth = if growth.abs() < 0.05 { 0.05 } else { growth };
-                let found = side(cloud, growth);
-                cloud.squares(|x| of(found, growth, x))
-            },
-            [-GROWTH_MAX, GROWTH_MAX],
-            49,
-        );
-        let growth = if growth.abs() < 0.05 { 0.05 } else { growth };
+        let squares = |growth: f64| {
+            let found = side(cloud, growth);
+            cloud.squares(|x| of(found, growth, x))
+        };
+        // falling and rising parts, each for itself
+        let ends = [[-GROWTH_MAX, -GROWTH_MIN], [GROWTH_MIN, GROWTH_MAX]];
+        let [falls, rises] = ends.map(|ends| least_of_many(squares, ends, 24));
+        let growth = if squares(falls) <= squares(rises) { falls } else { rises };
         (side(cloud, growth), growth)
     });
     let [([up, up_amplitude], up_growth), ([down, down_amplitude], down_growth)] = sides;
@@ -229,7 +255,8 @@ fn residuals(fit: &KindFit, settled: &Settled, rows: &[PulseRow], ends: &[[f64; 
     let of_steps = libm::sqrt(squares / f64::max(count, 1.0));
     let (mut count, mut squares) = (0.0, 0.0);
     // the law many times over would be slow: its steps at 1,024 places
-    let many = [0, 1].map(|side| (0..=1024).map(|i| steps(f64::from(i) / 1024.0)[side]).collect::<Vec<_>>());
+    let many = [0, 1]
+        .map(|side| (0..=1024).map(|i| steps(f64::from(i) / 1024.0)[side]).collect::<Vec<_>>());
     for row in rows {
         let [floor, ceiling] = ends[row.device];
         let own = ceiling - floor;

@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use super::MeasuredDevice;
+use super::{LEAST, MeasuredDevice};
 use crate::chip::device::{CellSpread, PulseNoise};
 use crate::lab::config::builtin_models;
 use crate::num::fixed::Millionths;
@@ -44,7 +44,7 @@ impl MeasuredDevice {
             None => "the least conductance is 0".into(),
         };
         let mut text = format!(
-            "# Made by `dalean hw import` from {}, on the periphery of the ideal chip. What is not in that table is the ideal chip's.\n\
+            "# Made by `dalean hw import` from {}: what is not in that table is the ideal chip's.\n\
              # {}.\n\
              name = {}\n\
              summary = {}\n\
@@ -58,18 +58,21 @@ impl MeasuredDevice {
         let _ = write!(
             text,
             "[cell]\n\
-             level_bits = {bits}            # the resolution it is simulated with; its pulses are in [device.response]\n\
+             level_bits = {bits}            # the resolution it is simulated with\n\
              floor = {floor}\n\
              ceiling = {ceiling}\n\
              floor_kind = \"recoverable\"\n\
              source = {}\n\
              kind = \"measured\"\n\n",
-            quoted(&format!("{source}: {ratio}; levels that resolve a step, and room for ceilings that differ")),
+            quoted(&format!(
+                "{source}: {ratio}; levels that resolve a step, and room for ceilings that differ"
+            )),
         );
         text += &self.response_toml(&quoted(&source));
         text += &self.spread_toml(&quoted(&source));
         text += ideal[periphery..].trim_end();
-        text += "\n\n# What the table does not say, or what is not simulated of it.\n[not_simulated]\n";
+        text +=
+            "\n\n# What the table does not say, or what is not simulated of it.\n[not_simulated]\n";
         for (effect, words) in self.absent() {
             let _ = writeln!(text, "{effect} = {}", quoted(&words));
         }
@@ -84,7 +87,10 @@ impl MeasuredDevice {
             count => format!("{count} devices"),
         };
         let [up, down] = self.pulses;
-        format!("{} (blake3 {}): {up} pulses up and {down} down of {devices}", self.file, self.digest)
+        format!(
+            "{} (blake3 {}): {up} pulses up and {down} down of {devices}",
+            self.file, self.digest
+        )
     }
 
     fn summary(&self) -> String {
@@ -93,7 +99,8 @@ impl MeasuredDevice {
             PulseNoise::OfWindow(share) => format!(", noise {} % of the window", percent(share)),
             _ => String::new(),
         };
-        let differ = if self.device.spread == CellSpread::default() { "" } else { ", cells differ" };
+        let differ =
+            if self.device.spread == CellSpread::default() { "" } else { ", cells differ" };
         let (name, states) = (self.device.response.name(), self.device.states);
         format!("a measured device: {states} states, curve {name}{noise}{differ}")
     }
@@ -147,7 +154,8 @@ impl MeasuredDevice {
     fn spread_toml(&self, source: &str) -> String {
         let CellSpread { step_law, step, asymmetry, ceiling, floor } = self.device.spread;
         let mut lines = String::new();
-        let named = [("step", step), ("asymmetry", asymmetry), ("ceiling", ceiling), ("floor", floor)];
+        let named =
+            [("step", step), ("asymmetry", asymmetry), ("ceiling", ceiling), ("floor", floor)];
         for (key, share) in named.into_iter().filter(|(_, share)| share.0 != 0) {
             let _ = writeln!(lines, "{key} = {share}");
             if key == "step" {
@@ -164,12 +172,24 @@ impl MeasuredDevice {
     /// What the file says that is not simulated.
     fn absent(&self) -> Vec<(&'static str, String)> {
         let mut all = vec![
-            ("pulse_time", "a pulse takes the time and the energy that it takes on the ideal chip: its length and voltage are not in the table".to_owned()),
-            ("beyond_window", "nothing is known of conductances beyond the measured ones: the window ends there".to_owned()),
+            (
+                "pulse_time",
+                "a pulse takes the time and the energy that it takes on the ideal chip: its length and voltage are \
+                 not in the table"
+                    .to_owned(),
+            ),
+            (
+                "beyond_window",
+                "nothing is known of conductances beyond the measured ones: the window ends there"
+                    .to_owned(),
+            ),
         ];
-        if self.read_noise >= 5e-4 {
+        if self.read_noise >= LEAST {
             let percent = short(100.0 * self.read_noise);
-            all.push(("read_noise", format!("a read of the table seems to miss by {percent} % of the window; it is taken off the noise of pulses")));
+            let words = format!(
+                "a read of the table seems to miss by {percent} % of the window; it is taken off the noise of pulses"
+            );
+            all.push(("read_noise", words));
         }
         if self.device.noise == PulseNoise::Off {
             all.push(("cycle_to_cycle", "the table shows no noise from pulse to pulse".to_owned()));

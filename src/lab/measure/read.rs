@@ -27,16 +27,58 @@ const COLUMNS: [(&str, &[&str]); 4] = [
 ];
 /// Units that may stand behind the name of a conductance; only ratios count.
 const UNITS: [&str; 20] = [
-    "s", "ms", "us", "µs", "μs", "ns", "ps", "siemens", "millisiemens", "microsiemens",
-    "nanosiemens", "a", "ma", "ua", "µa", "μa", "na", "pa", "amperes", "au",
+    "s",
+    "ms",
+    "us",
+    "µs",
+    "μs",
+    "ns",
+    "ps",
+    "siemens",
+    "millisiemens",
+    "microsiemens",
+    "nanosiemens",
+    "a",
+    "ma",
+    "ua",
+    "µa",
+    "μa",
+    "na",
+    "pa",
+    "amperes",
+    "au",
 ];
 const RISES: [&str; 14] = [
-    "up", "u", "+", "potentiation", "potentiate", "pot", "p", "ltp", "set", "rise", "rising",
-    "increase", "positive", "pos",
+    "up",
+    "u",
+    "+",
+    "potentiation",
+    "potentiate",
+    "pot",
+    "p",
+    "ltp",
+    "set",
+    "rise",
+    "rising",
+    "increase",
+    "positive",
+    "pos",
 ];
 const FALLS: [&str; 14] = [
-    "down", "d", "-", "depression", "depress", "dep", "n", "ltd", "reset", "fall", "falling",
-    "decrease", "negative", "neg",
+    "down",
+    "d",
+    "-",
+    "depression",
+    "depress",
+    "dep",
+    "n",
+    "ltd",
+    "reset",
+    "fall",
+    "falling",
+    "decrease",
+    "negative",
+    "neg",
 ];
 
 /// A line.
@@ -116,7 +158,8 @@ pub(super) fn read(bytes: &[u8]) -> Result<Table, MeasureError> {
     }
     if places.of[2].is_none() {
         said.push(
-            "no column says which way a pulse led: it is told from where the conductance turns".into(),
+            "no column says which way a pulse led: it is told from where the conductance turns"
+                .into(),
         );
     }
     let mut table = Table { devices: vec![], rows: vec![], ends: vec![], reads: count, said };
@@ -217,7 +260,8 @@ fn read_line(
         }
         Some(_) => return Err(wrong(1, "a pulse has a whole number, 0 or more")),
     };
-    let rises = match places.of[2].map(|at| (shown(&record[at]), number_of(&record[at], separator))) {
+    let rises = match places.of[2].map(|at| (shown(&record[at]), number_of(&record[at], separator)))
+    {
         None => None,
         Some((_, Some(sign))) if sign > 0.0 => Some(true),
         Some((_, Some(sign))) if sign < 0.0 => Some(false),
@@ -277,6 +321,8 @@ fn turns_of_run(reads: &[Read], turn: f64) -> Vec<bool> {
     let last = reads.len() - 1;
     let rises = rising.unwrap_or_else(|| g(last) >= g(0));
     told[from..].fill(rises);
+    // the pulse before the first read of a run is of the run
+    told[0] = *told.get(1).unwrap_or(&rises);
     told
 }
 
@@ -307,7 +353,9 @@ fn rows_of(
             }
             _ => {
                 let next = PulseRow { device, start: read.conductance, pulses: vec![] };
-                rows.extend(Some(std::mem::replace(&mut row, next)).filter(|r| !r.pulses.is_empty()));
+                rows.extend(
+                    Some(std::mem::replace(&mut row, next)).filter(|r| !r.pulses.is_empty()),
+                );
             }
         }
     }

@@ -35,8 +35,16 @@ fn columns_are_known_by_many_names() {
 
 #[test]
 fn polarities_have_many_words() {
-    for (up, down) in [("up", "down"), ("Potentiation", "DEPRESSION"), ("set", "reset"), ("+", "-"), ("1", "-1"), ("ltp", "LTD")] {
-        let text = format!("pulse,g,polarity\n0,1,{up}\n1,2,{up}\n2,3,{up}\n3,2,{down}\n4,1,{down}\n");
+    for (up, down) in [
+        ("up", "down"),
+        ("Potentiation", "DEPRESSION"),
+        ("set", "reset"),
+        ("+", "-"),
+        ("1", "-1"),
+        ("ltp", "LTD"),
+    ] {
+        let text =
+            format!("pulse,g,polarity\n0,1,{up}\n1,2,{up}\n2,3,{up}\n3,2,{down}\n4,1,{down}\n");
         assert_eq!(ways(&text), "++--", "{up}");
     }
     // a read without a pulse begins a row
@@ -76,11 +84,17 @@ fn what_is_wrong_is_named_with_its_place() {
         ("pulse,conductence\n1,2\n", "did you mean \"conductance\"?"),
         ("g,conductance\n1,2\n", "two columns for a conductance, `g` and `conductance`"),
         ("pulse,g\n1,2\n2\n", "line 3 has 1 fields, but line 1 names 2 columns"),
-        ("pulse,g\n1,2\n2,high\n", "line 3, column 1 (`g`) holds `high`; a conductance is a number, 0 or more"),
+        (
+            "pulse,g\n1,2\n2,high\n",
+            "line 3, column 1 (`g`) holds `high`; a conductance is a number, 0 or more",
+        ),
         ("pulse,g\n1,2\n2,-3\n", "holds `-3`"),
         ("pulse,g\n1,2\n2,nan\n", "holds `nan`"),
         ("pulse,g\n1.5,2\n", "line 2, column 0 (`pulse`) holds `1.5`; a pulse has a whole number"),
-        ("g,polarity\n1,up\n2,sideways\n", "line 3, column 1 (`polarity`) holds `sideways`; a polarity is up or down"),
+        (
+            "g,polarity\n1,up\n2,sideways\n",
+            "line 3, column 1 (`polarity`) holds `sideways`; a polarity is up or down",
+        ),
         ("g,device\n1,a\n2,a\n1,b\n1,b\n", "device `b` has the same conductance in every line, 1"),
         ("pulse,g\n1,2\n90000000,3\n", "line 3 lies 89999999 pulses behind"),
         ("PK\x03\x04", "spreadsheet"),

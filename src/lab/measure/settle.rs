@@ -106,7 +106,8 @@ impl Settled {
             all.find_rows(parts);
             all.find_factors();
             let rows = all.rows.clone();
-            all.scatter = all.scatter_about(|side, x| between(&rows[side], x), 2.0 * size(parts + 1));
+            all.scatter =
+                all.scatter_about(|side, x| between(&rows[side], x), 2.0 * size(parts + 1));
             if round + 1 < ROUNDS {
                 all.leave_out(&held, ends);
             }
@@ -117,8 +118,7 @@ impl Settled {
     /// Steps of a polarity over places, as one device would have them, and their weights: 1 on the mean.
     pub(super) fn clouds(&self) -> [Cloud; 2] {
         let weight = |point: &Point| {
-            let step = between(&self.rows[point.side], point.x);
-            let deviation = self.scatter.deviation(step, self.mean).max(NONE * self.mean);
+            let [_, deviation] = self.known(point);
             point.count / (deviation * deviation)
         };
         let free = || self.points.iter().filter(|point| point.free);
@@ -143,8 +143,7 @@ impl Settled {
     fn find_factors(&mut self) {
         let mut sums = vec![[[0.0; 2]; 2]; self.factors.len()];
         for point in self.points.iter().filter(|point| point.free) {
-            let step = between(&self.rows[point.side], point.x);
-            let deviation = self.scatter.deviation(step, self.mean).max(NONE * self.mean);
+            let [step, deviation] = self.known(point);
             let weight = point.count / (deviation * deviation);
             let sums = &mut sums[point.device][point.side];
             sums[0] += weight * point.y * step;
@@ -184,7 +183,9 @@ impl Settled {
                 telling.iter_mut().zip(terms).for_each(|(sum, term)| *sum += term);
             }
             let signed = if point.side == 0 { off } else { -off };
-            if let Some((_, last)) = before.filter(|(row, _)| *row == point.row && point.count == 1.0) {
+            if let Some((_, last)) =
+                before.filter(|(row, _)| *row == point.row && point.count == 1.0)
+            {
                 pairs += 1.0;
                 products += last * signed;
             }
@@ -204,11 +205,8 @@ impl Settled {
         let likely = |squares: f64| libm::log((squares / count).max(f64::MIN_POSITIVE));
         let of_step = count > 0.0
             && 0.5 * count * likely(shares) + logarithms < 0.5 * count * likely(squares);
-        let share = if of_step {
-            libm::sqrt(shares / count * all[0] / left)
-        } else {
-            libm::sqrt(variance)
-        };
+        let share =
+            if of_step { libm::sqrt(shares / count * all[0] / left) } else { libm::sqrt(variance) };
         let of_mean = if of_step { share } else { share / self.mean.max(f64::MIN_POSITIVE) };
         let share = if of_mean * kept < NONE { 0.0 } else { share * kept };
         Scatter { of_step, share, read: libm::sqrt(missed) }
@@ -222,7 +220,8 @@ impl Settled {
             .zip(held)
             .map(|(point, held)| {
                 let [floor, ceiling] = ends[point.device];
-                let step = self.factors[point.device][point.side] * between(&self.rows[point.side], point.x);
+                let step = self.factors[point.device][point.side]
+                    * between(&self.rows[point.side], point.x);
                 let own = ceiling - floor;
                 let room = 2.0 * self.scatter.deviation(step, self.mean) * libm::sqrt(point.count);
                 let (step, room) = (step * point.count / own, room / own);
@@ -241,23 +240,31 @@ impl Settled {
             let enough = of(&free) >= 16 && 2 * of(&free) >= of(held);
             let which = if enough { &free[..] } else { held };
             let points = self.points.iter_mut().zip(which);
-            points.filter(|(point, _)| point.side == side).for_each(|(point, free)| point.free = *free);
+            points
+                .filter(|(point, _)| point.side == side)
+                .for_each(|(point, free)| point.free = *free);
         }
     }
 
-    /// By how much factors are known too little: variances of a step's factor and of its asymmetry.
+    /// The variance of a device's factor that noise alone makes, on the mean.
     pub(super) fn unknown(&self) -> f64 {
-        let mut sums = vec![[[0.0; 2]; 2]; self.factors.len()];
+        let mut sums = vec![[0.0; 2]; self.factors.len()];
         for point in self.points.iter().filter(|point| point.free) {
-            let step = self.factors[point.device][point.side] * between(&self.rows[point.side], point.x);
-            let deviation = self.scatter.deviation(step, self.mean);
-            let sums = &mut sums[point.device][point.side];
-            let weight = step * step * point.count;
-            *sums = [sums[0] + weight, sums[1] + weight * deviation * deviation];
+            let [step, deviation] = self.known(point);
+            sums[point.device][point.side] += point.count * step * step / (deviation * deviation);
         }
-        let of = |[whole, noise]: &[f64; 2]| if *whole > 0.0 { noise / (whole * whole) } else { 0.0 };
-        let variance = sums.iter().flatten().map(of).sum::<f64>();
-        variance / (4.0 * size(sums.len()))
+        if self.scatter.share == 0.0 {
+            return 0.0;
+        }
+        let of = |known: &f64| if *known > 0.0 { 1.0 / known } else { 0.0 };
+        // steps are the mean of both polarities, asymmetry half their difference
+        sums.iter().flatten().map(of).sum::<f64>() / (4.0 * size(sums.len()))
+    }
+
+    /// The mean step of a pulse, and its deviation where it has one.
+    fn known(&self, point: &Point) -> [f64; 2] {
+        let step = between(&self.rows[point.side], point.x);
+        [step, self.scatter.deviation(step, self.mean).max(NONE * self.mean)]
     }
 
     /// Whether devices differ so much that their factors are log-normal.

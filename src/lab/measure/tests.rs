@@ -32,7 +32,9 @@ fn the_kind_with_fewest_numbers_is_proposed() {
     for one in [soft, line, hump] {
         assert_eq!(one.device.noise, PulseNoise::Off);
         assert!(one.best().curve_rms < 0.01, "{}", one.best().curve_rms);
-        assert!(one.device.check().is_ok() && one.said.last().unwrap().contains("how cells differ"));
+        assert!(
+            one.device.check().is_ok() && one.said.last().unwrap().contains("how cells differ")
+        );
     }
 }
 
@@ -51,7 +53,8 @@ fn too_little_and_the_wrong_way_are_refused() {
 fn a_file_says_where_every_number_is_from() {
     let one = measured(&reads(|x| [0.04 * (1.0 - x), 0.03 * x], 300));
     let text = one.hardware_toml("mine");
-    for wanted in ["x.csv (blake3 ", "600 pulses up and 600 down of one device", "[not_simulated]"] {
+    for wanted in ["x.csv (blake3 ", "600 pulses up and 600 down of one device", "[not_simulated]"]
+    {
         assert!(text.contains(wanted), "{wanted} in {text}");
     }
     let Response::SoftBounds(soft) = &one.best().response else { panic!("{:?}", one.best()) };

@@ -55,7 +55,8 @@ fn conductances(of: &MeasuredDevice) -> Chart {
     let name = if name.is_empty() { String::new() } else { format!(" of device {name}") };
     let x = Axis::round(0.0, size(read.max(2) - 1), &format!("reads{name}"));
     let values = rows.iter().flat_map(|(seen, walked)| seen.iter().chain(walked)).map(|at| at.1);
-    let (low, high) = values.fold((0.0, 1.0), |(low, high), g| (f64::min(low, g), f64::max(high, g)));
+    let (low, high) =
+        values.fold((0.0, 1.0), |(low, high), g| (f64::min(low, g), f64::max(high, g)));
     let y = Axis::round(low, high, "conductance, windows");
     let mut chart = Chart::framed(CHART, [24.0, KEY], x, y);
     chart.heading("Pulse by pulse");
@@ -65,7 +66,8 @@ fn conductances(of: &MeasuredDevice) -> Chart {
         }
         chart.line(walked, hue(0), "line", 0);
     }
-    let entries = [(0, hue(6), "measured".to_owned()), (0, hue(0), of.best().response.name().into())];
+    let entries =
+        [(0, hue(6), "measured".to_owned()), (0, hue(0), of.best().response.name().into())];
     chart.key("conductance", entries.into_iter(), false);
     chart
 }
