@@ -30,6 +30,8 @@ const DEVICES_MAX: usize = 10_000;
 const DEVICES_MIN: usize = 3;
 /// Pulses of each polarity, at least.
 const PULSES_MIN: usize = 8;
+/// Pulses of each polarity that end inside the window, at least.
+const FREE_MIN: usize = 4;
 /// Parts of the window that steps are first found in.
 const PARTS: usize = 16;
 /// What is too small for a file.
@@ -196,6 +198,15 @@ pub enum MeasureError {
         /// Pulses up and down.
         found: [usize; 2],
     },
+    /// Pulses that reach the ends at once.
+    #[error(
+        "has {} pulses up and {} down that move the conductance and end inside its window, but at least {FREE_MIN} of each \
+         are needed: how far a pulse leads is not seen where the window ends", .free[0], .free[1]
+    )]
+    Ends {
+        /// Pulses up and down.
+        free: [usize; 2],
+    },
     /// Pulses that move the wrong way.
     #[error(
         "pulses {way} move the conductance the other way on the mean; exchange the words of the column `polarity`"
@@ -240,6 +251,11 @@ impl MeasuredDevice {
         let pulses = [0, 1].map(|side| of(side).map(|point| point.count as u64).sum());
         let parts = PARTS.min(found[0].min(found[1]) / 4).max(2);
         let mut settled = Settled::new(points, &ends, parts);
+        let of = |side: usize| settled.points.iter().filter(move |p| p.free && p.side == side);
+        let free = [0, 1].map(|side| of(side).count());
+        if free.iter().any(|free| *free < FREE_MIN) || !(settled.mean > 0.0) {
+            return Err(MeasureError::Ends { free });
+        }
         let kinds = kinds::all(&settled, &rows, &ends);
         let best = &kinds[0];
         let steps = best.steps();

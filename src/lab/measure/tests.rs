@@ -1,3 +1,5 @@
+use proptest::prelude::*;
+
 use super::*;
 use crate::num::tables::Response;
 
@@ -47,6 +49,9 @@ fn too_little_and_the_wrong_way_are_refused() {
     let text = reads(|x| [0.05 * (1.0 - x), 0.05 * x], 60);
     let turned = text.replace("up", "x").replace("down", "up").replace('x', "down");
     assert!(error(&turned).contains("the other way"), "{}", error(&turned));
+    // two states: every pulse ends at an end
+    let text = reads(|_| [1.0, 1.0], 10);
+    assert!(error(&text).contains("0 pulses up and 0 down that move"), "{}", error(&text));
 }
 
 #[test]
@@ -60,4 +65,38 @@ fn a_file_says_where_every_number_is_from() {
     let Response::SoftBounds(soft) = &one.best().response else { panic!("{:?}", one.best()) };
     assert!(text.contains(&format!("up = [{}]\ndown = [{}]\n", soft.up, soft.down)));
     assert_eq!(one.levels(), (8, [0, 255]));
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(48))]
+
+    /// Whatever is measured, it is refused or becomes a device that a chip can have, in a file that is read.
+    #[test]
+    fn any_reads_are_a_device_or_an_error(
+        reads in prop::collection::vec((0u8..3, 0u32..4, any::<bool>(), -1i32..9), 0..300),
+        columns in 0u8..8,
+    ) {
+        let [with_device, with_pulse, with_way] = [0, 1, 2].map(|bit| columns >> bit & 1 == 1);
+        let line = |parts: [(bool, String); 4]| {
+            let kept = parts.into_iter().filter(|(kept, _)| *kept).map(|(_, part)| part);
+            kept.collect::<Vec<_>>().join(",") + "\n"
+        };
+        let all = |device: String, pulse: String, way: String, g: String| {
+            line([(with_device, device), (with_pulse, pulse), (with_way, way), (true, g)])
+        };
+        let mut text = all("device".into(), "pulse".into(), "polarity".into(), "g".into());
+        let (mut pulses, mut g) = (0, 0);
+        for (device, more, up, step) in reads {
+            pulses = if more == 0 { 0 } else { pulses + more };
+            g = (if up { g + step } else { g - step }).clamp(0, 40);
+            let way = if up { "up" } else { "down" };
+            text += &all(device.to_string(), pulses.to_string(), way.into(), g.to_string());
+        }
+        if let Ok(found) = MeasuredDevice::new("any.csv", text.as_bytes()) {
+            prop_assert_eq!(found.device.check(), Ok(()));
+            let text = found.hardware_toml("any");
+            prop_assert!(toml::from_str::<toml::Table>(&text).is_ok(), "{}", text);
+            prop_assert!(found.best().curve_rms.is_finite());
+        }
+    }
 }
