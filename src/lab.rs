@@ -3,6 +3,7 @@
 pub mod analysis;
 pub mod config;
 pub mod data;
+pub mod measure;
 pub mod near;
 pub mod price;
 pub mod report;

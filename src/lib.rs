@@ -87,7 +87,7 @@ pub mod hardware {
     };
     pub use crate::num::tables::{
         ExponentialSteps, LinearSteps, MeasuredSteps, NeurosimSteps, Response, SoftBoundSteps,
-        SpreadLaw,
+        SpreadLaw, TableSteps,
     };
 }
 

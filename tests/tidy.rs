@@ -42,8 +42,8 @@ const HOUSE: [(&str, &[&str]); 6] = [
     (
         "lab",
         &[
-            "near", "analysis", "data", "config", "store", "price", "table", "report", "run",
-            "wave", "sweep", "runs",
+            "near", "analysis", "data", "config", "measure", "store", "price", "table", "report",
+            "run", "wave", "sweep", "runs",
         ],
     ),
     (

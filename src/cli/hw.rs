@@ -1,4 +1,4 @@
-//! `hw list`, `hw new`, `hw show`, `hw peak`, `hw check`.
+//! `hw list`, `hw new`, `hw import`, `hw show`, `hw peak`, `hw check`.
 
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -15,6 +15,7 @@ use crate::lab::config::{
 };
 use crate::lab::price::{Convention, bounds, figures, peak, prefixed};
 
+mod import;
 mod modes;
 
 /// Error words that `hw show` reckons with: those of ten classes.
@@ -42,6 +43,8 @@ pub(super) enum HwCommand {
         #[arg(long, short)]
         quiet: bool,
     },
+    /// Make a model of your device from a table of measured pulses: curve, states, noise, spread
+    Import(import::ImportArgs),
     /// Show a model: its numbers, times and energies, then its text with sources
     Show {
         /// A built-in name or a file
@@ -127,6 +130,7 @@ pub(super) fn execute(command: &HwCommand) -> Done {
             Ok(())
         }
         HwCommand::New { name, json, quiet } => new(name, *json, *quiet),
+        HwCommand::Import(args) => import::execute(args),
         HwCommand::Show { model, settings, toml, json, quiet } => {
             let given = load_model(model).map_err(|e| usage(&e.to_string()))?;
             let config = changed(model, settings)?;

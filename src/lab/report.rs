@@ -13,6 +13,7 @@ mod analysis;
 mod chart;
 mod colour;
 pub mod compare;
+mod device;
 mod figures;
 mod film;
 mod image;
@@ -27,6 +28,7 @@ mod words;
 mod sample;
 
 pub use analysis::analysis_page;
+pub use device::device_figure;
 pub use film::{Film, Frame};
 
 use super::config::Absent;

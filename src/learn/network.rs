@@ -65,7 +65,7 @@ pub struct NetworkSpec {
     pub centred: Vec<bool>,
     /// What is taken from it, to see whether it is needed.
     pub control: Control,
-    /// After how many updates, again and again, what both cells of a pair hold is taken off both; see MODEL 3.14.
+    /// After how many updates, again and again, what both cells of a pair hold is taken off both; see MODEL 3.15.
     pub refresh: Option<NonZeroU32>,
 }
 

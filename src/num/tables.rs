@@ -34,7 +34,7 @@ pub use policy::PolicyTables;
 pub use rate::{Decay, LEVELS_SHIFT_MAX, Rate, RateOf, SHIFT_MAX};
 pub use response::{
     ExponentialSteps, LinearSteps, MeasuredSteps, NeurosimSteps, Response, ResponseError,
-    STEP_BITS, SoftBoundSteps,
+    STEP_BITS, SoftBoundSteps, TableSteps,
 };
 pub use scales::{Factor, Scales};
 pub use softmax::SoftmaxTables;

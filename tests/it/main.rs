@@ -22,6 +22,7 @@ mod golden_run;
 mod hardware;
 mod keys;
 mod laws;
+mod measure;
 mod oracle;
 mod output;
 mod outside;

@@ -75,10 +75,13 @@ fn every_command_speaks_json() {
     let (folder, _) = trained(out.path(), &[]);
     let folder = folder.display().to_string();
     let chip = out.path().join("mychip").display().to_string();
+    let pulses = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/devices/pulses.csv");
+    let device = out.path().join("device.toml").display().to_string();
     for arguments in [
         &["keys"][..],
         &["hw", "list"],
         &["hw", "new", &chip],
+        &["hw", "import", pulses, "--out", &device],
         &["hw", "show", "reram"],
         &["hw", "peak", "reram"],
         &["hw", "check", "reram"],

@@ -15,7 +15,7 @@ use crate::chip::population::Wiring;
 use crate::num::fixed::{IncrementMax, LevelBits, Millionths, ResidualBits};
 use crate::num::tables::{
     Activation, ExponentialSteps, LinearSteps, MeasuredSteps, NeurosimSteps, Response,
-    SoftBoundSteps, SpreadLaw,
+    SoftBoundSteps, SpreadLaw, TableSteps,
 };
 
 fn number(seed: u64, at: usize, below: usize) -> usize {
@@ -60,6 +60,10 @@ fn response() -> impl Strategy<Value = Response> {
         ),
         [signed.clone(), signed]
             .prop_map(|labels| { Response::Neurosim(NeurosimSteps { labels }) }),
+        prop::collection::vec([part(30), part(30)], 2..=20).prop_map(|rows| {
+            let row = |of: usize| rows.iter().map(|both| both[of]).collect();
+            Response::Table(TableSteps { up: row(0), down: row(1) })
+        }),
         [part(10), part(10), part(10), part(10)].prop_map(|[a, b, c, d]| {
             let rows = [(0, a, b), (300_000, c, d), (1_000_000, b, c)];
             let points = rows.map(|(x, up, down)| [Millionths(x), up, down]).into();

@@ -7,7 +7,7 @@
 //!
 //! In a differential pair this takes nothing from what the pair stands for. Banks of two populations are driven by what their
 //! own population hands on, so there a refresh changes what they add up to, unless both hand on alike. The loads are counted as
-//! any others, and leave what loads of this chip leave; what is read to find `c` is not charged. See docs/MODEL.md, 3.14.
+//! any others, and leave what loads of this chip leave; what is read to find `c` is not charged. See docs/MODEL.md, 3.15.
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
 use super::{Engine, Operation};

@@ -10,9 +10,10 @@ mod error;
 mod scan;
 mod text;
 
-use std::{fmt, str::FromStr};
+use std::{borrow::Cow, fmt, str::FromStr};
 
 pub use self::error::CsvError;
+pub(crate) use self::scan::reader;
 
 use self::columns::Told;
 use self::scan::{Field, Scan, field};
@@ -127,6 +128,24 @@ pub struct CsvTable {
     pub layout: TableLayout,
     /// What was told from the table and not stated.
     pub said: Vec<String>,
+}
+
+/// The text of a table of any kind, of at most `limit` bytes, and what separates its fields.
+///
+/// # Errors
+/// When it is no text.
+pub(crate) fn text_of(bytes: &[u8], limit: u64) -> Result<(Cow<'_, [u8]>, u8), CsvError> {
+    let text = text::decode(bytes, limit)?;
+    let separator = text::separator(&text);
+    Ok((text, separator))
+}
+
+/// The number of a field, where it is one; decimal commas are numbers where commas do not separate.
+pub(crate) fn number_of(bytes: &[u8], separator: u8) -> Option<f64> {
+    match field(bytes, separator != b',') {
+        Field::Number(number, _) => Some(number),
+        Field::Missing | Field::Text => None,
+    }
 }
 
 /// Reads a table; `like` is the layout of the training part for every other part. Fractions reach `full_scale`; a packed
@@ -426,7 +445,7 @@ fn list(names: impl Iterator<Item = String>) -> String {
 }
 
 /// The start of a field, printable.
-fn shown(field: &[u8]) -> String {
+pub(crate) fn shown(field: &[u8]) -> String {
     let start = &field[..field.len().min(24)];
     let dots = if start.len() < field.len() { ".." } else { "" };
     match std::str::from_utf8(start) {

@@ -28,6 +28,7 @@ mod text;
 
 pub use learning::{Learning, wanted};
 pub use page::html;
+pub(super) use paper::sheet;
 pub use paper::{StaticFigure, figures};
 pub use raster::png;
 pub use text::text;

@@ -6,7 +6,8 @@
 //! ```
 //!
 //! `up(x)` and `down(x)` are the steps of a kind, in fractions of the window: how far a pulse moves a cell that lies at `x` of
-//! it, computed in doubles: what lies within 2^-20 below a half is rounded up as the half is. They are not below 0, and none is longer than the window. One kind is one file and a variant here. See docs/MODEL.md, 3.11.
+//! it, computed in doubles: what lies within 2^-20 below a half is rounded up as the half is. They are not below 0, and none is longer than the window. `table` is rational and
+//! rounded exactly. One kind is one file and a variant here. See docs/MODEL.md, 3.11.
 #![expect(clippy::float_arithmetic, reason = "floats become integers here, at load only")]
 #![deny(clippy::disallowed_types, clippy::disallowed_methods)]
 
@@ -15,12 +16,14 @@ mod linear;
 mod measured;
 mod neurosim;
 mod soft_bounds;
+mod table;
 
 pub use exponential::ExponentialSteps;
 pub use linear::LinearSteps;
 pub use measured::MeasuredSteps;
 pub use neurosim::NeurosimSteps;
 pub use soft_bounds::SoftBoundSteps;
+pub use table::TableSteps;
 
 use crate::num::fixed::Millionths;
 
@@ -48,6 +51,8 @@ pub enum Response {
     Exponential(ExponentialSteps),
     /// Curves of conductance by nonlinearity labels.
     Neurosim(NeurosimSteps),
+    /// Steps at equally spaced places, and lines between them.
+    Table(TableSteps),
     /// Steps between given points.
     Measured(MeasuredSteps),
 }
@@ -66,10 +71,23 @@ pub struct ResponseError {
 /// Steps up and down, in fractions of the window, of a cell at `x` (0 to 1) of it.
 type Steps<'a> = Box<dyn Fn(f64) -> [f64; 2] + 'a>;
 
+/// What a table is made for.
+#[derive(Debug, Clone, Copy)]
+struct Exact {
+    span: u16,
+    states: u32,
+    asymmetry: Millionths,
+}
+
 /// What every kind is.
 trait Curve {
     /// Its steps; `mean` is the one of which as many as the device has states cross the window.
     fn steps(&self, mean: f64) -> Steps<'_>;
+
+    /// Its table, where it is rational and needs no doubles.
+    fn exact(&self, _: Exact) -> Option<[Vec<u32>; 2]> {
+        None
+    }
 
     /// What it is called.
     fn name(&self) -> &'static str;
@@ -88,6 +106,7 @@ impl Response {
             Self::SoftBounds(steps) => steps,
             Self::Exponential(steps) => steps,
             Self::Neurosim(steps) => steps,
+            Self::Table(steps) => steps,
             Self::Measured(steps) => steps,
         }
     }
@@ -112,6 +131,16 @@ impl Response {
         self.curve().check()
     }
 
+    /// Steps up and down in fractions of the window, of a cell at `x` of it, as doubles: for fits and figures. What a chip does is
+    /// [`Response::table`].
+    ///
+    /// # Panics
+    /// When there is no state.
+    pub(crate) fn steps(&self, states: u32) -> Steps<'_> {
+        assert!(states > 0, "a window is crossed in some pulses");
+        self.curve().steps(1.0 / f64::from(states))
+    }
+
     /// Steps up and down in 256ths of a level, by level above the floor: `span + 1` each. `states` pulses of mean length cross
     /// the window; `asymmetry` makes steps up longer and steps down shorter, by that share.
     ///
@@ -120,7 +149,10 @@ impl Response {
     #[must_use]
     pub fn table(&self, span: u16, states: u32, asymmetry: Millionths) -> [Vec<u32>; 2] {
         assert!(span > 0 && states > 0, "a window is crossed in some pulses");
-        let (steps, whole) = (self.curve().steps(1.0 / f64::from(states)), f64::from(span));
+        if let Some(table) = self.curve().exact(Exact { span, states, asymmetry }) {
+            return table;
+        }
+        let (steps, whole) = (self.steps(states), f64::from(span));
         let entry = |step: f64| {
             let levels = step.clamp(0.0, 1.0) * whole;
             // a half that doubles miss by little is one

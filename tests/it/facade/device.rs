@@ -4,7 +4,7 @@ use dalean::HardwareSpec;
 use dalean::hardware::{
     CellSpread, Chance, DeviceSpec, ExponentialSteps, Faults, LinearSteps, MeasuredSteps,
     Millionths, NeurosimSteps, Programming, PulseNoise, ReadNoise, Response, SoftBoundSteps,
-    SpreadLaw,
+    SpreadLaw, TableSteps,
 };
 
 use super::Choices;
@@ -19,7 +19,7 @@ fn parts<const N: usize>(c: &mut Choices<'_>) -> [Millionths; N] {
 }
 
 fn response(c: &mut Choices<'_>) -> Response {
-    match c.byte() % 5 {
+    match c.byte() % 6 {
         0 => Response::Linear(LinearSteps { up: parts(c), down: parts(c) }),
         1 => Response::SoftBounds(SoftBoundSteps { up: part(c), down: part(c) }),
         2 => Response::Exponential(ExponentialSteps {
@@ -28,6 +28,10 @@ fn response(c: &mut Choices<'_>) -> Response {
             z: parts(c),
         }),
         3 => Response::Neurosim(NeurosimSteps { labels: parts(c) }),
+        4 => {
+            let row = |c: &mut Choices<'_>| (0..c.byte() % 5).map(|_| part(c)).collect();
+            Response::Table(TableSteps { up: row(c), down: row(c) })
+        }
         _ => {
             let points = (0..c.byte() % 5).map(|_| parts(c)).collect();
             Response::Measured(MeasuredSteps { points })

@@ -4,6 +4,7 @@
 //! Sizes stay small where memory and time follow them; elsewhere any number is tried.
 
 use std::fmt::Display;
+use std::num::NonZeroU32;
 
 use dalean::hardware::{
     Adc, AdcBits, AdcRange, CellSpec, DigitalSpec, DitherBits, DitherPattern, DriveBits, DriveSpec,
@@ -277,6 +278,7 @@ fn network(c: &mut Choices<'_>, inputs: usize, outputs: usize) -> NetworkSpec {
         optimisers: (0..count).map(|_| c.of(&optimisers)).collect(),
         centred: (0..count).map(|_| c.one_in(16)).collect(),
         control: if c.one_in(8) { c.of(&CONTROLS) } else { Control::None },
+        refresh: if c.one_in(8) { NonZeroU32::new(c.word() as u32 % 3) } else { None },
     }
 }
 

@@ -10,7 +10,7 @@ use crate::chip::hardware::Window;
 use crate::num::fixed::Millionths;
 use crate::num::tables::{
     ExponentialSteps, LinearSteps, MeasuredSteps, NeurosimSteps, Response, SoftBoundSteps,
-    SpreadLaw,
+    SpreadLaw, TableSteps,
 };
 
 keys! {
@@ -20,9 +20,11 @@ keys! {
         curve: String,
         /// Pulses of mean length across the window. Levels are the resolution that the cell is simulated with; rates count pulses.
         states: i64,
-        /// Steps up, in mean steps: at the floor and at the ceiling (linear), at the floor alone (soft_bounds).
+        /// Steps up, in mean steps: at the floor and at the ceiling (linear), at the floor alone (soft_bounds), at equally spaced places
+        /// from the floor to the ceiling (table).
         up: Vec<f64>,
-        /// Steps down, in mean steps: at the floor and at the ceiling (linear), at the ceiling alone (soft_bounds).
+        /// Steps down, in mean steps: at the floor and at the ceiling (linear), at the ceiling alone (soft_bounds), at equally spaced places
+        /// from the floor to the ceiling (table).
         down: Vec<f64>,
         /// Of steps up and down: how much the exponential part takes off the mean step.
         amplitude: Vec<f64>,
@@ -65,11 +67,12 @@ keys! {
 }
 
 /// Words of `curve`, and which numbers each has.
-const CURVES: [(&str, &[&str]); 5] = [
+const CURVES: [(&str, &[&str]); 6] = [
     ("linear", &["up", "down"]),
     ("soft_bounds", &["up", "down"]),
     ("exponential", &["amplitude", "growth", "z"]),
     ("neurosim", &["labels"]),
+    ("table", &["up", "down"]),
     ("measured", &["points"]),
 ];
 
@@ -214,6 +217,16 @@ fn curve(
         "neurosim" => Response::Neurosim(NeurosimSteps {
             labels: numbers(&at("labels"), file.labels.as_ref(), [none; 2])?,
         }),
+        "table" => {
+            let row = |name: &str, given: Option<&Vec<f64>>| {
+                let given = given.map_or(&[1.0, 1.0][..], Vec::as_slice);
+                given.iter().map(|&step| millionths(&at(name), step)).collect::<Result<_, _>>()
+            };
+            Response::Table(TableSteps {
+                up: row("up", file.up.as_ref())?,
+                down: row("down", file.down.as_ref())?,
+            })
+        }
         "measured" => {
             let mean = Millionths(1_000_000 / i64::from(states.max(1)));
             let Some(rows) = &file.points else {

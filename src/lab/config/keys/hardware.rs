@@ -311,19 +311,20 @@ const RESPONSE: &[KeyEntry] = &[
             ("soft_bounds", "steps shrink in proportion to what is left of the window"),
             ("exponential", "1 - amplitude exp(growth z) mean steps, where that is above 0"),
             ("neurosim", "the curves of MLP+NeuroSim, by their nonlinearity labels"),
+            ("table", "straight lines between steps at equally spaced places"),
             ("measured", "straight lines between given points"),
         ],
     )
     .otherwise("linear"),
     whole("states", 1, 65_536).unit("pulses").otherwise("as many as the window has levels"),
-    other("up", "a list of one or two numbers, 0 to 1000")
+    other("up", "a list of one or two numbers, 2 to 64 of a table, 0 to 1000")
         .unit("mean steps")
         .otherwise("[1, 1], of soft_bounds [2]")
-        .only("with curve = \"linear\" or \"soft_bounds\"", LINES),
-    other("down", "a list of one or two numbers, 0 to 1000")
+        .only("with curve = \"linear\", \"soft_bounds\" or \"table\"", LINES),
+    other("down", "a list of one or two numbers, 2 to 64 of a table, 0 to 1000")
         .unit("mean steps")
         .otherwise("[1, 1], of soft_bounds [2]")
-        .only("with curve = \"linear\" or \"soft_bounds\"", LINES),
+        .only("with curve = \"linear\", \"soft_bounds\" or \"table\"", LINES),
     other("amplitude", "a list of two numbers, -1000 to 1000")
         .otherwise("[0, 0]")
         .only("with curve = \"exponential\"", EXPONENTIAL),

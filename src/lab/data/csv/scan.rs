@@ -158,7 +158,7 @@ pub(super) struct Scan {
 }
 
 /// A reader of the fields of a text.
-pub(super) fn reader(text: &[u8], separator: u8) -> ::csv::Reader<&[u8]> {
+pub(crate) fn reader(text: &[u8], separator: u8) -> ::csv::Reader<&[u8]> {
     ::csv::ReaderBuilder::new()
         .has_headers(false)
         .flexible(true)

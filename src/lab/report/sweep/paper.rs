@@ -42,7 +42,7 @@ pub fn figures(view: &SweepView<'_>) -> Vec<StaticFigure> {
 }
 
 /// A picture of `size` units that holds `body`; `says` in words what it shows.
-pub(super) fn sheet([width, height]: [f64; 2], says: &str, body: &str) -> String {
+pub(in crate::lab::report) fn sheet([width, height]: [f64; 2], says: &str, body: &str) -> String {
     // Letters of the upright title lean out to the left.
     let width = width + 10.0;
     let [wide, high] = [width, height].map(|units| place(units / COLUMN * COLUMN_MM));

@@ -87,3 +87,84 @@ fn no_step_is_longer_than_the_window() {
     let label = NeurosimSteps { labels: [millionths(9.5), Millionths(0)] };
     assert_eq!(Response::Neurosim(label).check().unwrap_err().name, "labels");
 }
+
+/// Steps of a table as fractions of whole numbers: by each part of the window alone, rounded by hand.
+fn table_by_hand(row: &[Millionths], span: u16, states: u32, share: i128) -> Vec<u32> {
+    let (n, parts) = (i128::from(span), row.len() as i128 - 1);
+    let of = |i: i128| {
+        // the first part whose end is not below i / N
+        let part = (0..parts).find(|part| i * parts <= (part + 1) * n).unwrap();
+        let [from, to] = [part, part + 1].map(|at| i128::from(row[at as usize].0));
+        // from + (to - from) (i parts - part N) / N, times 2^8 N (1 + a) / P, in millionths twice
+        let above = from * n + (to - from) * (i * parts - part * n);
+        let (above, below) = (256 * share * above, i128::from(states) * 1_000_000_000_000);
+        nearest(above, below).min(u32::from(span) << 8)
+    };
+    (0..=n).map(of).collect()
+}
+
+proptest::proptest! {
+    /// Faults this is made for: a part too far, a window that does not cancel, a lean to the wrong side, a half rounded down.
+    #[test]
+    fn a_table_is_its_rational(
+        rows in proptest::collection::vec([0i64..=5_000_000, 0i64..=5_000_000], 2..=64),
+        span in 1u16..=4095,
+        states in 1u32..=2000,
+        lean in -1_000_000i64..=1_000_000,
+    ) {
+        let row = |of: usize| rows.iter().map(|both| Millionths(both[of])).collect::<Vec<_>>();
+        let steps = TableSteps { up: row(0), down: row(1) };
+        proptest::prop_assert_eq!(steps.check(), Ok(()));
+        let wanted = [(&steps.up, lean), (&steps.down, -lean)].map(|(row, lean)| {
+            table_by_hand(row, span, states, 1_000_000 + i128::from(lean))
+        });
+        let response = Response::Table(steps);
+        let found = response.table(span, states, Millionths(lean));
+        proptest::prop_assert_eq!(&found, &wanted);
+        // and as doubles, which fits and figures take
+        let steps = response.steps(states);
+        for i in 0..=span {
+            let doubles = steps(f64::from(i) / f64::from(span));
+            for (of, share) in [(0, 1e6 + lean as f64), (1, 1e6 - lean as f64)] {
+                let fine = doubles[of].min(1e3) * share / 1e6 * 256.0 * f64::from(span);
+                let whole = f64::from(found[of][usize::from(i)]);
+                let held = fine.min(256.0 * f64::from(span));
+                proptest::prop_assert!((held - whole).abs() <= 0.5 + 1e-6 * held.max(1.0));
+            }
+        }
+    }
+
+    /// Of two steps it is a straight line, which doubles know too: they may miss a half.
+    #[test]
+    fn a_table_of_two_steps_is_a_line(
+        ends in [0i64..=3_000_000, 0i64..=3_000_000, 0i64..=3_000_000, 0i64..=3_000_000],
+        span in 1u16..=4095,
+        states in 1u32..=2000,
+    ) {
+        let [a, b, c, d] = ends.map(Millionths);
+        let table = Response::Table(TableSteps { up: vec![a, b], down: vec![c, d] });
+        let line = Response::Linear(LinearSteps { up: [a, b], down: [c, d] });
+        let [table, line] = [table, line].map(|of| of.table(span, states, Millionths(0)));
+        for (table, line) in table.iter().flatten().zip(line.iter().flatten()) {
+            proptest::prop_assert!(table.abs_diff(*line) <= 1);
+        }
+    }
+}
+
+#[test]
+fn rows_of_a_table_are_as_long_as_one_another_and_no_step_is_below_0() {
+    let row = |steps: &[f64]| steps.iter().map(|&step| millionths(step)).collect::<Vec<_>>();
+    for (up, down, name) in [
+        (row(&[1.0]), row(&[1.0]), "up"),
+        (row(&[1.0, 1.0]), row(&[1.0, 1.0, 1.0]), "up"),
+        (row(&[1.0; 65]), row(&[1.0; 65]), "up"),
+        (row(&[1.0, -0.1]), row(&[1.0, 1.0]), "up"),
+        (row(&[1.0, 1.0]), row(&[1.0, 1000.1]), "down"),
+    ] {
+        assert_eq!(TableSteps { up, down }.check().unwrap_err().name, name);
+    }
+    let most = TableSteps { up: row(&[0.0; 64]), down: row(&[1000.0; 64]) };
+    assert_eq!(most.check(), Ok(()));
+    let [up, down] = Response::Table(most).table(4095, 1, Millionths(-1_000_000));
+    assert!(up.iter().all(|&step| step == 0) && down.iter().all(|&step| step == 4095 << 8));
+}
