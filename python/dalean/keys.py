@@ -345,12 +345,12 @@ Keys = TypedDict(
         # What time does to levels, between programming and reading (`dalean eval --after`).
         "hw.device.drift": Any,
         # How the step of a pulse depends on where the cell lies in its window.
-        "hw.device.response.curve": Literal["linear", "soft_bounds", "exponential", "neurosim", "measured"],
+        "hw.device.response.curve": Literal["linear", "soft_bounds", "exponential", "neurosim", "table", "measured"],
         # Pulses of mean length across the window. Levels are the resolution that the cell is simulated with; rates count pulses. [pulses]
         "hw.device.response.states": int,
-        # Steps up, in mean steps: at the floor and at the ceiling (linear), at the floor alone (soft_bounds). [mean steps]
+        # Steps up, in mean steps: at the floor and at the ceiling (linear), at the floor alone (soft_bounds), at equally spaced places from the floor to the ceiling (table). [mean steps]
         "hw.device.response.up": Any,
-        # Steps down, in mean steps: at the floor and at the ceiling (linear), at the ceiling alone (soft_bounds). [mean steps]
+        # Steps down, in mean steps: at the floor and at the ceiling (linear), at the ceiling alone (soft_bounds), at equally spaced places from the floor to the ceiling (table). [mean steps]
         "hw.device.response.down": Any,
         # Of steps up and down: how much the exponential part takes off the mean step.
         "hw.device.response.amplitude": Any,

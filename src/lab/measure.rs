@@ -253,7 +253,8 @@ impl MeasuredDevice {
         let mut settled = Settled::new(points, &ends, parts);
         let of = |side: usize| settled.points.iter().filter(move |p| p.free && p.side == side);
         let free = [0, 1].map(|side| of(side).count());
-        if free.iter().any(|free| *free < FREE_MIN) || !(settled.mean > 0.0) {
+        if free.iter().any(|free| *free < FREE_MIN) || settled.mean.is_nan() || settled.mean <= 0.0
+        {
             return Err(MeasureError::Ends { free });
         }
         let kinds = kinds::all(&settled, &rows, &ends);

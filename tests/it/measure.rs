@@ -321,7 +321,7 @@ fn presets_of_aihwkit_pulse_as_its_own_tiles_do() {
             *done = 0;
         }
         while *done < pulse {
-            let place = level.round() as usize;
+            let place = (*level + 0.5) as usize;
             let step = |of: usize| f64::from(tables[of][place]) / 256.0;
             *level =
                 if way == "up" { *level + step(0) } else { *level - step(1) }.clamp(0.0, *span);

@@ -103,6 +103,15 @@ fn of_millionths(share: Millionths) -> f64 {
     share.0 as f64 / 1e6
 }
 
+/// Five digits.
+fn digits(value: f64) -> String {
+    if value == 0.0 || (1e-3..1e6).contains(&value) {
+        let text = format!("{value:.4}");
+        return text.trim_end_matches('0').trim_end_matches('.').to_owned();
+    }
+    format!("{value:.4e}")
+}
+
 /// Numbers of a curve, as many as a line holds.
 fn numbers(kind: &KindFit) -> String {
     const SHOWN: usize = 6;
@@ -140,12 +149,8 @@ fn spread(spread: &CellSpread) -> String {
 fn show(device: &MeasuredDevice, written: &str, figure: Option<&Path>) {
     let ratio =
         device.on_off().map_or("no ratio: the least is 0".into(), |r| format!("on/off {r:.2}"));
-    say(&format!(
-        "{}, conductance {} to {} ({ratio})",
-        device.source(),
-        device.window[0],
-        device.window[1]
-    ));
+    let [least, most] = device.window.map(digits);
+    say(&format!("{}, conductance {least} to {most} ({ratio})", device.source()));
     for said in &device.said {
         say(&format!("note     {said}"));
     }

@@ -62,7 +62,7 @@ impl Curve for TableSteps {
                 let after = i128::try_from(place - at * usize::from(span)).expect("a place");
                 let [from, to] = [row[at], row[at + 1]].map(|step| i128::from(step.0));
                 // 2^8 N times the share, over N: the window is no part of it
-                let fine = share * (from * (whole - after) + to * after) << STEP_BITS;
+                let fine = (share * (from * (whole - after) + to * after)) << STEP_BITS;
                 let rounded = (2 * fine + one).div_euclid(2 * one);
                 narrow(rounded.clamp(0, longest), "at most 2^8 windows of 2^12 levels")
             };
