@@ -1,7 +1,6 @@
 //! The keys of configuration files. Every key is optional here; defaults and ranges are in `check`.
 
-use std::collections::BTreeMap;
-use std::fmt;
+use std::{collections::BTreeMap, fmt};
 
 use serde::de::{self, Deserializer, MapAccess, Visitor};
 use serde::{Deserialize, Serialize};
