@@ -155,7 +155,6 @@ const RATIOS: [f64; 7] = [1e-6, 3e-6, 1e-5, 3e-5, 1e-4, 3e-4, 1e-3];
 /// One row of the table.
 struct Row {
     side: usize,
-    ratio: f64,
     /// Of the mean current.
     drop: f64,
     /// Of the drop: the law, and `1 - s`.
@@ -174,7 +173,7 @@ fn row(side: usize, ratio: f64, low: bool) -> Row {
     let errors = [&law, &taken].map(|of| apart(of, &exact) / drop);
     let step = exact.iter().fold(0.0, |a: f64, b| a.max(*b)) / 255.0;
     let greatest = law.iter().zip(&exact).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
-    Row { side, ratio, drop: drop / mean, errors, steps: greatest / step }
+    Row { side, drop: drop / mean, errors, steps: greatest / step }
 }
 
 /// Writes docs/img/ir-drop.svg and prints the table of docs/results/devices.md.
@@ -213,7 +212,7 @@ fn figure(rows: &[Row]) -> String {
         "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width} {height}\" font-family=\"sans-serif\" font-size=\"12\">\n\
          <rect width=\"{width}\" height=\"{height}\" fill=\"#fff\"/>\n"
     );
-    let mut text = |svg: &mut String, at: [f64; 2], anchor: &str, text: &str| {
+    let text = |svg: &mut String, at: [f64; 2], anchor: &str, text: &str| {
         let [x, y] = at;
         let _ = writeln!(
             svg,

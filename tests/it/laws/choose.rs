@@ -396,8 +396,8 @@ pub(crate) fn flaws(seed: u64) -> impl Fn(&mut HardwareSpec) {
     let least = 1 << numbers.within(0, 20);
     let reference = if numbers.within(0, 1) == 0 { Reference::None } else { Reference::Column };
     let segment = 1 << numbers.within(16, 47);
-    // in the corner of the first layer, which every array has
-    let pathway = [0, 1, 4][numbers.within(0, 2) as usize];
+    // the corner of an array that every wiring has
+    let pathway = 0;
     let at = [StuckAt::Floor, StuckAt::Ceiling][numbers.within(0, 1) as usize];
     let cell = ListedCell { layer: 0, pathway, row: 0, column: 0, at };
     let map = FaultMap::new(vec![cell]).unwrap();
