@@ -207,7 +207,7 @@ fn table_and_figure() {
 fn figure(rows: &[Row]) -> String {
     let [width, height, left, top, right, bottom] = [640.0, 400.0, 70.0, 30.0, 150.0, 50.0];
     let x = |drop: f64| left + (drop.log10() + 4.0) / 4.0 * (width - left - right);
-    let y = |error: f64| height - bottom - (error.log10() + 5.0) / 5.5 * (height - top - bottom);
+    let y = |error: f64| height - bottom - (error.log10() + 4.0) / 5.0 * (height - top - bottom);
     let mut svg = format!(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width} {height}\" font-family=\"sans-serif\" font-size=\"12\">\n\
          <rect width=\"{width}\" height=\"{height}\" fill=\"#fff\"/>\n"
@@ -219,20 +219,20 @@ fn figure(rows: &[Row]) -> String {
             "<text x=\"{x:.1}\" y=\"{y:.1}\" text-anchor=\"{anchor}\" fill=\"#222\">{text}</text>"
         );
     };
-    let ends = [x(1e-4), x(1.0), y(1e-5), y(10f64.powf(0.5))];
+    let ends = [x(1e-4), x(1.0), y(1e-4), y(10.0)];
     for (value, name) in [
-        (1e-5, "0.001 %"),
         (1e-4, "0.01 %"),
         (1e-3, "0.1 %"),
         (1e-2, "1 %"),
         (0.1, "10 %"),
         (1.0, "100 %"),
+        (10.0, "1000 %"),
     ] {
         let at = y(value);
         let _ =
             writeln!(svg, "<path d=\"M{:.1} {at:.1}H{:.1}\" stroke=\"#ddd\"/>", ends[0], ends[1]);
         text(&mut svg, [ends[0] - 6.0, at + 4.0], "end", name);
-        if value >= 1e-4 {
+        if value <= 1.0 {
             let at = x(value);
             let _ = writeln!(
                 svg,
