@@ -74,7 +74,8 @@ pub use crate::task::classify::{
 /// ```
 pub mod hardware {
     pub use crate::chip::device::{
-        CellSpread, Chance, DeviceError, DeviceSpec, Faults, Programming, PulseNoise, ReadNoise,
+        CellSpread, Chance, Conductance, Conducting, DeviceError, DeviceSpec, FaultMap, Faults,
+        LetThrough, ListedCell, Programming, PulseNoise, ReadNoise, Reference, StuckAt, Wires,
     };
     pub use crate::chip::hardware::{
         Adc, AdcRange, CellSpec, ConverterKind, DigitalSpec, DitherBits, DitherPattern, DriveSpec,

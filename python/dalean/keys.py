@@ -338,6 +338,10 @@ Keys = TypedDict(
         "hw.device.spread": Any,
         # Cells that hold one level.
         "hw.device.faults": Any,
+        # What cells conduct at level 0.
+        "hw.device.conductance": Any,
+        # What wires take.
+        "hw.device.wires": Any,
         # Noise of conversions.
         "hw.device.read_noise": Any,
         # Noise of loads.
@@ -392,10 +396,30 @@ Keys = TypedDict(
         "hw.device.faults.stuck_ceiling": float,
         # Share of the cells that are stuck at any level of the window, each level as often as any other. [of the cells]
         "hw.device.faults.stuck_any": float,
+        # A CSV file that lists stuck cells, `layer,pathway,row,column,state`, in a file relative to that file; state is a level, `floor` or `ceiling`. Listed cells are stuck on every chip, whatever is drawn.
+        "hw.device.faults.map": Any,
+        # The same lines in place, as a run keeps them.
+        "hw.device.faults.cells": Any,
         # Where the numbers come from.
         "hw.device.faults.source": Any,
         # How far to trust the numbers.
         "hw.device.faults.kind": Literal["measured", "fitted", "assumed"],
+        # Conductance of a cell at the ceiling over that at level 0. Levels lie evenly between: level 0 no longer conducts nothing.
+        "hw.device.conductance.on_off": Any,
+        # What takes off what cells conduct at level 0.
+        "hw.device.conductance.reference": Literal["none", "column"],
+        # Where the numbers come from.
+        "hw.device.conductance.source": Any,
+        # How far to trust the numbers.
+        "hw.device.conductance.kind": Literal["measured", "fitted", "assumed"],
+        # Resistance of the wire from one cell to the next, along rows and along columns. [ohm]
+        "hw.device.wires.segment_ohm": Any,
+        # Resistance of a cell at the ceiling, with what selects it. [ohm]
+        "hw.device.wires.cell_on_ohm": Any,
+        # Where the numbers come from.
+        "hw.device.wires.source": Any,
+        # How far to trust the numbers.
+        "hw.device.wires.kind": Literal["measured", "fitted", "assumed"],
         # Standard deviation of a conversion, in currents of one cell at the ceiling under the greatest slice of a drive. [cells]
         "hw.device.read_noise.sigma_cells": float,
         # Where the numbers come from.

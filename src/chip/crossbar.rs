@@ -25,6 +25,7 @@ mod own;
 mod pulses;
 mod state;
 mod stuck;
+mod through;
 mod trains;
 mod words;
 mod write;
@@ -34,6 +35,7 @@ pub use initial::{InitialLaw, initial_levels, initial_scale};
 pub use optimise::{Adam, Asks, Momentum};
 pub use own::{CellsMade, OwnCells};
 pub use pulses::{Collect, Collected, RowPeaks};
+pub use through::Through;
 pub use trains::ColumnTrain;
 pub use write::{WriteRequest, Written};
 
@@ -130,13 +132,13 @@ impl Crossbar {
     /// When a level lies outside the window: levels are checked at the door.
     pub fn load_row(&mut self, row: usize, levels: &[u16]) {
         assert_eq!(levels.len(), self.layout.columns, "a row has one level a column");
+        let differ = self.own.as_ref().is_some_and(|own| own.windows_differ());
         for (column, &level) in levels.iter().enumerate() {
             let own = self.own(row, column);
+            // a level of another chip may lie beyond what any cell of this one has
             let [floor, ceiling] = match own {
-                Some(own) => {
-                    [own.floor.min(self.window.floor()), own.ceiling.max(self.window.ceiling())]
-                }
-                None => [self.window.floor(), self.window.ceiling()],
+                Some(_) if differ => [0, u16::MAX],
+                _ => [self.window.floor(), self.window.ceiling()],
             };
             assert!((floor..=ceiling).contains(&level), "level {level} lies outside the window");
             let level = own.map_or(level, |own| level.clamp(own.floor, own.ceiling));

@@ -4,13 +4,17 @@
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
 mod cell;
+mod conductance;
 mod drift;
+mod fault_map;
 mod faults;
 mod programming;
 mod read_noise;
 mod response;
 
 pub use cell::{Device, DeviceLanes, OwnCell, PLACES, PulseWords};
+pub use conductance::{CONDUCTANCE_BITS, Conductance, Conducting, LetThrough, Reference, Wires};
+pub use fault_map::{FaultMap, ListedCell, StuckAt};
 pub use faults::{Chance, Faults, StuckCell};
 pub use programming::{Programming, cell_words};
 pub use read_noise::{Direction, Noise, NoisePlace, ReadNoise};

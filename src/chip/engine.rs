@@ -29,6 +29,7 @@ use crate::num::tables::{Gaussian, Scales};
 
 mod calibrate;
 mod columns;
+mod conducting;
 mod currents;
 mod deploy;
 #[cfg(test)]
@@ -264,6 +265,8 @@ pub struct Engine {
     said: Vec<mute::Said>,
     /// Sums of levels of each row, by layer and array; forgotten when a level moves.
     row_sums: Vec<Option<Vec<Vec<i64>>>>,
+    /// What cells let through, by layer, where that is not their level; forgotten when a level moves.
+    through: Vec<Option<conducting::AllThrough>>,
     samples: usize,
     /// Samples that `LOADX` has brought since the start, by phase: state.
     loaded: [u64; 3],
@@ -329,6 +332,7 @@ impl Engine {
             currents: vec![[[0; 2]; 2]; layers.len()],
             said: vec![mute::Said::default(); layers.len()],
             row_sums: vec![None; layers.len()],
+            through: vec![None; layers.len()],
             units,
             layers,
             samples: 0,
@@ -448,6 +452,7 @@ impl Engine {
     pub fn layers_mut(&mut self) -> &mut [Layer] {
         self.registers.fill(Registers::default());
         self.row_sums.fill(None);
+        self.through.fill(None);
         self.samples = 0;
         &mut self.layers
     }

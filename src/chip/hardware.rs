@@ -1,13 +1,17 @@
 //! What a chip is, as checked numbers. A hardware model file becomes one of these at the door.
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
-use super::device::{Device, DeviceError, DeviceSpec, Faults, Programming, ReadNoise};
+use super::device::{
+    CONDUCTANCE_BITS, Conductance, Conducting, Device, DeviceError, DeviceSpec, FaultMap, Faults,
+    Programming, ReadNoise, Reference, Wires,
+};
 use crate::num::fixed::{
-    AdcBits, DriveBits, ErrorBits, IncrementMax, LevelBits, LutBits, OutOfRange, ResidualBits,
+    AdcBits, DriveBits, ErrorBits, IncrementMax, LevelBits, LutBits, OutOfRange, ResidualBits, rsh,
 };
 
 pub mod converter;
 mod driver;
+mod flaws;
 pub mod read_time;
 pub mod timing;
 
@@ -273,6 +277,12 @@ pub struct HardwareSpec {
     pub timing: Option<Timing>,
     /// Cells that are stuck.
     pub faults: Faults,
+    /// Cells that are stuck by a list.
+    pub fault_map: FaultMap,
+    /// What level 0 conducts; `None`: nothing.
+    pub conductance: Option<Conductance>,
+    /// Resistance of wires; `None`: none.
+    pub wires: Option<Wires>,
     /// What conversions are off by; `None`: nothing.
     pub read_noise: Option<ReadNoise>,
     /// What loads leave beside a level; `None`: nothing.
@@ -347,6 +357,9 @@ impl Hardware {
             device,
             timing,
             faults,
+            fault_map,
+            conductance,
+            wires,
             read_noise,
             programming,
         } = &spec;
@@ -390,25 +403,13 @@ impl Hardware {
             driver::check_driver(*timing)?;
         }
         if let WriteScheme::Trains { slots_log2 } = *scheme {
-            check_trains(slots_log2, *increment_max, *residual_bits, *timing)?;
+            driver::check_trains(slots_log2, *increment_max, *residual_bits, *timing)?;
         }
-        if faults.total() > 1 << 32 {
-            let found = "make more than all cells".to_owned();
-            let allowed = "the shares of stuck cells add up to at most 1".to_owned();
-            return Err(HardwareError { key: "device.faults", found, allowed });
-        }
-        if let Some(Programming { coefficients }) = programming {
-            let most = Programming::COEFFICIENT_MAX;
-            if let Some(c) = coefficients.iter().find(|c| c.abs() > most) {
-                let found = format!("has {c} of 2^24");
-                let allowed = "a coefficient is at most four times the greatest conductance".into();
-                return Err(HardwareError { key: "device.programming.sigma", found, allowed });
-            }
-        }
-        if let Some(ReadNoise { sigma }) = read_noise {
-            let most = u64::from(ReadNoise::SIGMA_MAX);
-            between("device.read_noise.sigma_cells", (*sigma).into(), [1, most])?;
-        }
+        flaws::check(
+            (*faults, fault_map, *window),
+            (*conductance, *wires),
+            (*read_noise, *programming),
+        )?;
         Ok(Self(spec))
     }
 
@@ -458,6 +459,9 @@ impl Hardware {
             device: None,
             timing: None,
             faults: Faults::NONE,
+            fault_map: FaultMap::default(),
+            conductance: None,
+            wires: None,
             read_noise: None,
             programming: None,
         };
@@ -503,6 +507,18 @@ impl Hardware {
         self.device.as_ref().map(of)
     }
 
+    /// The law of its currents, where cells conduct something else than their level.
+    #[must_use]
+    pub fn conducting(&self) -> Option<Conducting> {
+        Conducting::new(self.conductance, self.wires, self.cell.window.ceiling())
+    }
+
+    /// Whether cells are stuck, by a draw or a list.
+    #[must_use]
+    pub fn has_stuck_cells(&self) -> bool {
+        !self.faults.is_none() || !self.fault_map.is_empty()
+    }
+
     /// Pulses across the window and levels they move a cell by, where those are not the same.
     #[must_use]
     pub fn pulses_of_window(&self) -> Option<[u32; 2]> {
@@ -515,45 +531,16 @@ impl Hardware {
     #[must_use]
     pub(crate) fn full_shift(&self, bits: AdcBits, subtract: Subtract, rows: usize) -> u32 {
         let slice_max = (1i64 << self.drive.dac_bits.min(self.drive.bits.get())) - 1;
-        let worst = rows as i64 * i64::from(self.level_greatest()) * slice_max;
+        let kept = self.conductance.filter(|of| of.reference == Reference::None);
+        let least = kept.map_or(0, |of| i64::from(of.least));
+        let cell = (i64::from(self.level_greatest()) << CONDUCTANCE_BITS) + least;
+        let worst = rsh(rows as i64 * slice_max * cell, CONDUCTANCE_BITS);
         let rail = match subtract {
             Subtract::Digital => (1i64 << bits.get()) - 1,
             Subtract::Current => (1i64 << (bits.get() - 1)) - 1,
         };
-        (0..).find(|&shift| crate::num::fixed::rsh(worst, shift) <= rail).expect("rsh ends at 0")
+        (0..).find(|&shift| rsh(worst, shift) <= rail).expect("rsh ends at 0")
     }
-}
-
-/// Coincidences of trains: at most a pulse a slot, all lines at once, nothing left over.
-fn check_trains(
-    slots_log2: u32,
-    increment_max: IncrementMax,
-    residual_bits: ResidualBits,
-    timing: Option<Timing>,
-) -> Result<(), HardwareError> {
-    let wrong = |key, found: String, allowed: String| Err(HardwareError { key, found, allowed });
-    let most = WriteScheme::SLOTS_MAX.min(increment_max.get());
-    if 1u64 << slots_log2.min(63) > u64::from(most) {
-        let allowed = format!(
-            "a power of two in 1..={most}: a cell gets at most one pulse a slot, and write.increment_max is {}",
-            increment_max.get()
-        );
-        return wrong("write.train_slots", format!("is 2^{slots_log2}"), allowed);
-    }
-    if residual_bits.get() != 0 {
-        let allowed = "coincidences of trains have no remainder; set it to 0".to_owned();
-        return wrong("write.residual_bits", "is not 0".to_owned(), allowed);
-    }
-    let plain = |timing: Timing| {
-        !timing.verify && timing.active_max.is_none() && timing.pulse_code == PulseCode::Unary
-    };
-    if timing.is_some_and(|timing| !plain(timing)) {
-        let found = "is \"rank1\" beside verified, limited or amplitude-coded pulses".to_owned();
-        let allowed = "all rows and columns fire at once: leave out timing.verify, timing.write_active_max and \
-                       timing.pulses, or use write.scheme = \"rounded\"";
-        return wrong("write.scheme", found, allowed.to_owned());
-    }
-    Ok(())
 }
 
 #[cfg(test)]

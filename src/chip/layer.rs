@@ -21,12 +21,14 @@ use crate::num::tables::{Activation, FullDrive, Lut, Unit};
 
 mod delivery;
 pub mod homeostasis;
+mod listed;
 pub mod requests;
 mod stage;
 mod state;
 
 pub use delivery::{Delivery, Taps, WordSource};
 pub use homeostasis::{Balance, Readings};
+pub use listed::{Listed, check_listed};
 pub use requests::{Followed, Optimiser, Requests};
 pub use stage::{Gain, Homeostasis, Pool};
 

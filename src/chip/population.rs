@@ -52,6 +52,26 @@ pub struct Pathway {
     pub polarity: Polarity,
 }
 
+impl Pathway {
+    /// The code of the arrays that have this name, in whatever wiring.
+    #[must_use]
+    pub fn named(name: &str) -> Option<u8> {
+        all().find(|pathway| pathway.name == name).map(|pathway| pathway.code)
+    }
+
+    /// Names of all arrays that there are.
+    #[must_use]
+    pub fn names() -> Vec<&'static str> {
+        all().map(|pathway| pathway.name).collect()
+    }
+}
+
+/// Every array that there is, by its name.
+fn all() -> impl Iterator<Item = &'static Pathway> {
+    const ALONE: [Pathway; 6] = [PP, NP, NN, PN, PLUS, MINUS];
+    ALONE.iter().chain(&PAIRS[4..])
+}
+
 const fn pathway(
     code: u8,
     name: &'static str,

@@ -6,7 +6,7 @@ use clap::Args;
 use serde_json::json;
 
 use super::table::columns;
-use super::{Done, Failure, Shared, known, say, usage};
+use super::{Done, Failure, Shared, known, note, say, usage};
 use crate::lab::data::DataRoot;
 use crate::lab::run::{self, ChipResult, Deployment};
 
@@ -79,6 +79,13 @@ pub(super) fn deploy(
         }
         !stopped()
     };
+    if let Some(unread) = run::unread(&deployment)? {
+        if shared.json {
+            say(&json!({"event": "note", "text": unread}).to_string());
+        } else {
+            note(&format!("note: {unread}"));
+        }
+    }
     let results = run::deploy(path, root, shared.machine()?, &deployment, &mut each)?;
     let shown = |score: f64| {
         if policy { format!("{score:.2}") } else { format!("{:.2} %", 100.0 * score) }

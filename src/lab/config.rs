@@ -35,6 +35,7 @@ pub use differs::{Difference, flat};
 pub use file::{ExperimentFile, HardwareFile};
 pub use hardware::{Model, builtin_devices, builtin_models, device_names, load_model, model_names};
 pub use law::{Law, Setting, SettingValue};
+pub(crate) use layers::anchor_map;
 pub use layers::{Overlay, Sources, anchor, load, overlay, setting, setting_table};
 pub(crate) use policy::PolicySettings;
 pub use quantity::{

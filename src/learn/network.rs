@@ -21,9 +21,12 @@ use super::route::Route;
 use super::rule::{Control, Rule, UpdateMode};
 use crate::chip::crossbar::kernel::Backend;
 use crate::chip::crossbar::{InitialLaw, initial_levels, initial_scale};
+use crate::chip::device::FaultMap;
 use crate::chip::engine::{Engine, Operation};
 use crate::chip::hardware::Hardware;
-use crate::chip::layer::{self, Delivery, InitialLevels, Layer, LayerSpec, Optimiser, PlanError};
+use crate::chip::layer::{
+    self, Delivery, InitialLevels, Layer, LayerSpec, Listed, Optimiser, PlanError,
+};
 use crate::chip::population::{Pathway, Polarity};
 use crate::num::draw::{Place, Site};
 use crate::num::fixed::{Batch, RateMantissa, log2_ceil};
@@ -137,6 +140,16 @@ pub enum NetworkError {
 }
 
 impl NetworkError {
+    /// Whether the cells of a list are those of layers with these numbers.
+    pub(crate) fn listed<'a>(
+        map: &FaultMap,
+        layers: impl Iterator<Item = (u16, &'a LayerSpec)>,
+        which: Listed,
+    ) -> Result<(), Self> {
+        layer::check_listed(map, layers, which)
+            .map_err(|error| Self::misfit("hw.device.faults.map", error.found, error.allowed))
+    }
+
     /// A part that does not fit with the others; tasks say so of what they add to a network.
     pub fn misfit(
         key: &'static str,
@@ -218,6 +231,8 @@ impl NetworkSpec {
     ) -> Result<Driver, NetworkError> {
         self.check(hardware)?;
         let numbers = self.numbers(place)?;
+        let numbered = numbers.iter().copied().zip(&self.layers);
+        NetworkError::listed(&hardware.fault_map, numbered, Listed::Some)?;
         let deliveries = self.deliveries(place.seed, &numbers, words);
         let layers = self.layers.iter().zip(deliveries).zip(&numbers);
         let layers = layers.map(|((spec, delivery), &number)| {

@@ -6,7 +6,7 @@
 use dalean::chip::device::{CellSpread, Device, DeviceSpec, OwnCell, PulseNoise, PulseWords};
 use dalean::num::draw::{Place, Site};
 use dalean::num::fixed::Millionths;
-use dalean::num::tables::{FACTOR_ONE, LinearSteps, Response, SpreadLaw};
+use dalean::num::tables::{FACTOR_ONE, SpreadLaw};
 
 fn millionths(value: f64) -> Millionths {
     Millionths((value * 1e6).round() as i64)
@@ -15,16 +15,6 @@ fn millionths(value: f64) -> Millionths {
 fn chip(bits: u32, ends: [u16; 2], device: &DeviceSpec) -> Device {
     assert_eq!(device.check(), Ok(()));
     Device::new(device, ends, (1 << bits) - 1)
-}
-
-fn plain(states: u32) -> DeviceSpec {
-    DeviceSpec {
-        response: Response::Linear(LinearSteps::default()),
-        states,
-        asymmetry: Millionths(0),
-        noise: PulseNoise::Off,
-        spread: CellSpread::default(),
-    }
 }
 
 /// Mean and variance.
@@ -62,7 +52,7 @@ fn what_sets_cells_apart_has_the_law_it_is_named_by() {
         floor: millionths(0.02),
         step_law: SpreadLaw::LogNormal,
     };
-    let device = chip(12, [600, 2600], &DeviceSpec { spread, ..plain(100) });
+    let device = chip(12, [600, 2600], &DeviceSpec { spread, ..DeviceSpec::even(100) });
     let of = |seed: u64| {
         let words = [0, 1, 2, 3].map(|sub| quads(Device::place(place(seed), sub)));
         (0..CELLS).map(|at| device.cell([0, 1, 2, 3].map(|sub| words[sub][at]))).collect()
@@ -135,7 +125,7 @@ fn noise_and_rounding_have_their_mean_and_variance_at_every_pulse() {
         (PulseNoise::OfStep(millionths(0.6)), 0.6 * mean),
         (PulseNoise::OfWindow(millionths(0.05)), 0.05 * 255.0),
     ] {
-        let device = chip(8, [0, 255], &DeviceSpec { noise, ..plain(200) });
+        let device = chip(8, [0, 255], &DeviceSpec { noise, ..DeviceSpec::even(200) });
         for rises in [true, false] {
             let sign = if rises { 1.0 } else { -1.0 };
             let draws = [(1, 0, 0), (1, 1, 0), (1, 0, 1), (2, 0, 0)];

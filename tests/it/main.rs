@@ -20,6 +20,7 @@ mod extending;
 mod facade;
 mod golden_run;
 mod hardware;
+mod ir_drop;
 mod keys;
 mod laws;
 mod measure;

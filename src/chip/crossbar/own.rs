@@ -90,6 +90,11 @@ impl OwnCells {
         Self { device, factors, windows }
     }
 
+    /// Whether cells differ in their windows.
+    pub(super) const fn windows_differ(&self) -> bool {
+        self.windows.is_some()
+    }
+
     /// The half block that begins at a place of the planes.
     pub(super) fn half(&self, at: usize) -> CellsMade<'_> {
         let factors = self.factors.as_ref();

@@ -2,7 +2,7 @@
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
 use crate::num::fixed::Millionths;
-use crate::num::tables::{Response, SpreadLaw};
+use crate::num::tables::{LinearSteps, Response, SpreadLaw};
 
 /// A device that is not ideal: a pulse moves a cell by more or less than a level.
 ///
@@ -87,6 +87,18 @@ impl CellSpread {
 impl DeviceSpec {
     /// States, at most.
     pub const STATES_MAX: u32 = 1 << 16;
+
+    /// A device of which every pulse is as long as the others, and every cell like the others.
+    #[must_use]
+    pub fn even(states: u32) -> Self {
+        Self {
+            response: Response::Linear(LinearSteps::default()),
+            states,
+            asymmetry: Millionths(0),
+            noise: PulseNoise::Off,
+            spread: CellSpread::default(),
+        }
+    }
 
     /// Checks its numbers.
     ///

@@ -11,6 +11,7 @@
 
 use std::ops::Range;
 
+use super::conducting::{Letting, rows_through};
 use super::each::each;
 use super::error::{packed_at, stride_of};
 use super::noise::disturb_rows;
@@ -31,6 +32,7 @@ const READS_A_PART: usize = 64;
 
 impl Engine {
     pub(super) fn forward_columns(&mut self, layer: usize) {
+        self.look_through(layer);
         let this = &self.layers[layer];
         let (layout, spec) = (this.layout, &this.spec);
         assert!(
@@ -44,6 +46,12 @@ impl Engine {
         let (samples, reads) = (self.samples, self.reads(layer));
         let (positions, inputs) = (spec.positions(), spec.sample_sums());
         let noise = self.noise(layer, Direction::Rows);
+        // what every cell conducts beside its level cancels between banks that the same gates drive
+        let through = match self.letting(layer) {
+            Some(Letting::Own(all)) => Some(all),
+            _ => None,
+        };
+        let through = through.as_ref().map(|all| pair.map(|at| &all[at]));
         let codes = pair.map(|at| spec.wiring.pathways()[at].code);
         let ([_, across], hardware) = (this.tiles(&self.hardware), &self.hardware);
         let mut backward = std::mem::take(&mut self.registers[layer].backward);
@@ -66,8 +74,20 @@ impl Engine {
                 for from in (first..end).step_by(READS_TOGETHER) {
                     let group = from..(from + READS_TOGETHER).min(end);
                     unpack(packed, reads, &group, &mut gates);
-                    let gates = Drives::new(&gates, group.len());
-                    for (array, negate) in arrays.iter().zip([false, true]) {
+                    let driven = &gates[..];
+                    let gates = Drives::new(driven, group.len());
+                    for (at, read) in group.clone().enumerate().filter(|_| through.is_some()) {
+                        let gate = |column: usize| {
+                            let block = column / BLOCK_ROWS * group.len() + at;
+                            driven[block * BLOCK_ROWS + column % BLOCK_ROWS].cast_signed().into()
+                        };
+                        let at = (read - first) / positions * inputs;
+                        let (of, pixels) = (through.expect("looked"), &mut sums[at..at + inputs]);
+                        let layer = (hardware, spec, [layout.rows, layout.columns]);
+                        rows_through(of, layer, gate, read % positions, pixels);
+                    }
+                    let banks = arrays.iter().zip([false, true]);
+                    for (array, negate) in banks.filter(|_| through.is_none()) {
                         array.read_columns(kernel, gates, &mut row_sums, |rows, shift| {
                             for (read, rows) in
                                 group.clone().zip(rows.chunks_exact(layout.rows_padded()))

@@ -15,8 +15,9 @@ use std::sync::Arc;
 use super::noise::gaussian_of;
 use super::{Engine, Operation, Registers};
 use crate::chip::crossbar::Crossbar;
-use crate::chip::device::{Faults, Programming, ReadNoise, cell_words};
-use crate::chip::hardware::HardwareError;
+use crate::chip::device::{Programming, cell_words};
+use crate::chip::hardware::{HardwareError, HardwareSpec};
+use crate::chip::layer::{Listed, check_listed};
 use crate::chip::ledger::{During, Event};
 use crate::num::draw::{Place, Site};
 use crate::num::tables::{DriftTables, Gaussian};
@@ -26,19 +27,27 @@ use crate::num::tables::{DriftTables, Gaussian};
 pub struct AllLevels(Vec<Vec<Vec<u16>>>);
 
 impl Engine {
-    /// Makes its cells and reads those of another kind of chip. Levels stay as they are.
+    /// Makes its cells and reads those of another kind of chip, but for its loads; windows of cells too, if those of the other kind differ.
+    /// Levels stay as they are, inside the windows.
     ///
     /// # Errors
     /// When there is no such chip.
     pub fn set_device(
         &mut self,
-        faults: Faults,
-        read_noise: Option<ReadNoise>,
+        of: &HardwareSpec,
         programming: Option<Programming>,
     ) -> Result<(), HardwareError> {
         let hardware = self.hardware.with(|h| {
-            (h.faults, h.read_noise, h.programming) = (faults, read_noise, programming);
+            (h.faults, h.fault_map) = (of.faults, of.fault_map.clone());
+            (h.conductance, h.wires) = (of.conductance, of.wires);
+            (h.read_noise, h.programming) = (of.read_noise, programming);
+            let windows = of.device.as_ref().filter(|device| device.spread.moves_window());
+            if let Some(device) = windows {
+                h.device = Some(device.clone());
+            }
         })?;
+        let layers = self.layers.iter().map(|layer| (layer.index, &layer.spec));
+        check_listed(&hardware.fault_map, layers, Listed::Some)?;
         self.gaussian = gaussian_of(&hardware);
         self.hardware = hardware;
         self.set_chip_seed(self.chip_seed);
@@ -128,7 +137,7 @@ impl Engine {
                     .move_all(|cell, level| drift.aged(&gaussian, level, words[cell], level_max));
             }
             let after = sum(self);
-            self.row_sums[layer] = None;
+            self.levels_moved(layer);
             let factor = ((before << 12) + after / 2).checked_div(after).filter(|_| made_up);
             self.factors[layer] = factor.map(|factor| i64::try_from(factor).expect("12 bits more"));
         }
@@ -146,7 +155,7 @@ impl Engine {
         let pathway = self.layers[layer].spec.wiring.pathways()[array].code;
         let left = self.programmed(layer, array, row, levels);
         self.layers[layer].arrays[array].load_row(row, &left);
-        self.row_sums[layer] = None;
+        self.levels_moved(layer);
         let (during, count) = (During::LoadWeights, levels.len() as u64);
         self.charge(layer, pathway, during, Event::CellLoads, count);
         self.time(|schedule, cycles| schedule.load(cycles, layer));
@@ -157,7 +166,7 @@ impl Engine {
 mod tests {
     use super::*;
     use crate::chip::crossbar::kernel::Backend;
-    use crate::chip::device::Chance;
+    use crate::chip::device::{Chance, Faults, ReadNoise};
     use crate::chip::engine::Side;
     use crate::chip::hardware::Hardware;
     use crate::chip::layer::{DrivenBy, Homeostasis, InitialLevels, Layer, LayerSpec, Pool, Taps};
@@ -263,8 +272,8 @@ mod tests {
     fn another_chip_has_other_cells_and_the_same_chip_the_same() {
         let mut engine = engine();
         let loads = Programming { coefficients: [1 << 20, 0, 0, 0] };
-        let faults = engine.hardware().faults;
-        engine.set_device(faults, Some(ReadNoise { sigma: 1 << 16 }), Some(loads)).unwrap();
+        let noisy = engine.hardware().with(|h| h.read_noise = Some(ReadNoise { sigma: 1 << 16 }));
+        engine.set_device(&noisy.unwrap(), Some(loads)).unwrap();
         let read = |engine: &mut Engine, seed| {
             engine.set_chip_seed(seed);
             engine.load_all(&levels());
@@ -275,7 +284,7 @@ mod tests {
         assert_ne!(one, two);
         assert_eq!(read(&mut engine, 1), one);
         // without flaws all chips are alike, and loads are exact
-        engine.set_device(Faults::NONE, None, None).unwrap();
+        engine.set_device(&Hardware::reference(), None).unwrap();
         assert_eq!(read(&mut engine, 1), read(&mut engine, 2));
         assert_eq!(read(&mut engine, 3).0, levels());
     }

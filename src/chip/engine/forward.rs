@@ -90,6 +90,7 @@ impl Engine {
         if let Units::Homeostatic(table) = &mut self.units[layer] {
             table.shift = u32::try_from(self.layers[layer].balance.shift()).unwrap_or(0);
         }
+        self.look_through(layer);
         let notes = self.notes(layer, mode);
         let mut seen = match self.units[layer] {
             Units::Normalised(hand_on) => self.normalised(layer, mode, hand_on),
@@ -300,6 +301,7 @@ impl Engine {
         let samples = self.reads(layer) as u64;
         let dac_bits = u64::from(self.hardware.drive.dac_bits);
         let wiring = this.spec.wiring;
+        let reference = self.reference_columns(layer);
         let at_difference =
             matches!(self.hardware.adc, Adc::Finite { subtract: Subtract::Current, .. });
         for &target in wiring.targets() {
@@ -311,7 +313,8 @@ impl Engine {
                 let driven = samples * rows * across * slices;
                 self.charge_read(layer, code, Event::DacSlices, driven);
                 self.charge_read(layer, code, Event::SramBits, driven * dac_bits);
-                self.charge_read(layer, code, Event::CellReads, samples * rows * columns * slices);
+                let read = samples * rows * (columns + reference) * slices;
+                self.charge_read(layer, code, Event::CellReads, read);
                 self.charge_read(layer, code, Event::Holds, held);
                 self.charge_read(layer, code, Event::Conversions, converted);
                 self.charge_read(layer, code, Event::ShiftAdds, converted);

@@ -5,9 +5,10 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use super::Engine;
+use super::conducting::Letting;
 use super::window::fold;
 use crate::chip::crossbar::layout::PANEL_COLUMNS;
-use crate::chip::device::{Direction, Noise, NoisePlace};
+use crate::chip::device::{Device, Direction, Noise, NoisePlace};
 use crate::chip::hardware::{Adc, Hardware, Subtract};
 use crate::chip::layer::{Layer, LayerSpec};
 use crate::chip::population::Wiring;
@@ -25,6 +26,8 @@ pub(super) fn gaussian_of(hardware: &Hardware) -> Option<Arc<Gaussian>> {
 pub(super) struct Beside {
     /// What conversions are off by.
     pub(super) noise: Option<Noise>,
+    /// What cells let through, if not their level.
+    pub(super) letting: Option<Letting>,
     /// What accumulators are multiplied by, 12 fractional bits.
     pub(super) factor: Option<i64>,
 }
@@ -32,12 +35,13 @@ pub(super) struct Beside {
 impl Beside {
     /// The same for reads of which the first is number `read` of these.
     pub(super) fn starting_at(&self, read: usize) -> Self {
-        Self { noise: self.noise.as_ref().map(|noise| noise.starting_at(read)), ..*self }
+        let noise = self.noise.as_ref().map(|noise| noise.starting_at(read));
+        Self { noise, ..self.clone() }
     }
 
     /// Whether there is nothing.
     pub(super) const fn is_nothing(&self) -> bool {
-        self.noise.is_none() && self.factor.is_none()
+        self.noise.is_none() && self.letting.is_none() && self.factor.is_none()
     }
 }
 
@@ -49,23 +53,30 @@ fn sd(hardware: &Hardware) -> Option<i64> {
 }
 
 impl Engine {
-    /// Makes it another chip of the same kind: which cells are stuck, what loads leave and what reads are off by are drawn with this seed. Levels of
-    /// cells that were stuck before stay until they are loaded. An engine starts with the seed of its run.
+    /// Makes it another chip of the same kind: which cells are stuck, how their steps and windows differ, what loads leave and what reads
+    /// are off by are drawn with this seed. Levels of cells that were stuck before stay until they are loaded. An engine starts with the
+    /// seed of its run.
     pub fn set_chip_seed(&mut self, seed: u64) {
         self.chip_seed = seed;
         self.load_words.iter_mut().for_each(Vec::clear);
+        let differs = |device: &Device| device.differs() != [false; 2];
+        if let Some(device) = self.hardware.device().filter(differs) {
+            let device = Arc::new(device);
+            self.layers.iter_mut().for_each(|layer| layer.fit(&device, seed));
+        }
+        (0..self.layers.len()).for_each(|layer| self.levels_moved(layer));
         self.draw_faults();
     }
 
     pub(super) fn draw_faults(&mut self) {
         let any = |layer: &Layer| layer.arrays.iter().any(|array| !array.stuck().is_empty());
-        if self.hardware.faults.is_none() && !self.layers.iter().any(any) {
+        if !self.hardware.has_stuck_cells() && !self.layers.iter().any(any) {
             return;
         }
         let seed = self.chip_seed;
         let window = self.hardware.cell.window;
         let ends = [window.floor(), window.ceiling()];
-        for (layer, sums) in self.layers.iter_mut().zip(&mut self.row_sums) {
+        for layer in &mut self.layers {
             let size = [layer.layout.rows, layer.layout.columns];
             for (array, pathway) in layer.arrays.iter_mut().zip(layer.spec.wiring.pathways()) {
                 let place = Place {
@@ -76,9 +87,10 @@ impl Engine {
                     sub: 0,
                     count: 0,
                 };
-                array.set_stuck(self.hardware.faults.stuck(place, ends, size));
+                let drawn = self.hardware.faults.stuck(place, ends, size);
+                let of = (layer.index, pathway.code);
+                array.set_stuck(self.hardware.fault_map.over(drawn, of, ends));
             }
-            *sums = None;
         }
     }
 
@@ -92,7 +104,11 @@ impl Engine {
 
     /// What reads of the columns of a layer have beside the ideal.
     pub(super) fn beside(&self, layer: usize) -> Beside {
-        Beside { noise: self.noise(layer, Direction::Columns), factor: self.factors[layer] }
+        Beside {
+            noise: self.noise(layer, Direction::Columns),
+            letting: self.letting(layer),
+            factor: self.factors[layer],
+        }
     }
 
     /// Noise of the reads of a layer of the loaded samples, if conversions have any.

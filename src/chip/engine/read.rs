@@ -2,7 +2,8 @@
 //!
 //! ```text
 //! narrow   every sum fits 31 bits by the plan, and nobody has to see a current: kernels convert and look up
-//! wide     anything else: 64 bits, one conversion after the other; all reads whose conversions are noisy
+//! wide     anything else: 64 bits, one conversion after the other; all reads that are noisy, or of cells that conduct more or less
+//!          than their level
 //! ```
 //!
 //! Both give the same numbers. On the wide way currents exist as numbers in one place, [`Reader::currents`], between
@@ -13,11 +14,13 @@
 use std::borrow::Cow;
 use std::ops::Range;
 
+use super::conducting::{Common, Letting};
 use super::homeostasis::{Noted, Notes};
 use super::noise::{Beside, Noisy};
 use crate::chip::crossbar::Crossbar;
 use crate::chip::crossbar::kernel::{Banks, Conversion, Drives, Greatest, Kernel, Scratch};
 use crate::chip::crossbar::layout::{BLOCK_ROWS, PANEL_COLUMNS};
+use crate::chip::device::CONDUCTANCE_BITS;
 use crate::chip::hardware::{Adc, Hardware, Subtract};
 use crate::chip::layer::{CHUNK_BLOCKS, Layer};
 use crate::chip::periphery::Converter;
@@ -121,7 +124,11 @@ pub(super) struct PanelPart {
 /// Two banks whose currents or codes are subtracted.
 struct Pair<'a> {
     arrays: [&'a Crossbar; 2],
+    /// Their numbers in the layer.
+    at: [usize; 2],
     reads: [Vec<TileRead<'a>>; 2],
+    /// What comes to the currents of each read, where cells conduct beside their levels.
+    common: [Vec<Common>; 2],
 }
 
 /// The banks of one target stream, and how they are read.
@@ -138,6 +145,8 @@ pub(super) struct Reader<'a> {
     greatest: Greatest,
     /// What conversions are off by.
     noisy: Option<Noisy>,
+    /// What cells let through, if not their level.
+    letting: Option<Letting>,
     /// What accumulators are multiplied by, 12 fractional bits.
     factor: Option<i64>,
     narrow: bool,
@@ -175,10 +184,10 @@ impl<'a> Reader<'a> {
         let pairs = wiring.pairs(target);
         let bound = bound(layer, hardware, pairs.len(), converters.as_ref());
         let narrow = bound.is_some() && !mode.shows_currents() && beside.is_nothing();
-        let Beside { noise, factor } = beside;
+        let Beside { noise, letting, factor } = beside;
         let tiles = match (&converters, narrow) {
             // a lossless conversion is off all the same
-            (None, _) if noise.is_none() => Tiles::Whole,
+            (None, _) if noise.is_none() && letting.is_none() => Tiles::Whole,
             (Some(_), true) => Tiles::Together,
             _ => Tiles::Apart,
         };
@@ -188,9 +197,20 @@ impl<'a> Reader<'a> {
             let drives = drives(wiring.pathways()[at].source);
             tile_reads(layer, hardware, drives, samples * phases, tiles)
         };
-        let pair = |places: &[usize; 2]| Pair {
-            arrays: places.map(|at| &layer.arrays[at]),
-            reads: places.map(reads),
+        let pair = |places: &[usize; 2]| {
+            let reads = places.map(reads);
+            let common = [0, 1].map(|bank| match &letting {
+                None => vec![],
+                Some(letting) => {
+                    let common = |read: &TileRead<'_>| {
+                        let drives = (&*read.codes, samples * phases);
+                        let first = read.blocks.start * BLOCK_ROWS;
+                        Common::of(letting, places[bank], drives, first, hardware.tile.columns)
+                    };
+                    reads[bank].iter().map(common).collect()
+                }
+            });
+            Pair { arrays: places.map(|at| &layer.arrays[at]), at: *places, reads, common }
         };
         Self {
             pairs: pairs.iter().map(pair).collect(),
@@ -202,7 +222,10 @@ impl<'a> Reader<'a> {
             slices: hardware.slices() as usize,
             greatest: Greatest {
                 // a low byte of more than 8 bits can be anything
-                level: u8::try_from(hardware.level_greatest()).unwrap_or(u8::MAX),
+                level: match &letting {
+                    Some(Letting::Own(_)) => u8::MAX,
+                    _ => u8::try_from(hardware.level_greatest()).unwrap_or(u8::MAX),
+                },
                 code: if tiles == Tiles::Whole {
                     code_max
                 } else {
@@ -210,6 +233,7 @@ impl<'a> Reader<'a> {
                 },
             },
             noisy: noise.map(|noise| Noisy::new(noise, wiring, pairs, (phases, hardware))),
+            letting,
             factor,
             narrow,
             bound: bound.unwrap_or(u128::MAX),
@@ -418,17 +442,35 @@ impl<'a> Reader<'a> {
         part: &PanelPart,
         [e, i]: [&mut [i64]; 2],
     ) {
-        let PanelPart { panel, samples, .. } = part.clone();
-        for ((array, reads), out) in pair.arrays.iter().zip(&pair.reads).zip([e, i]) {
-            let read = &reads[read];
-            let drives = self.drives(read);
+        let PanelPart { panel, live, samples } = part.clone();
+        for (bank, out) in [e, i].into_iter().enumerate() {
+            let (array, of) = (pair.arrays[bank], &pair.reads[bank][read]);
+            let drives = self.drives(of);
             let mut sums = [0; Scratch::SUMS];
             let sums = &mut sums[..out.len()];
-            kernel.read(array.low(panel, read.blocks.clone()), drives, samples.clone(), sums);
-            out.iter_mut().zip(&*sums).for_each(|(out, &sum)| *out = i64::from(sum));
-            if let Some(high) = array.high(panel, read.blocks.clone()) {
-                kernel.read(high, drives, samples.clone(), sums);
-                out.iter_mut().zip(sums).for_each(|(out, sum)| *out += i64::from(*sum) << 8);
+            let mut add = |plane: &[u8], place: usize, out: &mut [i64]| {
+                kernel.read(plane, drives, samples.clone(), sums);
+                let weighed = sums.iter().map(|&sum| i64::from(sum) << (8 * place));
+                out.iter_mut().zip(weighed).for_each(|(out, sum)| *out += sum);
+            };
+            out.fill(0);
+            if let Some(Letting::Own(all)) = &self.letting {
+                let planes = all[pair.at[bank]].planes(panel, of.blocks.clone());
+                planes.enumerate().for_each(|(place, plane)| add(plane, place, out));
+                out.iter_mut().for_each(|sum| *sum = rsh(*sum, CONDUCTANCE_BITS));
+            } else {
+                add(array.low(panel, of.blocks.clone()), 0, out);
+                if let Some(high) = array.high(panel, of.blocks.clone()) {
+                    add(high, 1, out);
+                }
+            }
+            let Some(common) = pair.common[bank].get(read).filter(|of| !of.is_nothing()) else {
+                continue;
+            };
+            let first = panel * PANEL_COLUMNS;
+            for (driving, out) in samples.clone().zip(out.chunks_exact_mut(PANEL_COLUMNS)) {
+                let lines = out[..live].iter_mut().zip(first..);
+                lines.for_each(|(sum, column)| *sum += common.at(driving, column));
             }
         }
     }

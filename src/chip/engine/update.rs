@@ -54,7 +54,7 @@ impl Engine {
                 assert!(plain, "optimisers and centred updates write a batch at once");
                 assert!(*pending == 0 && samples.len() == 1, "now takes one sample");
                 if let WriteScheme::Trains { slots_log2 } = self.hardware.write.scheme {
-                    self.row_sums[layer] = None;
+                    self.levels_moved(layer);
                     return self.write_trains(layer, samples.start, shift, slots_log2);
                 }
                 let reads = self.layers[layer].spec.drivings();
@@ -101,7 +101,7 @@ impl Engine {
     /// Programs the sums over `samples` and counts one write of each array.
     fn program(&mut self, layer: usize, samples: Range<usize>, shift: u32) {
         let wiring = self.layers[layer].spec.wiring;
-        self.row_sums[layer] = None;
+        self.levels_moved(layer);
         self.registers[layer].pulses = Pulses::none(self.collect, &self.layers[layer]);
         // words are moved by a write of nothing too
         let moves = self.layers[layer].requests.optimiser.memory().0 > 0;

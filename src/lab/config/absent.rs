@@ -115,9 +115,12 @@ impl Config {
         let drive = self.resolved.hw.as_ref().and_then(|hw| hw.drive.as_ref());
         let optical = drive.is_some_and(|drive| drive.mode.as_deref() == Some("amplitude"));
         let has = |effect: &&Effect| match (effect.of, effect.key) {
-            // a floor above 0 is a lowest level that conducts
-            (_, "on_off") => self.hardware.cell.window.floor() == 0,
-            (_, "stuck_cells") => self.hardware.faults.is_none(),
+            // a floor above 0 is a lowest level that conducts too
+            (_, "on_off") => {
+                self.hardware.cell.window.floor() == 0 && self.hardware.conductance.is_none()
+            }
+            (_, "stuck_cells") => !self.hardware.has_stuck_cells(),
+            (_, "ir_drop") if self.hardware.wires.is_some() => false,
             (_, "read_noise") => self.hardware.read_noise.is_none(),
             (_, "programming_noise") => self.hardware.programming.is_none(),
             (_, "write_nonlinearity") => self.hardware.device.is_none(),
@@ -207,6 +210,10 @@ mod tests {
     fn a_floor_above_0_is_an_on_off_ratio() {
         assert!(find(&absent(None, &[]), "on_off").is_some());
         assert!(find(&absent(None, &["hw.cell.floor=2"]), "on_off").is_none());
+        assert!(find(&absent(None, &["hw.device.conductance.on_off=5"]), "on_off").is_none());
+        let wires = ["hw.device.wires.segment_ohm=1", "hw.device.wires.cell_on_ohm=1e5"];
+        assert!(find(&absent(None, &[]), "ir_drop").is_some());
+        assert!(find(&absent(None, &wires), "ir_drop").is_none());
     }
 
     #[test]

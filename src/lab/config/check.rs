@@ -225,7 +225,8 @@ pub(super) fn config(mut file: ExperimentFile, model: &UnderModel) -> Result<Con
     let seed = *file.seed.get_or_insert(1);
     let ChipFile(hw) = file.hw.get_or_insert_with(ChipFile::default);
     let hardware = chip::resolve(hw, "hw.")?;
-    let drift = device::flaws(hw.device.as_ref(), &|name| format!("hw.{name}"))?.drift;
+    let of = (hardware.cell.window.ceiling(), false);
+    let drift = device::flaws(hw.device.as_ref(), of, &|name| format!("hw.{name}"))?.drift;
     check_marks(hw, "hw.")?;
     changed::settle(hw, model, &settings(&hardware, kind_of(hw)));
     let constants = constants_of(hw, &hardware, "hw.")?;

@@ -103,11 +103,14 @@ pub(super) fn resolve(file: &mut HardwareFile, prefix: &str) -> Result<Hardware,
     let residual_bits = range(&key("write.residual_bits"), ResidualBits::new(bits))?;
 
     let scheme = scheme(write, &key, increments)?;
+    device::keep_lists(file.device.as_mut(), &key)?;
     let device = device::resolve(file.device.as_ref(), window, &key)?;
+    let light = mode == DriveMode::Amplitude;
     let slices = Slices { mode, converter, count: drive_bits.get().div_ceil(dac_bits), dac_bits };
     let timing = file.timing.as_mut().map(|table| timing(table, &slices, &key)).transpose()?;
-    let device::Flaws { faults, read_noise, programming, drift: _ } =
-        device::flaws(file.device.as_ref(), &key)?;
+    let window_end = (window.ceiling(), light);
+    let device::Flaws { faults, fault_map, conductance, wires, read_noise, programming, drift: _ } =
+        device::flaws(file.device.as_ref(), window_end, &key)?;
     let spec = HardwareSpec {
         cell: CellSpec { level_bits, window, floor_kind },
         tile: TileSpec { rows: tile_rows, columns: tile_columns, count_max, transposed_read },
@@ -118,6 +121,9 @@ pub(super) fn resolve(file: &mut HardwareFile, prefix: &str) -> Result<Hardware,
         device,
         timing,
         faults,
+        fault_map,
+        conductance,
+        wires,
         read_noise,
         programming,
     };

@@ -3,13 +3,19 @@
 use serde::{Deserialize, Serialize};
 
 use super::ConfigError;
+use super::check::wrong;
 use super::file::keys;
 use crate::chip::device::DeviceSpec;
 use crate::chip::hardware::Window;
 
+mod currents;
+mod fault_list;
 mod flaws;
 mod response;
 
+pub(super) use fault_list::listed;
+
+pub(super) use currents::{ConductanceFile, WiresFile};
 pub use flaws::Retention;
 pub(super) use flaws::{DriftFile, FaultsFile, Flaws, ProgrammingFile, ReadNoiseFile, flaws};
 pub(super) use response::{ResponseFile, SpreadFile};
@@ -23,6 +29,10 @@ keys! {
         spread: SpreadFile,
         /// Cells that hold one level.
         faults: FaultsFile,
+        /// What cells conduct at level 0.
+        conductance: ConductanceFile,
+        /// What wires take.
+        wires: WiresFile,
         /// Noise of conversions.
         read_noise: ReadNoiseFile,
         /// Noise of loads.
@@ -30,6 +40,22 @@ keys! {
         /// What time does to levels, between programming and reading (`dalean eval --after`).
         drift: DriftFile,
     }
+}
+
+/// Reads the list of stuck cells that is named, and keeps it in its place. `key` puts the place of a table before a name.
+pub(super) fn keep_lists(
+    device: Option<&mut DeviceFile>,
+    key: &dyn Fn(&str) -> String,
+) -> Result<(), ConfigError> {
+    let Some(faults) = device.and_then(|device| device.faults.as_mut()) else { return Ok(()) };
+    let Some(path) = faults.map.take() else { return Ok(()) };
+    let at = key("device.faults.map");
+    if faults.cells.is_some() {
+        let allowed = "cells are listed by the file or in place: remove one of them";
+        return Err(wrong(&at, "is given beside `cells`", allowed));
+    }
+    faults.cells = Some(fault_list::read(&at, &path)?);
+    Ok(())
 }
 
 /// Checks `[device]` of a chip with that window. `key` puts the place of a table before a name.

@@ -7,9 +7,10 @@
 
 use std::num::NonZeroU32;
 
+use super::device::listed;
 use super::{Config, ConfigError, Select, TrainOn};
 use crate::chip::crossbar::kernel::ConvShape;
-use crate::chip::device::{CellSpread, DeviceSpec, Faults, PulseNoise};
+use crate::chip::device::{CellSpread, DeviceSpec, Faults, PulseNoise, Reference};
 use crate::chip::hardware::{
     Adc, AdcRange, CellSpec, DigitalSpec, DitherBits, DitherPattern, DriveSpec, FloorKind,
     HardwareSpec, PulseCode, Subtract, TileSpec, Timing, WriteScheme, WriteSpec,
@@ -98,6 +99,9 @@ const FROZEN: &[(&str, &str)] = &[
     ("faults.any", "0"),
     ("read_noise.sigma", "0"),
     ("programming.sigma", "none"),
+    ("faults.map", "none"),
+    ("conductance.least", "0"),
+    ("wires.segment", "0"),
 ];
 
 /// Key and word.
@@ -466,6 +470,9 @@ impl List {
             device,
             timing,
             faults,
+            fault_map,
+            conductance,
+            wires,
             read_noise,
             programming,
         } = hardware;
@@ -537,6 +544,13 @@ impl List {
         self.put("faults.floor", floor.get());
         self.put("faults.ceiling", ceiling.get());
         self.put("faults.any", any.get());
+        self.put("faults.map", listed(fault_map));
+        let off = conductance.map(|of| match of.reference {
+            Reference::None => of.least.to_string(),
+            Reference::Column => format!("{} and a reference column", of.least),
+        });
+        self.put("conductance.least", off.unwrap_or_else(|| "0".into()));
+        self.put("wires.segment", wires.map_or(0, |of| of.segment));
         self.put("read_noise.sigma", read_noise.map_or(0, |noise| noise.sigma));
         let sigma = programming.map(|loads| loads.coefficients.map(|c| c.to_string()).join(" "));
         self.put("programming.sigma", sigma.unwrap_or_else(|| "none".into()));

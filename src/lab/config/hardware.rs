@@ -166,11 +166,16 @@ fn provenance(file: &HardwareFile) -> Vec<(&'static str, Option<&str>, Option<&s
             }
         )*};
     }
-    device!(response spread faults read_noise programming drift);
+    device!(response spread faults conductance wires read_noise programming drift);
     if let Some(super::file::AdcFile::Finite(table)) = &file.adc {
         all.push(("adc", table.source.as_deref(), table.kind.as_deref()));
     }
     all
+}
+
+/// The folder of a model's file.
+pub(super) fn beside(name: &str) -> &std::path::Path {
+    std::path::Path::new(name).parent().unwrap_or(std::path::Path::new(""))
 }
 
 /// Loads and checks a model by built-in name or path.
@@ -181,6 +186,9 @@ pub fn load_model(name: &str) -> Result<Model, ConfigError> {
     let text = model_text(name)?;
     let file = model_file(name, &text)?;
     let mut resolved = file.clone();
+    if let Some(map) = resolved.device.as_mut().and_then(|of| of.faults.as_mut()?.map.as_mut()) {
+        *map = beside(name).join(&*map).display().to_string();
+    }
     let hardware = chip::resolve(&mut resolved, "")?;
     let constants = constants_of(&resolved, &hardware, "")?;
     Ok(Model {

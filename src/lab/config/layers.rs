@@ -104,7 +104,8 @@ pub fn load(sources: &Sources<'_>) -> Result<Config, ConfigError> {
     } else {
         let text = hardware::model_text(&name)?;
         let file: HardwareFile = hardware::model_file(&name, &text)?;
-        let under: toml::Table = parse(&name, &text)?;
+        let mut under: toml::Table = parse(&name, &text)?;
+        anchor_map(&mut under, hardware::beside(&name));
         before = Some(under.clone());
         changed::lay(under, &file, own)?
     };
@@ -124,9 +125,20 @@ fn expanded(mut over: toml::Table) -> toml::Table {
     over
 }
 
+/// The same of the list of stuck cells that a hardware model names.
+pub(crate) fn anchor_map(hardware: &mut toml::Table, folder: &Path) {
+    let faults = hardware.get_mut("device").and_then(|device| device.get_mut("faults"));
+    if let Some(toml::Value::String(map)) = faults.and_then(|faults| faults.get_mut("map")) {
+        *map = folder.join(&*map).display().to_string();
+    }
+}
+
 /// Makes paths that a file in `folder` names relative to where the program runs: those of data and of a hardware model.
 pub fn anchor(table: &mut toml::Table, folder: &Path) {
     data::anchor(table, folder);
+    if let Some(toml::Value::Table(hw)) = table.get_mut("hw") {
+        anchor_map(hw, folder);
+    }
     let model = match table.get_mut("hw") {
         Some(toml::Value::Table(hw)) => hw.get_mut("model"),
         model => model,

@@ -70,6 +70,9 @@ pub fn changes(run: &Hardware, other: &Hardware) -> Vec<Change> {
         device,
         timing,
         faults,
+        fault_map,
+        conductance,
+        wires,
         read_noise,
         programming,
     } = &**run;
@@ -98,6 +101,9 @@ pub fn changes(run: &Hardware, other: &Hardware) -> Vec<Change> {
     let remainders = *residual_bits != other.write.residual_bits;
     differ("write.residual_bits", remainders, REMAINDERS, true);
     differ("device.faults", *faults != other.faults, LEARNT, true);
+    differ("device.faults.map", *fault_map != other.fault_map, LEARNT, true);
+    differ("device.conductance", *conductance != other.conductance, LEARNT, true);
+    differ("device.wires", *wires != other.wires, LEARNT, true);
     differ("device.programming", *programming != other.programming, LEARNT, true);
     differ("device.read_noise", *read_noise != other.read_noise, LEARNT, true);
     differ("write.scheme", *scheme != other.write.scheme, SCHEME, true);

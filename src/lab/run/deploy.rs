@@ -15,7 +15,8 @@ use std::path::Path;
 use super::again::read_again;
 use super::{Machine, RunError};
 use crate::chip::engine::AllLevels;
-use crate::chip::hardware::{Hardware, HardwareSpec};
+use crate::chip::hardware::Hardware;
+use crate::chip::layer::{Listed, check_listed};
 use crate::lab::config::{self, Config, ConfigError, Overlay, Retention, Sources};
 use crate::lab::data::DataRoot;
 use crate::lab::store::folder::{self, names};
@@ -52,12 +53,46 @@ fn wrong(key: &str, found: &str, allowed: &str) -> RunError {
     ConfigError::Value { key, found, allowed }.into()
 }
 
+/// What a deployment names and a reading does not look at, in words.
+///
+/// # Errors
+/// When the model cannot be read.
+pub fn unread(deployment: &Deployment) -> Result<Option<String>, RunError> {
+    let Some(model) = &deployment.device else { return Ok(None) };
+    let own: toml::Table = config::load_model(model)?.text.parse().expect("a model that was read");
+    let mut device = own.get("device").and_then(toml::Value::as_table).cloned().unwrap_or_default();
+    let taken = without_pulses(&mut device);
+    let tables = taken.iter().map(|name| format!("[device.{name}]")).collect::<Vec<_>>();
+    Ok((!taken.is_empty()).then(|| {
+        let tables = tables.join(" and ");
+        format!("{tables} of {model}: what pulses do; eval gives none, so it is not looked at")
+    }))
+}
+
+/// Keys that only a pulse has to do with.
+const UNREAD: [&str; 3] =
+    ["hw.device.response", "hw.device.spread.step", "hw.device.spread.asymmetry"];
+
+/// Takes the tables out that only pulses have to do with; their names.
+fn without_pulses(device: &mut toml::Table) -> Vec<&'static str> {
+    let windows =
+        |spread: &toml::Value| ["ceiling", "floor"].iter().any(|key| spread.get(key).is_some());
+    let read = device.get("spread").is_some_and(windows);
+    let names = ["response", "spread"].into_iter().filter(|name| *name == "response" || !read);
+    names.filter(|name| device.remove(*name).is_some()).collect()
+}
+
 /// The chip of a run with another device.
 fn chip(path: &Path, deployment: &Deployment) -> Result<(Hardware, Option<Retention>), RunError> {
     for setting in &deployment.settings {
         if !setting.trim_start().starts_with("hw.device.") {
             let found = format!("is set by `{setting}`");
             let allowed = "eval changes what cells and reads do, hw.device.*; everything else is as it was learnt with";
+            return Err(wrong("eval --set", &found, allowed));
+        }
+        if UNREAD.iter().any(|key| setting.trim_start().starts_with(key)) {
+            let found = format!("is set by `{setting}`");
+            let allowed = "eval gives no pulses, so what a pulse does changes nothing: remove it, or train with it";
             return Err(wrong("eval --set", &found, allowed));
         }
     }
@@ -67,10 +102,22 @@ fn chip(path: &Path, deployment: &Deployment) -> Result<(Hardware, Option<Retent
     if let Some(model) = &deployment.device {
         let model_text = config::load_model(model)?.text;
         let mut own: toml::Table = model_text.parse().expect("a model that was read");
+        config::anchor_map(&mut own, Path::new(model).parent().unwrap_or(Path::new("")));
         let Some(device) = own.remove("device") else {
             let allowed = "name a model with a table [device], such as hw_models/own/pcm_drift.toml, or use --set hw.device.KEY=VALUE";
             return Err(wrong("eval --hw", &format!("names {model}, which has none"), allowed));
         };
+        let mut device = device;
+        if let Some(tables) = device.as_table_mut() {
+            let taken = without_pulses(tables);
+            if tables.is_empty() {
+                let allowed = "eval gives no pulses, so that changes nothing: name a model that says what cells and reads do, or train with \
+                               this one";
+                let found =
+                    format!("names {model}, whose [device] has {} alone", taken.join(" and "));
+                return Err(wrong("eval --hw", &found, allowed));
+            }
+        }
         let hw = toml::Table::from_iter([("device".to_owned(), device)]);
         table.insert("hw".into(), toml::Value::Table(hw));
     }
@@ -98,13 +145,16 @@ pub fn deploy(
     let (hardware, drift) = chip(path, deployment)?;
     let level_max = hardware.cell.window.ceiling();
     let others = deployment.chips.iter().any(|&chip| chip > 0);
+    let spread = hardware.device.as_ref().map(|device| device.spread);
     let varies = !hardware.faults.is_none()
+        || spread.is_some_and(|spread| spread.moves_window())
         || hardware.read_noise.is_some()
         || hardware.programming.is_some()
         || (drift.is_some() && !deployment.after.is_empty());
     if others && !varies {
-        let allowed = "chips of this kind are all alike: give hw.device.faults, hw.device.programming or \
-                       hw.device.read_noise with --set or --hw, or --after with hw.device.drift";
+        let allowed = "chips of this kind are all alike: give shares of hw.device.faults, hw.device.programming, \
+                       hw.device.read_noise or the ends of hw.device.spread with --set or --hw, or --after with \
+                       hw.device.drift";
         return Err(wrong("eval --samples", "asks for other chips", allowed));
     }
     let times: Vec<Option<f64>> = match &deployment.after[..] {
@@ -129,7 +179,11 @@ pub fn deploy(
     });
     let tables = tables.collect::<Result<Vec<_>, _>>()?;
     let (mut session, _) = read_again(path, data_root, machine)?;
-    let HardwareSpec { faults, read_noise, programming, .. } = (*hardware).clone();
+    let layers = session.engines().into_iter().flat_map(|engine| engine.layers());
+    let layers = layers.map(|layer| (layer.index, &layer.spec));
+    check_listed(&hardware.fault_map, layers, Listed::All)
+        .map_err(|error| wrong(error.key, &error.found, &error.allowed))?;
+    let programming = hardware.programming;
     let levels: Vec<AllLevels> =
         session.engines().iter().map(|engine| engine.all_levels()).collect();
     let counters: Vec<[u64; 3]> =
@@ -142,7 +196,7 @@ pub fn deploy(
                 let engine = driver.engine_mut();
                 // the chip that learnt is loaded with what it holds, exactly
                 let loads = programming.filter(|_| number > 0);
-                let set = engine.set_device(faults, read_noise, loads);
+                let set = engine.set_device(&hardware, loads);
                 set.map_err(|error| wrong(error.key, &error.found, &error.allowed))?;
                 engine.set_chip_seed(if number > 0 { number } else { own[at] });
                 engine.load_all(&levels[at]);

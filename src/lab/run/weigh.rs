@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! wanted = sum over arrays of cells x ( 1 or 2 planes + 2 of a residual + 1 of pruned bits + 4 of a checkpoint
-//!                                     + 8 of a device whose cells differ in their steps + 8 in their windows )
+//!                                     + 8 of a device whose cells differ in their steps + 8 in their windows + 3 where wires resist )
 //!        + sum over convolutions of reads x ( drive sets x rows + target streams x units x 10 )
 //! left   = least of: memory the system can give, what the group of processes may take, what this process may address
 //! ```
@@ -72,7 +72,8 @@ impl Memory {
         let planes = if hardware.cell.level_bits.get() > 8 { 2 } else { 1 };
         let residual = if hardware.write.residual_bits.get() > 0 { 2 } else { 0 };
         let absorbs = hardware.cell.floor_kind == FloorKind::Absorbing;
-        let pruned = u64::from(absorbs || !hardware.faults.is_none());
+        let pruned = u64::from(absorbs || hardware.has_stuck_cells());
+        let through = 3 * u64::from(hardware.wires.is_some());
         let spread = hardware.device.as_ref().map(|device| device.spread);
         let own = spread
             .map_or(0, |of| 8 * (u64::from(of.differs_in_steps()) + u64::from(of.moves_window())));
@@ -81,8 +82,8 @@ impl Memory {
             let layout = Layout { rows, columns: layer.units };
             let arrays = layer.wiring.pathways().len() as u64;
             let cells = |cells: usize| (cells as u64).saturating_mul(arrays);
-            let stored =
-                cells(layout.cells_padded()).saturating_mul(planes + residual + pruned + own);
+            let stored = cells(layout.cells_padded())
+                .saturating_mul(planes + residual + pruned + own + through);
             let together = u64::from(batch.get()).max(READ_TOGETHER);
             let reads = together.saturating_mul(layer.positions() as u64);
             let sets = layer.drive_sets().len() * rows;

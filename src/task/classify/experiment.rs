@@ -5,7 +5,7 @@ use super::coding::{Coder, Coding};
 use super::examples::Examples;
 use crate::chip::crossbar::kernel::Backend;
 use crate::chip::hardware::Hardware;
-use crate::chip::layer::{DrivenBy, LayerSpec};
+use crate::chip::layer::{DrivenBy, LayerSpec, Listed};
 use crate::learn::driver::Driver;
 use crate::learn::error::OutputError;
 use crate::learn::network::{NetworkError, NetworkPlace, NetworkSpec};
@@ -62,6 +62,8 @@ impl Experiment {
     /// When something does not, with the key that says it.
     pub fn check(&self) -> Result<(), NetworkError> {
         self.network.check(&self.hardware)?;
+        let layers = (0..).zip(&self.network.layers);
+        NetworkError::listed(&self.hardware.fault_map, layers, Listed::All)?;
         if self.network.layers[0].driven_by == DrivenBy::Signed {
             let allowed = "values of examples have none: give the first layer one set of drives";
             return Err(NetworkError::misfit("network.input", "gives drives a sign", allowed));

@@ -4,7 +4,7 @@
 use fixed::types::U1F31;
 
 use crate::chip::hardware::Hardware;
-use crate::chip::layer::DrivenBy;
+use crate::chip::layer::{DrivenBy, Listed};
 use crate::learn::network::{NetworkError, NetworkSpec};
 use crate::num::fixed::narrow;
 use crate::num::tables::Activation;
@@ -186,6 +186,8 @@ impl PolicyExperiment {
                 return Err(NetworkError::misfit("network.threshold", "is given", allowed));
             }
         }
+        let layers = self.actor.layers.iter().chain(&self.critic.layers);
+        NetworkError::listed(&self.hardware.fault_map, (0..).zip(layers), Listed::All)?;
         if self.actor.batch != self.critic.batch {
             let allowed = "actor and critic learn from the same minibatches";
             return Err(NetworkError::misfit("learning.batch", "is not one", allowed));

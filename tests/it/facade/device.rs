@@ -2,9 +2,9 @@
 
 use dalean::HardwareSpec;
 use dalean::hardware::{
-    CellSpread, Chance, DeviceSpec, ExponentialSteps, Faults, LinearSteps, MeasuredSteps,
-    Millionths, NeurosimSteps, Programming, PulseNoise, ReadNoise, Response, SoftBoundSteps,
-    SpreadLaw, TableSteps,
+    CellSpread, Chance, Conductance, DeviceSpec, ExponentialSteps, FaultMap, Faults, LinearSteps,
+    ListedCell, MeasuredSteps, Millionths, NeurosimSteps, Programming, PulseNoise, ReadNoise,
+    Reference, Response, SoftBoundSteps, SpreadLaw, StuckAt, TableSteps, Wires,
 };
 
 use super::Choices;
@@ -58,6 +58,23 @@ fn chance(c: &mut Choices<'_>) -> Chance {
     Chance::new(some).unwrap_or(Chance::NEVER)
 }
 
+/// Some cells, some of which no network has.
+fn listed(c: &mut Choices<'_>) -> FaultMap {
+    let cell = |c: &mut Choices<'_>| ListedCell {
+        layer: u16::from(c.byte() % 3),
+        pathway: c.byte() % 8,
+        row: c.near(0, 70).unsigned_abs() as u32,
+        column: c.near(0, 40).unsigned_abs() as u32,
+        at: match c.byte() % 3 {
+            0 => StuckAt::Floor,
+            1 => StuckAt::Ceiling,
+            _ => StuckAt::Level(c.near(0, 255) as u16),
+        },
+    };
+    let cells = (0..c.byte() % 5).map(|_| cell(c)).collect();
+    FaultMap::new(cells).unwrap_or_default()
+}
+
 /// Gives a chip cells that are not ideal.
 pub(super) fn devices(c: &mut Choices<'_>, spec: &mut HardwareSpec) {
     spec.device = c.one_in(2).then(|| DeviceSpec {
@@ -74,6 +91,15 @@ pub(super) fn devices(c: &mut Choices<'_>, spec: &mut HardwareSpec) {
     if c.one_in(2) {
         spec.faults = Faults { floor: chance(c), ceiling: chance(c), any: chance(c) };
     }
+    spec.fault_map = if c.one_in(3) { listed(c) } else { FaultMap::default() };
+    spec.conductance = c.one_in(3).then(|| Conductance {
+        least: c.near(0, 10 * (4095 << 8)) as u32,
+        reference: c.of(&[Reference::None, Reference::Column]),
+    });
+    spec.wires = c.one_in(3).then(|| {
+        let segment = c.near(0, 1 << 48).unsigned_abs();
+        Wires { segment: segment >> (c.byte() % 49) }
+    });
     spec.read_noise = c.one_in(3).then(|| ReadNoise { sigma: c.near(0, 16 << 16) as u32 });
     let coefficient = |c: &mut Choices<'_>| c.near(-(4 << 24), 4 << 24);
     spec.programming =

@@ -1,6 +1,9 @@
 //! Any valid chip, any small network on it, any list of choices.
 
-use dalean::chip::device::{Chance, Faults, Programming, ReadNoise};
+use dalean::chip::device::{
+    Chance, Conductance, FaultMap, Faults, ListedCell, Programming, ReadNoise, Reference, StuckAt,
+    Wires,
+};
 use dalean::chip::hardware::{
     Adc, AdcRange, ConverterKind, DitherBits, DitherPattern, FloorKind, Hardware, HardwareSpec,
     PulseCode, SliceTime, SliceTimes, Subtract, Timing, Window, WriteScheme, converter,
@@ -373,7 +376,8 @@ pub(crate) fn timed_net() -> impl Strategy<Value = Net> {
     })
 }
 
-/// A network of which one in three has stuck cells, one in three noisy reads and one in three noisy loads.
+/// A network of which one in three has stuck cells, one in three noisy reads, one in three noisy loads; one in three has cells that conduct
+/// at level 0, one in three wires that resist, and one in three a listed cell.
 pub(crate) fn flawed(mut net: Net) -> Net {
     let flaw = flaws(net.seed);
     net.change(flaw);
@@ -388,7 +392,19 @@ pub(crate) fn flaws(seed: u64) -> impl Fn(&mut HardwareSpec) {
     let sigma = 1 << numbers.within(0, 19);
     let [stuck, noisy, loads] = [0; 3].map(|_| numbers.within(0, 2) == 0);
     let coefficients = [0; 4].map(|_| numbers.within(-(1 << 22), 1 << 23));
+    let [conducts, resists, listed] = [0; 3].map(|_| numbers.within(0, 2) == 0);
+    let least = 1 << numbers.within(0, 20);
+    let reference = if numbers.within(0, 1) == 0 { Reference::None } else { Reference::Column };
+    let segment = 1 << numbers.within(16, 47);
+    // the corner of an array that every wiring has
+    let pathway = 0;
+    let at = [StuckAt::Floor, StuckAt::Ceiling][numbers.within(0, 1) as usize];
+    let cell = ListedCell { layer: 0, pathway, row: 0, column: 0, at };
+    let map = FaultMap::new(vec![cell]).unwrap();
     move |h| {
+        h.conductance = conducts.then_some(Conductance { least, reference });
+        h.wires = resists.then_some(Wires { segment });
+        h.fault_map = if listed { map.clone() } else { FaultMap::default() };
         h.faults = if stuck { faults } else { Faults::NONE };
         h.read_noise = noisy.then_some(ReadNoise { sigma });
         h.programming = loads.then_some(Programming { coefficients });

@@ -111,11 +111,17 @@ pub(crate) enum Fault {
     NoiseOfFirstSample,
     /// Reads from the columns have no noise.
     BackwardIsQuiet,
+    /// What level 0 conducts is not taken off by the reference column.
+    ReferenceStays,
+    /// Wires run through all tiles of an array.
+    WiresCrossTiles,
+    /// Only the wires along rows have a resistance.
+    ColumnsHaveNoWires,
 }
 
 impl Fault {
     /// All of them.
-    pub(crate) const ALL: [Self; 54] = [
+    pub(crate) const ALL: [Self; 57] = [
         Self::WrapAtCeiling,
         Self::FloorOffByOne,
         Self::CeilingOffByOne,
@@ -170,5 +176,8 @@ impl Fault {
         Self::NoiseOfNeighbour,
         Self::NoiseOfFirstSample,
         Self::BackwardIsQuiet,
+        Self::ReferenceStays,
+        Self::WiresCrossTiles,
+        Self::ColumnsHaveNoWires,
     ];
 }

@@ -224,7 +224,8 @@ proptest! {
         }
         prop_assert_eq!(Some(&interrupted(&run)), want.last(), "stopped after {}", run.stop);
         // another tile has another converter, and its noise
-        let quiet = run.experiment.hardware.read_noise.is_none();
+        let chip = &run.experiment.hardware;
+        let quiet = chip.read_noise.is_none() && chip.conducting().is_none();
         if run.experiment.hardware.adc == Adc::Ideal && quiet {
             let mut cut = run.clone();
             let smaller = |h: &mut HardwareSpec| (h.tile.rows, h.tile.columns) = tiles;

@@ -5,6 +5,7 @@
 
 use std::ops::Range;
 
+use dalean::chip::device::Reference;
 use dalean::chip::engine::{Calibration, Phase};
 use dalean::chip::hardware::{Adc, AdcRange, Subtract};
 use dalean::chip::layer::{self, Delivery, DrivenBy, LayerSpec};
@@ -16,6 +17,7 @@ use dalean::num::tables::{Activation, Lut, half_gaussian};
 use super::choose::Net;
 use super::fault::Fault;
 
+mod currents;
 mod flaws;
 mod unit;
 mod write;
@@ -68,6 +70,8 @@ pub(crate) struct Side {
     derivative: [Table; 2],
     gates: [Table; 2],
     pub(crate) backward: Vec<i64>,
+    /// What cells let through, by array, as it was looked at last.
+    through: Vec<currents::Through>,
 }
 
 /// The network, all its registers and what happened so far.
@@ -115,7 +119,10 @@ impl Shadow {
                 Adc::Finite { bits, subtract, range } => {
                     let slice = (1i64 << hw.drive.dac_bits.min(hw.drive.bits.get())) - 1;
                     let tallest = rows.min(hw.tile.rows) as i64;
-                    let worst = tallest * i64::from(hw.cell.window.ceiling()) * slice;
+                    let kept = hw.conductance.filter(|of| of.reference == Reference::None);
+                    let least = kept.map_or(0, |of| i64::from(of.least));
+                    let cell = 256 * i64::from(hw.cell.window.ceiling()) + least;
+                    let worst = rsh(tallest * cell * slice, 8);
                     let sign = u32::from(subtract == Subtract::Current);
                     let rail = (1i64 << (bits.get() - sign)) - 1;
                     let shift = match range {
@@ -148,6 +155,7 @@ impl Shadow {
                 derivative: Default::default(),
                 gates: Default::default(),
                 backward: vec![],
+                through: vec![],
             }
         });
         let ledger = Ledger::new(net.specs.len());
@@ -261,22 +269,27 @@ impl Shadow {
         if self.is(Fault::TileEdgeLost) && rows.end < this.rows {
             rows.end -= 1;
         }
-        rows.map(|row| {
+        let part = |row: usize| {
             let code = if phase == 0 { drives[row].max(0) } else { (-drives[row]).max(0) };
             let slice = (code >> (s * self.net.hardware.drive.dac_bits)) & mask;
-            this.arrays[bank].level[row][column] * if whole { code } else { slice }
-        })
-        .sum()
+            if whole { code } else { slice }
+        };
+        if self.conducts() {
+            return self.let_through((layer, bank), column, rows, part);
+        }
+        rows.map(|row| this.arrays[bank].level[row][column] * part(row)).sum()
     }
 
     /// Whether all rows may be driven at once by whole codes.
     fn is_whole(&self) -> bool {
-        self.net.hardware.adc == Adc::Ideal && self.net.hardware.read_noise.is_none()
+        let hw = &self.net.hardware;
+        hw.adc == Adc::Ideal && hw.read_noise.is_none() && !self.conducts()
     }
 
     /// Reads one target stream. Returns the currents every converter saw, by slice, when `probe` reads with
     /// ideal converters.
     fn read(&mut self, layer: usize, target: Stream, probe: bool) -> Vec<Vec<i64>> {
+        self.look_through(layer);
         let hw = self.net.hardware.clone();
         let (units, t) = (self.layers[layer].spec.units, target.index());
         let pairs = self.layers[layer].spec.wiring.pairs(target);
@@ -427,10 +440,12 @@ impl Shadow {
                 let code = self.code(layer, at);
                 for (high, wide) in tile_sizes(rows, columns, hw.tile.rows, hw.tile.columns) {
                     let converted = if current && bank % 2 == 1 { 0 } else { wide };
+                    let reference = hw.conductance.map(|of| of.reference);
+                    let beside = u64::from(reference == Some(Reference::Column));
                     for (event, count) in [
                         (Event::SramBits, high * u64::from(hw.drive.dac_bits)),
                         (Event::DacSlices, high),
-                        (Event::CellReads, high * wide),
+                        (Event::CellReads, high * (wide + beside)),
                         (Event::Holds, wide),
                         (Event::Conversions, converted),
                         (Event::ShiftAdds, converted),

@@ -4,21 +4,11 @@ use proptest::prelude::*;
 
 use super::*;
 use crate::chip::device::CellSpread;
-use crate::num::tables::{LinearSteps, Response, SoftBoundSteps};
+use crate::num::tables::{Response, SoftBoundSteps};
 
 fn chip(bits: u32, ends: [u16; 2], device: &DeviceSpec) -> Device {
     assert_eq!(device.check(), Ok(()));
     Device::new(device, ends, (1 << bits) - 1)
-}
-
-fn plain(states: u32) -> DeviceSpec {
-    DeviceSpec {
-        response: Response::Linear(LinearSteps::default()),
-        states,
-        asymmetry: Millionths(0),
-        noise: PulseNoise::Off,
-        spread: CellSpread::default(),
-    }
 }
 
 /// `floor(v / 2^by + 1/2)`.
@@ -47,7 +37,7 @@ proptest! {
             true => Response::SoftBounds(SoftBoundSteps::default()),
             false => Response::Linear(LinearSteps::default()),
         };
-        let spec = DeviceSpec { response, noise: noises[kind], spread, ..plain(states) };
+        let spec = DeviceSpec { response, noise: noises[kind], spread, ..DeviceSpec::even(states) };
         let device = chip(8, [floor, floor + span], &spec);
         let cell = device.cell(words);
         prop_assert!(cell.floor < cell.ceiling && cell.ceiling <= 255);

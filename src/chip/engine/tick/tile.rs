@@ -11,6 +11,7 @@
 
 mod balance;
 mod command;
+mod conducting;
 mod config;
 mod device;
 mod events;
@@ -24,6 +25,7 @@ mod write;
 pub use balance::TileBalance;
 use balance::TileReadings;
 pub use command::Command;
+use conducting::Through;
 pub(super) use config::TileNoise;
 pub use config::{More, Squares, TileAdc, TileConfig, TileSize, TileUnits};
 pub(super) use device::{TileDevice, laws};
@@ -212,6 +214,8 @@ pub struct Tile {
     readings: TileReadings,
     /// What cells are made of, if they are not ideal.
     device: Option<Box<TileDevice>>,
+    /// By bank: levels, and what they let through, where that is not the level itself.
+    through: [Through; 2],
 }
 
 impl Tile {
@@ -267,6 +271,7 @@ impl Tile {
             looked_up: false,
             readings: TileReadings::default(),
             device: None,
+            through: Default::default(),
             size,
             config,
             table,

@@ -26,16 +26,16 @@ fn inside(shape: ConvShape, position: usize, size: usize) -> (Range<usize>, usiz
 
 /// Adds the row sums of a position, each times `2^shift` and a sign, to the sums of the pixels of its sample,
 /// `[y][x][channel]`. What met the border goes nowhere, and a constant row has no pixel.
-pub(in super::super) fn fold(
+pub(in super::super) fn fold<T: Copy + Into<i64>>(
     spec: &LayerSpec,
-    rows: &[i32],
+    rows: &[T],
     position: usize,
     (shift, negate): (u32, bool),
     pixels: &mut [i64],
 ) {
-    let add = |to: &mut [i64], from: &[i32]| {
+    let add = |to: &mut [i64], from: &[T]| {
         for (to, &sum) in to.iter_mut().zip(from) {
-            let sum = i64::from(sum) << shift;
+            let sum = sum.into() << shift;
             *to += if negate { -sum } else { sum };
         }
     };

@@ -2,15 +2,15 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::DeviceFile;
-use crate::chip::device::{Chance, Faults, Programming, ReadNoise};
+use super::{DeviceFile, currents, fault_list};
+use crate::chip::device::{Chance, Conductance, FaultMap, Faults, Programming, ReadNoise, Wires};
 use crate::lab::config::ConfigError;
 use crate::lab::config::check::wrong;
 use crate::lab::config::file::keys;
 use crate::num::tables::{DriftLaw, DriftTables, OfLogarithm};
 
 keys! {
-    /// `[device.faults]`: shares of all cells, which add up to at most 1.
+    /// `[device.faults]`: shares of all cells, which add up to at most 1, and a list.
     FaultsFile {
         /// Share of the cells that are stuck at the floor.
         stuck_floor: f64,
@@ -18,6 +18,10 @@ keys! {
         stuck_ceiling: f64,
         /// Share of the cells that are stuck at any level of the window, each level as often as any other.
         stuck_any: f64,
+        /// A CSV file that lists stuck cells, `layer,pathway,row,column,state`, in a file relative to that file; state is a level, `floor` or `ceiling`. Listed cells are stuck on every chip, whatever is drawn.
+        map: String,
+        /// The same lines in place, as a run keeps them.
+        cells: Vec<String>,
         /// Where the numbers come from.
         source: String,
         /// How far to trust the numbers.
@@ -61,7 +65,7 @@ keys! {
 }
 
 /// A number between two ends.
-fn real(key: &str, found: f64, [least, most]: [f64; 2]) -> Result<f64, ConfigError> {
+pub(super) fn real(key: &str, found: f64, [least, most]: [f64; 2]) -> Result<f64, ConfigError> {
     if (least..=most).contains(&found) {
         return Ok(found);
     }
@@ -71,13 +75,16 @@ fn real(key: &str, found: f64, [least, most]: [f64; 2]) -> Result<f64, ConfigErr
 }
 
 /// `floor(2^bits x + 1/2)` of a number that was checked.
-fn scaled(x: f64, bits: i32) -> u64 {
+pub(super) fn scaled(x: f64, bits: i32) -> u64 {
     (x * f64::from(bits).exp2() + 0.5).floor() as u64
 }
 
 /// What a chip does beside the ideal.
 pub(in crate::lab::config) struct Flaws {
     pub(in crate::lab::config) faults: Faults,
+    pub(in crate::lab::config) fault_map: FaultMap,
+    pub(in crate::lab::config) conductance: Option<Conductance>,
+    pub(in crate::lab::config) wires: Option<Wires>,
     pub(in crate::lab::config) read_noise: Option<ReadNoise>,
     pub(in crate::lab::config) programming: Option<Programming>,
     pub(in crate::lab::config) drift: Option<Retention>,
@@ -105,17 +112,34 @@ impl Retention {
     }
 }
 
-/// Checks `[device]`. `key` puts the place of a table before a name.
+/// Checks `[device]` of a chip whose window ends at `ceiling`; `light`: it computes with light. `key` puts the place of a table before a
+/// name.
 pub(in crate::lab::config) fn flaws(
     device: Option<&DeviceFile>,
+    (ceiling, light): (u16, bool),
     key: &dyn Fn(&str) -> String,
 ) -> Result<Flaws, ConfigError> {
     let none = DeviceFile::default();
-    let DeviceFile { response: _, spread: _, faults, read_noise, programming, drift } =
-        device.unwrap_or(&none);
+    let DeviceFile {
+        response: _,
+        spread: _,
+        faults,
+        conductance,
+        wires,
+        read_noise,
+        programming,
+        drift,
+    } = device.unwrap_or(&none);
     let faults = faults.as_ref().map(|table| stuck(table, key)).transpose()?;
+    let (faults, fault_map) = faults.unwrap_or((Faults::NONE, FaultMap::default()));
+    let conductance = conductance.as_ref();
+    let conductance = conductance.map(|table| currents::conductance(table, ceiling, key));
+    let wires = wires.as_ref().map(|table| currents::wires(table, light, key)).transpose()?;
     Ok(Flaws {
-        faults: faults.unwrap_or(Faults::NONE),
+        faults,
+        fault_map,
+        conductance: conductance.transpose()?,
+        wires,
         read_noise: read_noise.as_ref().map(|table| noise(table, key)).transpose()?,
         programming: programming.as_ref().map(|table| loads(table, key)).transpose()?,
         drift: drift.as_ref().map(|table| retention(table, key)).transpose()?,
@@ -200,7 +224,10 @@ fn retention(table: &DriftFile, key: &dyn Fn(&str) -> String) -> Result<Retentio
     Ok(Retention { law, start_s })
 }
 
-fn stuck(table: &FaultsFile, key: &dyn Fn(&str) -> String) -> Result<Faults, ConfigError> {
+fn stuck(
+    table: &FaultsFile,
+    key: &dyn Fn(&str) -> String,
+) -> Result<(Faults, FaultMap), ConfigError> {
     let share = |name: &str, found: Option<f64>| -> Result<Chance, ConfigError> {
         let Some(found) = found else { return Ok(Chance::NEVER) };
         let share = real(&key(&format!("device.faults.{name}")), found, [1e-9, 1.0])?;
@@ -211,11 +238,14 @@ fn stuck(table: &FaultsFile, key: &dyn Fn(&str) -> String) -> Result<Faults, Con
         ceiling: share("stuck_ceiling", table.stuck_ceiling)?,
         any: share("stuck_any", table.stuck_any)?,
     };
-    if faults.is_none() {
-        let allowed = "give stuck_floor, stuck_ceiling or stuck_any, or take the table out";
+    let cells = table.cells.as_deref();
+    let map = cells.map(|cells| fault_list::of_cells(&key("device.faults.cells"), cells));
+    let map = map.transpose()?.unwrap_or_default();
+    if faults.is_none() && map.is_empty() {
+        let allowed = "give stuck_floor, stuck_ceiling, stuck_any or a map, or take the table out";
         return Err(wrong(&key("device.faults"), "has no share of stuck cells", allowed));
     }
-    Ok(faults)
+    Ok((faults, map))
 }
 
 fn noise(table: &ReadNoiseFile, key: &dyn Fn(&str) -> String) -> Result<ReadNoise, ConfigError> {

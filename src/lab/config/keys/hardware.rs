@@ -3,7 +3,8 @@
 use super::KeyFileKind::Hardware;
 use super::{KeyEntry, KeyTable, KeyValues, flag, key, other, real, whole, words};
 use crate::lab::config::device::{
-    DeviceFile, DriftFile, FaultsFile, ProgrammingFile, ReadNoiseFile, ResponseFile, SpreadFile,
+    ConductanceFile, DeviceFile, DriftFile, FaultsFile, ProgrammingFile, ReadNoiseFile,
+    ResponseFile, SpreadFile, WiresFile,
 };
 use crate::lab::config::file::{
     AdcTable, CellFile, DriveFile, ErrorFile, HardwareFile, LutFile, NumberFile, TileFile,
@@ -53,9 +54,21 @@ pub(super) const TABLES: &[KeyTable] = &[
     ),
     table(
         "device.faults",
-        "Cells that hold one level, whatever is loaded or written: shares of all cells, which add up to at most 1.",
+        "Cells that hold one level, whatever is loaded or written: shares of all cells, which add up to at most 1, and a list.",
         FaultsFile::MEANINGS,
         FAULTS,
+    ),
+    table(
+        "device.conductance",
+        "What a cell conducts at level 0, where it is not nothing.",
+        ConductanceFile::MEANINGS,
+        CONDUCTANCE,
+    ),
+    table(
+        "device.wires",
+        "What the wires of a tile take of the voltage of its cells, to first order in their resistance; only the ratio of both numbers counts. Drivers stand at the first column, amplifiers at the first row, both without resistance.",
+        WiresFile::MEANINGS,
+        WIRES,
     ),
     table(
         "device.read_noise",
@@ -295,6 +308,8 @@ const DEVICE: &[KeyEntry] = &[
     other("response", "a table").otherwise("a pulse moves a cell by one level"),
     other("spread", "a table").otherwise("cells are alike"),
     other("faults", "a table").otherwise("every cell works"),
+    other("conductance", "a table").otherwise("level 0 conducts nothing"),
+    other("wires", "a table").otherwise("wires have no resistance"),
     other("read_noise", "a table").otherwise("reads are free of noise"),
     other("programming", "a table").otherwise("loads are exact"),
     other("drift", "a table").otherwise("a level stays as it was written"),
@@ -413,6 +428,45 @@ const FAULTS: &[KeyEntry] = &[
     real("stuck_floor", 1e-9, 1.0).unit("of the cells").otherwise("none"),
     real("stuck_ceiling", 1e-9, 1.0).unit("of the cells").otherwise("none"),
     real("stuck_any", 1e-9, 1.0).unit("of the cells").otherwise("none"),
+    other("map", "a path").only("without `cells`", &[]).otherwise("none"),
+    other("cells", "a list of texts, such as [\"0,pp,3,5,floor\"]").otherwise("none"),
+    PROVENANCE[0],
+    PROVENANCE[1],
+];
+
+const RATIO: &[&str] = &["hw.device.conductance.on_off=10"];
+
+const CONDUCTANCE: &[KeyEntry] = &[
+    other("on_off", "a number of 1.1 or more")
+        .law("at most 2^9 times the greatest level: beyond that level 0 conducts nothing")
+        .otherwise("the table needs it"),
+    words(
+        "reference",
+        &[
+            ("none", "nothing: it stays in the sums, and cancels where both banks have the same drives"),
+            (
+                "column",
+                "a column of cells at level 0 in each bank of a tile, whose current is taken off the others' before they are \
+                 converted",
+            ),
+        ],
+    )
+    .otherwise("none")
+    .only("", RATIO),
+    PROVENANCE[0],
+    PROVENANCE[1],
+];
+
+const WIRES: &[KeyEntry] = &[
+    other("segment_ohm", "a number above 0")
+        .law("1e-12 to 1 of cell_on_ohm")
+        .unit("ohm")
+        .otherwise("the table needs it")
+        .only("", &["hw.device.wires.cell_on_ohm=1e5"]),
+    other("cell_on_ohm", "a number above 0")
+        .unit("ohm")
+        .otherwise("the table needs it")
+        .only("", &["hw.device.wires.segment_ohm=1"]),
     PROVENANCE[0],
     PROVENANCE[1],
 ];

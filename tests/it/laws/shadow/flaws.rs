@@ -1,5 +1,6 @@
 //! The shadow's stuck cells and noisy conversions.
 
+use dalean::chip::device::StuckAt;
 use dalean::num::draw::{Place, Site};
 
 use super::{Array, Fault, Net, Shadow, rsh};
@@ -8,7 +9,7 @@ impl Array {
     /// Cells that are stuck hold their levels from the start.
     pub(super) fn stick(&mut self, net: &Net, layer: usize, pathway: u8) {
         let (faults, window) = (net.hardware.faults, net.hardware.cell.window);
-        if faults.is_none() {
+        if !net.hardware.has_stuck_cells() {
             return;
         }
         let (floor, ceiling) = (i64::from(window.floor()), i64::from(window.ceiling()));
@@ -30,6 +31,17 @@ impl Array {
                     w if w - a - b < c => Some(floor + word(1) * levels / (1 << 32)),
                     _ => None,
                 };
+                let listed = net.hardware.fault_map.cells().iter().find(|listed| {
+                    (usize::from(listed.layer), listed.pathway) == (layer, pathway)
+                        && [listed.row, listed.column].map(|at| at as usize) == [row, column]
+                });
+                if let Some(listed) = listed {
+                    *cell = Some(match listed.at {
+                        StuckAt::Floor => floor,
+                        StuckAt::Ceiling => ceiling,
+                        StuckAt::Level(level) => level.into(),
+                    });
+                }
                 if let Some(level) = *cell {
                     self.level[row][column] = level;
                 }

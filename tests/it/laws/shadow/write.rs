@@ -73,6 +73,7 @@ impl Shadow {
 
     /// Reads a layer from its columns: positive gates, then negative ones.
     pub(crate) fn forward_columns(&mut self, layer: usize) {
+        self.look_through(layer);
         let this = &self.layers[layer];
         let banks = this.spec.wiring.banks(Stream::P);
         let (rows, columns) = (this.rows, this.spec.units);
@@ -86,6 +87,10 @@ impl Shadow {
                 };
                 let negative = if self.is(Fault::BackwardPhaseAdds) { 1 } else { -1 };
                 let off = self.backward_noise(layer, banks, sample, row);
+                if self.conducts() {
+                    backward.push(self.backward_current(layer, banks, gates, row) + off);
+                    continue;
+                }
                 backward.push(phase(true) + negative * phase(false) + off);
             }
         }

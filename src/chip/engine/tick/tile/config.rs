@@ -2,7 +2,7 @@
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
 use super::TileBalance;
-use crate::chip::device::Noise;
+use crate::chip::device::{Conducting, Noise};
 use crate::chip::hardware::{PulseCode, SliceTime};
 use crate::num::fixed::DriveBits;
 
@@ -162,6 +162,8 @@ pub struct More {
     pub squares: Option<Squares>,
     /// What conversions are off by.
     pub noise: Option<TileNoise>,
+    /// What cells conduct, if not their level.
+    pub conducting: Option<Conducting>,
 }
 
 /// Noise of the conversions of a tile, through rows and through columns.
@@ -230,6 +232,7 @@ impl Default for More {
             phases: 1,
             squares: None,
             noise: None,
+            conducting: None,
         }
     }
 }

@@ -79,17 +79,22 @@ impl Tile {
         let lines = self.read_lines(way);
         for bank in 0..2 {
             for line in 0..lines {
-                let current = match way {
-                    Way::Rows => (0..rows)
+                let current = match (self.config.more.conducting, way) {
+                    (Some(law), _) => self.current(law, bank, way, line),
+                    (None, Way::Rows) => (0..rows)
                         .map(|row| self.product(bank, row, line, self.row_part(bank, row)))
                         .sum(),
-                    Way::Columns => (0..columns)
+                    (None, Way::Columns) => (0..columns)
                         .map(|column| self.product(bank, line, column, self.column_part(column)))
                         .sum::<i64>(),
                 };
                 self.lines[way as usize].hold[bank][line] = current;
             }
-            self.bank_events[bank].cell_reads += (rows * columns) as u64;
+            let beside = match (self.config.more.conducting, way) {
+                (Some(law), Way::Rows) => law.reference_columns() * rows as u64,
+                _ => 0,
+            };
+            self.bank_events[bank].cell_reads += (rows * columns) as u64 + beside;
             self.bank_events[bank].holds += lines as u64;
         }
         assert!(!self.conv.busy, "a slice is sampled when the one before is converted");
@@ -106,7 +111,7 @@ impl Tile {
     }
 
     /// The slice of a row's drive code: of what is above 0 first, then of what is below.
-    fn row_part(&self, bank: usize, row: usize) -> i64 {
+    pub(super) fn row_part(&self, bank: usize, row: usize) -> i64 {
         let (phase, slice) =
             (self.front.slice / self.config.slices, self.front.slice % self.config.slices);
         let driving = self.front.slot * self.config.more.phases + phase as usize;
@@ -116,7 +121,7 @@ impl Tile {
 
     /// The slice of a gate that its phase drives: positive gates first, then negative ones. The last slice of a
     /// phase carries all bits that are left.
-    fn column_part(&self, column: usize) -> i64 {
+    pub(super) fn column_part(&self, column: usize) -> i64 {
         let (phase, slice) =
             (self.front.slice / self.config.slices, self.front.slice % self.config.slices);
         let gate = self.gate[self.front.slot * self.size.columns + column];

@@ -112,6 +112,7 @@ pub(super) fn config(
             }),
             // where samples are loaded
             noise: None,
+            conducting: hardware.conducting(),
         },
     }
 }

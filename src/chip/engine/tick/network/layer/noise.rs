@@ -35,7 +35,7 @@ impl TickLayer {
     /// Cells that are stuck hold their levels.
     pub(super) fn stick(&mut self, hardware: &Hardware) {
         let window = [hardware.cell.window.floor(), hardware.cell.window.ceiling()];
-        if hardware.faults.is_none() {
+        if !hardware.has_stuck_cells() {
             return;
         }
         for (array, pathway) in self.wiring.pathways().iter().enumerate() {
@@ -49,7 +49,11 @@ impl TickLayer {
             };
             for cell in 0..self.rows * self.columns {
                 let at = [cell / self.columns, cell % self.columns];
-                if let Some(level) = hardware.faults.stuck_at(place, window, self.rows, at) {
+                let drawn = hardware.faults.stuck_at(place, window, self.rows, at);
+                let mut listed = hardware.fault_map.of_array((self.index, pathway.code), window);
+                let listed =
+                    listed.find(|cell| [cell.row, cell.column].map(|at| at as usize) == at);
+                if let Some(level) = listed.map(|cell| cell.level).or(drawn) {
                     let (tile, bank, row, column) = self.cell(array, cell);
                     self.tiles[tile].stick(bank, row, column, level);
                 }
