@@ -4,7 +4,7 @@ use proptest::prelude::*;
 
 use super::*;
 use crate::chip::device::CellSpread;
-use crate::num::tables::{Response, SoftBoundSteps};
+use crate::num::tables::{LinearSteps, Response, SoftBoundSteps};
 
 fn chip(bits: u32, ends: [u16; 2], device: &DeviceSpec) -> Device {
     assert_eq!(device.check(), Ok(()));

@@ -113,7 +113,6 @@ pub(super) fn read(key: &str, path: &str) -> Result<Vec<String>, ConfigError> {
         let hint = format!("`{key}` names a CSV file; in a file, relative to that file");
         ConfigError::Unreadable { path: path.into(), error, hint }
     };
-    #[expect(clippy::disallowed_methods, reason = "lists of cells live in files")]
     let size = std::fs::metadata(path).map_err(unreadable)?.len();
     if size > BYTES_MAX {
         return Err(wrong(key, format!("names {path}, of {size} bytes"), "at most 256 MiB"));
