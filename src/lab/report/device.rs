@@ -61,10 +61,10 @@ fn conductances(of: &MeasuredDevice) -> Chart {
     let mut chart = Chart::framed(CHART, [24.0, KEY], x, y);
     chart.heading("Pulse by pulse");
     for (seen, walked) in &rows {
-        for &at in seen {
-            chart.marker(at, 0, 2.0, hue(6), "pale");
-        }
         chart.line(walked, hue(0), "line", 0);
+        for &at in seen {
+            chart.marker(at, 0, 1.6, hue(6), "dot");
+        }
     }
     let entries =
         [(0, hue(6), "measured".to_owned()), (0, hue(0), of.best().response.name().into())];
