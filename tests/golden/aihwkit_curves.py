@@ -1,6 +1,6 @@
 """Mean response curves of presets of aihwkit, as its own tiles take pulses.
 
-    python3 tests/golden/aihwkit_curves.py tests/golden/aihwkit_curves.csv        (aihwkit 1.1.0, PyTorch 2.15.0, NumPy 2)
+    python3 tests/golden/aihwkit_curves.py tests/golden/aihwkit_curves.csv        (aihwkit 1.1.0, PyTorch 2.10.0, NumPy 2)
 
 Noise, spread between devices, leakage and write noise are set to 0; one cell is pulsed from its least weight upward until its
 window is crossed about twice by steps of mean length, then as often downward. Writes a line a read, some 27 a preset
