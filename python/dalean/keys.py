@@ -54,6 +54,8 @@ Keys = TypedDict(
         "data.classes": int,
         # Height, width and channels of examples that are pictures; a table's values lie row after row, the channels of a pixel side by side.
         "data.shape": Any,
+        # Pictures: rows and pixels of a row that are kept of their middle.
+        "data.middle": Any,
         # CSV: `first`, `last`, a number from 0, or a header; default: told from the table, and said.
         "data.label_column": Any,
         # CSV: columns left out, each a number from 0 or a header; default: those without a name that number the rows.
@@ -154,6 +156,8 @@ Keys = TypedDict(
         "learning.centre": Literal["none", "batch", "running"],
         # What is taken away, to see whether it is needed. Default: "none".
         "learning.control": Literal["none", "frozen_hidden", "same_sign_hidden", "same_sign"],
+        # Updates after which, again and again, what both cells of a pair hold is taken off both by loads: for cells that only rise. [updates]
+        "learning.refresh": int,
         # How errors reach hidden units. Default: "modulo".
         "learning.route": Literal["modulo", "random_sparse", "scalar_broadcast", "random_dense"],
         # Words a hidden unit adds. [words] Default: 3.

@@ -111,7 +111,11 @@ impl Driver {
     /// An update is over: time for a refresh, now and then.
     fn updated(&mut self) {
         self.updates += 1;
-        if self.learning.refresh.is_some_and(|every| self.updates % u64::from(every.get()) == 0) {
+        if self
+            .learning
+            .refresh
+            .is_some_and(|every| self.updates.is_multiple_of(every.get().into()))
+        {
             self.engine.refresh();
             self.engine.settle();
         }

@@ -27,6 +27,9 @@ pub(super) use lanes::{Sent, Words, pulse};
 /// So many columns with a pulse make it worth drawing the words of all sixteen at once.
 const ALL_AT_ONCE: u32 = 4;
 
+/// A pulse of the first so many cells: by how many levels it moved them.
+type Pulse<'a> = dyn Fn(&mut Sent, Words<'_>, usize) -> u64 + 'a;
+
 /// Where the words of a write's pulses come from, and scratch for those of a half block.
 #[derive(Debug)]
 #[repr(align(64))]
@@ -131,7 +134,7 @@ fn side_by_side(
     cells: &mut Cells<'_>,
     answering: &mut Answering<'_>,
     (pulses, groups): (&Half<i8>, u16),
-    (ends, pulse): (Ends, &dyn Fn(&mut Sent, Words<'_>, usize) -> u64),
+    (ends, pulse): (Ends, &Pulse<'_>),
 ) -> u64 {
     let Answering { made, words, at: place } = answering;
     let wants = made.device.wants();

@@ -218,7 +218,7 @@ fn all<const NOISY: bool>(
             step[k] = device.steps[place[k] as usize % (2 * PLACES)];
         }
         for k in 0..LANES {
-            step[k] = (u64::from(step[k]) * u64::from(factor[k]) + (1 << 23) >> 24) as u32;
+            step[k] = ((u64::from(step[k]) * u64::from(factor[k]) + (1 << 23)) >> 24) as u32;
         }
         if NOISY {
             let (mut size, mut less) = ([0u32; LANES], [0u32; LANES]);
@@ -232,7 +232,7 @@ fn all<const NOISY: bool>(
                 let of_step = u64::from(step[k]) * u64::from(share) + (1 << 15);
                 let deviation = (of_step >> 16) as u32 + whole;
                 let fine = u64::from(size[k]) * u64::from(deviation);
-                let off = (fine + (1 << 11) - u64::from(less[k]) >> 12) as u32;
+                let off = ((fine + (1 << 11) - u64::from(less[k])) >> 12) as u32;
                 let sign = 0u32.wrapping_sub(less[k]);
                 step[k] = step[k].wrapping_add((off ^ sign).wrapping_sub(sign));
             }
@@ -243,7 +243,7 @@ fn all<const NOISY: bool>(
         }
         for k in 0..LANES {
             let signed = (step[k].cast_signed() ^ falls[k]) - falls[k];
-            let to = level[k] + (signed + rounding[k] >> 8);
+            let to = level[k] + ((signed + rounding[k]) >> 8);
             // lanes behind the last cell have had all their pulses
             let live = -i32::from(chunk * LANES + k < active);
             reached[k] = to & live | reached[k] & !live;

@@ -82,7 +82,7 @@ proptest! {
             let outside = !(cell.floor..=cell.ceiling).contains(&level);
             if outside || level % 7 == 0 { Cells::GONE } else { 0 }
         }).collect();
-        let pulses: Vec<i8> = gates(seed | 1, HALF_CELLS).iter().zip(bytes(seed / 3 | 1, HALF_CELLS))
+        let pulses: Vec<i8> = gates(seed | 1, HALF_CELLS).iter().zip(bytes((seed / 3) | 1, HALF_CELLS))
             .map(|(&pulses, word)| if word % 8 < share { pulses % most } else { 0 }).collect();
         let pulses = half(&pulses);
         let place = Place { seed, site: Site::WriteDither, layer: 1, pathway: 2, sub: 0, count: 7 };
