@@ -70,15 +70,24 @@ pub fn unread(deployment: &Deployment) -> Result<Option<String>, RunError> {
 }
 
 /// Keys that only a pulse has to do with.
-const UNREAD: [&str; 3] =
-    ["hw.device.response", "hw.device.spread.step", "hw.device.spread.asymmetry"];
+const UNREAD: [&str; 7] = [
+    "hw.device.response",
+    "hw.device.spread.step",
+    "hw.device.spread.asymmetry",
+    "hw.device.endurance",
+    "hw.device.leakage",
+    "hw.device.drift.update_s",
+    "hw.device.drift.every",
+];
+/// Tables that only a pulse has to do with, the spread where it has no windows.
+const PULSED: [&str; 4] = ["response", "spread", "endurance", "leakage"];
 
 /// Takes the tables out that only pulses have to do with; their names.
 fn without_pulses(device: &mut toml::Table) -> Vec<&'static str> {
     let windows =
         |spread: &toml::Value| ["ceiling", "floor"].iter().any(|key| spread.get(key).is_some());
     let read = device.get("spread").is_some_and(windows);
-    let names = ["response", "spread"].into_iter().filter(|name| *name == "response" || !read);
+    let names = PULSED.into_iter().filter(|name| *name != "spread" || !read);
     names.filter(|name| device.remove(*name).is_some()).collect()
 }
 
@@ -143,7 +152,7 @@ pub fn deploy(
     each: &mut dyn FnMut(&ChipResult) -> bool,
 ) -> Result<Vec<ChipResult>, RunError> {
     let (hardware, drift) = chip(path, deployment)?;
-    let level_max = hardware.cell.window.ceiling();
+    let ends = [hardware.cell.window.ceiling(), hardware.level_greatest()];
     let others = deployment.chips.iter().any(|&chip| chip > 0);
     let spread = hardware.device.as_ref().map(|device| device.spread);
     let varies = !hardware.faults.is_none()
@@ -171,7 +180,7 @@ pub fn deploy(
             let allowed = "give hw.device.drift with --set, or --hw with a model that has it, such as hw_models/own/pcm_drift.toml";
             return Err(wrong("hw.device.drift", "is missing", allowed));
         };
-        drift.after(seconds, level_max).map(Some).ok_or_else(|| {
+        drift.after(seconds, ends).map(Some).ok_or_else(|| {
             let found = format!("is {seconds} s");
             let start = format!("levels are of {} s after programming: give that or more", drift.start_s());
             wrong("eval --after", &found, &start)
