@@ -182,17 +182,12 @@ impl Crossbar {
     /// As [`Crossbar::load_row`].
     pub fn program_row(&mut self, row: usize, levels: &[u16], writes: u64) {
         let layout = self.layout;
-        let worn = |this: &Self, column: usize| {
-            let memory = this.memory.as_ref();
-            memory.is_some_and(|memory| memory.is_worn(layout.index(row, column)))
-        };
+        let Some(memory) = &self.memory else { return self.load_row(row, levels) };
+        let worn = |column| memory.is_worn(layout.index(row, column));
         let before: Vec<_> = (0..layout.columns)
-            .map(|column| worn(self, column).then(|| self.level(row, column)))
+            .map(|column| worn(column).then(|| self.level(row, column)))
             .collect();
         self.load_row(row, levels);
-        if self.memory.is_none() {
-            return;
-        }
         for (column, before) in before.into_iter().enumerate() {
             let at = layout.index(row, column);
             if let Some(level) = before {
@@ -205,11 +200,15 @@ impl Crossbar {
             if let Some(spent) = memory.spent.get_mut(at) {
                 *spent = spent.saturating_add(1);
             }
-            if memory.is_worn(at) && before.is_none() {
-                self.wear_out(row, column);
+            if memory.is_worn(at) {
+                if let Some(pruned) = &mut self.pruned {
+                    pruned[at] = Cells::GONE;
+                }
+                if before.is_none() {
+                    self.wear_out(row, column);
+                }
             }
         }
-        self.mark_worn();
     }
 
     /// A cell has taken its last pulse.
