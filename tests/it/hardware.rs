@@ -37,6 +37,19 @@ fn every_model_passes_its_check_and_trains_the_digits() {
 }
 
 #[test]
+fn every_file_beside_the_built_in_models_passes_its_check() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("hw_models/own");
+    let files = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
+    let mut files: Vec<_> = files.collect();
+    files.sort();
+    assert!(files.len() >= 11, "{files:?}");
+    for file in files {
+        let ran = run(dalean().args(["hw", "check"]).arg(&file));
+        assert_eq!(ran.code, Some(0), "{ran:?}");
+    }
+}
+
+#[test]
 fn the_example_of_the_documents_is_valid_and_every_quantity_is_described() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("hw_models");
     let text = std::fs::read_to_string(folder.join("README.md")).unwrap();
