@@ -26,6 +26,7 @@ use crate::chip::layer::{DrivenBy, LayerSpec};
 use crate::chip::population::{Pathway, Stream, Wiring};
 use crate::chip::state::{State, StateError, Visitor};
 use crate::num::fixed::rail;
+use crate::num::tables::DriftTables;
 
 /// Samples read at a time, at most: a sum over a batch fits 32 bits.
 pub const SAMPLES_MAX: usize = 65_536;
@@ -555,6 +556,22 @@ impl DrivenNetwork {
             self.driver.engine_mut().execute(&load);
         }
         Ok(())
+    }
+
+    /// Makes it chip `number` of its kind and loads its levels into that one: the number is the seed of which cells are stuck, how windows
+    /// differ, what loads leave and what reads are off by. What was read is forgotten.
+    pub fn set_chip(&mut self, number: u64) {
+        self.forget();
+        let engine = self.driver.engine_mut();
+        let levels = engine.all_levels();
+        engine.set_chip_seed(number);
+        engine.load_all(&levels);
+    }
+
+    /// Lets levels drift; with `made_up`, a factor a layer makes up for it. What was read is forgotten.
+    pub fn age(&mut self, drift: &DriftTables, made_up: bool) {
+        self.forget();
+        self.driver.engine_mut().age(drift, made_up);
     }
 
     /// Learning in progress, with its chip.
