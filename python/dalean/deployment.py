@@ -7,6 +7,7 @@
     y = dalean.outputs(net)                                     # in the units that the weights came in
     net.deliver(net.error_words(255 * (wanted - softmax(y))))   # and trained on, in place
     net.write()
+    net.on_chips(score, samples=1000, after="1d").summary       # and on others of its kind, later
 
 ``w = E - I`` of two cells, one of which rests on the floor::
 
@@ -79,7 +80,9 @@ def deploy(
     """Maps a dense network of signed weights onto a chip, finds the ranges of its converters, and gives it to be read and trained on.
 
     :param layers: weights ``[inputs, units]`` of each layer, or pairs of them and biases; or arrays by name as PyTorch has them
-        (``0.weight`` ``[units, inputs]``, ``0.bias``): a mapping, an NPZ or safetensors file, a module.
+        (``0.weight`` ``[units, inputs]``, ``0.bias``): a mapping, an NPZ or safetensors file, a module, whose order of layers is that
+        of its state. Between the layers of a ``Sequential`` units are looked for; whatever else a module does in its ``forward`` is
+        the caller's to know.
     :param x: samples that the network is used for, as :meth:`Network.read` takes them: what units put out is measured on them.
     :param to: ``"pairs"`` or ``"dual"``.
     :param activation: of hidden layers, ``"relu"`` or ``"sigmoid"``; outputs are sums, whose greatest is the answer.
@@ -213,11 +216,8 @@ def _fractions(x: ArrayLike, most: int, inputs: int) -> np.ndarray:
 def _layers(layers: Any, activation: str) -> list[_Layer]:
     """Weights ``[inputs, units]`` and biases, checked."""
     if hasattr(layers, "state_dict") and hasattr(layers, "modules"):
-        kinds = {type(one).__name__ for one in layers.modules() if not any(True for _ in one.children())}
-        other = kinds - {"Linear", "Flatten", "Dropout", "Identity", {"relu": "ReLU", "sigmoid": "Sigmoid"}[activation]}
-        if other:
-            raise _wrong("the module", f"has {', '.join(sorted(other))}", f"it may have Linear and, by activation={activation!r}, units of that kind")
-        layers = {name: tensor.detach().cpu().numpy() for name, tensor in layers.state_dict().items()}
+        _check_module(layers, activation)
+        layers = layers.state_dict()
     elif isinstance(layers, str | os.PathLike):
         if Path(layers).suffix == ".npz":
             with np.load(layers, allow_pickle=False) as arrays:
@@ -225,7 +225,7 @@ def _layers(layers: Any, activation: str) -> list[_Layer]:
         else:
             layers = read_safetensors(layers)
     if isinstance(layers, Mapping):
-        named = {name: np.asarray(array) for name, array in layers.items()}
+        named = {name: _numbers(array) for name, array in layers.items()}
         found: list[Any] = []
         for name, array in named.items():
             if name.endswith("weight"):
@@ -252,6 +252,26 @@ def _layers(layers: Any, activation: str) -> list[_Layer]:
     if not checked:
         raise _wrong("layers", "are none", "give at least one")
     return checked
+
+
+def _numbers(array: Any) -> np.ndarray:
+    """As NumPy has it: a tensor of PyTorch may be of a kind that NumPy has not, on another device, or learnt from."""
+    return array.detach().cpu().double().numpy() if hasattr(array, "detach") else np.asarray(array)
+
+
+def _check_module(module: Any, activation: str) -> None:
+    """That a module of PyTorch has dense layers with units of that kind between them; of its own forward() nothing is known."""
+    unit = {"relu": "ReLU", "sigmoid": "Sigmoid"}[activation]
+    inner, leaves = [], []
+    for one in module.modules():
+        (inner if any(True for _ in one.children()) else leaves).append(type(one).__name__)
+    other = set(leaves) - {"Linear", "Flatten", "Dropout", "Identity", unit}
+    if other:
+        raise _wrong("the module", f"has {', '.join(sorted(other))}", f"it may have Linear and, by activation={activation!r}, units of that kind")
+    found = [name for name in leaves if name in ("Linear", unit)]
+    layers = found.count("Linear")
+    if set(inner) <= {"Sequential"} and layers and found != ["Linear", *[unit, "Linear"] * (layers - 1)]:
+        raise _wrong("the module", f"is {', '.join(found)}", f"it has {unit} behind every Linear but the last")
 
 
 def _wrong(where: str, found: str, allowed: str) -> ArrayError:

@@ -93,15 +93,172 @@ def test_where_a_network_comes_from_makes_no_difference(tmp_path):
     assert all((again.levels(at, "e") == dalean.deploy(pairs, x).levels(at, "e")).all() for at in range(3))
 
 
-def test_a_module_of_pytorch():
+FLAWS = {"device": {"faults": {"stuck_any": 0.1}, "read_noise": {"sigma_cells": 1.0}, "programming": {"sigma": [0.02]}}}
+DRIFT = {"device.drift": {"start_s": 20.0, "change": -0.05, "change_spread": 0.02}}
+
+
+def kept(net):
+    """Everything that a network is."""
+    return net.state_hash, net.receipt(), {name: array.tolist() for name, array in net.all_levels().items()}
+
+
+@pytest.mark.parametrize("to", ["pairs", "dual"])
+def test_chips_have_what_their_numbers_say(to):
+    """Chip k holds what a network with the seed k holds that was loaded alike: its stuck cells, and what its loads left."""
+    pairs, x = layers()
+    chip = dalean.Chip("ideal", FLAWS | DRIFT)
+    net, seen = dalean.deploy(pairs, x, chip, to=to), []
+
+    def score(net):
+        seen.append(net.all_levels())
+        return (sums(net, x).argmax(1) == forward(pairs, x).argmax(1)).mean()
+
+    before, here = kept(net), score(net)
+    seen.clear()
+    chips = net.on_chips(score, samples=3, progress=False)
+    assert kept(net) == before
+    assert chips["chip"] == [1, 2, 3] and chips["after_s"] == [None] * 3 and chips.of == "score"
+    for number, levels in enumerate(seen, 1):
+        like = dalean.deploy(pairs, x, chip, to=to, seed=number).all_levels()
+        assert all((levels[name] == like[name]).all() for name in like)
+    assert any((seen[0][name] != seen[1][name]).any() for name in seen[0])
+    # by its number, whatever was read before; chip 0 is the one that it is on
+    assert net.on_chips(score, chip=3, progress=False).rows == chips.rows[2:]
+    fresh = dalean.deploy(pairs, x, chip, to=to)
+    assert fresh.on_chips(lambda net: 0 if seen.append(net.all_levels()) else 1, progress=False)["score"] == [1]
+    assert all((seen[-1][name] == fresh.levels(int(name[5]), name[7:])).all() for name in seen[-1])
+    assert here == net.on_chips(score, chip=0, progress=False)["score"][0] or "read_noise" in str(chip.settings)
+
+
+def test_levels_of_a_network_fall_with_time_and_come_back():
+    pairs, x = layers()
+    net = dalean.deploy(pairs, x, dalean.Chip("ideal", DRIFT))
+    total = lambda net: float(sum(array.sum(dtype=float) for array in net.all_levels().values()))
+    whole = total(net)
+    chips = net.on_chips(total, after=[20, "1h", "1d", "1y"], progress=False)
+    assert chips["score"][0] == whole and chips["score"] == sorted(chips["score"], reverse=True)
+    assert chips["score"][-1] < 0.9 * whole and chips["after_s"] == [20, 3600, 86_400, 31_557_600]
+    assert [one["mean"] for one in chips.summary] == chips["score"]
+    # what drift took from all cells of a layer alike, a factor gives back
+    size = lambda net: float(np.abs(sums(net, x)).mean())
+    plain, made_up = (net.on_chips(size, after="1y", compensate=on, progress=False)["score"][0] for on in (False, True))
+    now = size(net)
+    assert abs(made_up - now) < abs(plain - now)
+    assert total(net) == whole
+
+
+def test_what_was_written_on_the_chip_is_what_others_are_loaded_with():
+    pairs, x = layers()
+    chip = dalean.Chip("ideal", {"device.programming.sigma": [0.05]})
+    net = dalean.deploy(pairs, x, chip, overrides={"learning.batch": 20}, updates=9)
+    asked = net.on_chips(lambda net: net.levels(0, "e").sum(), chip=1, progress=False)["score"]
+    for some in np.arange(180).reshape(-1, 20):
+        net.read(x[some])
+        net.deliver(net.error_words(np.tile([255, 0, 0, -255], (20, 1))))
+        net.write()
+    before = kept(net)
+    moved = net.on_chips(lambda net: net.levels(0, "e").sum(), chip=1, progress=False)["score"]
+    assert moved != asked and kept(net) == before
+
+    def trains_there(net):
+        net.read(x[:20])
+        net.deliver(net.error_words(np.tile([255, 0, 0, -255], (20, 1))))
+        net.write()
+        net.load(0, "e", np.zeros_like(net.levels(0, "e")))
+        return net.updates
+
+    assert net.on_chips(trains_there, samples=2, progress=False)["score"] == [10, 10]
+    assert kept(net) == before
+
+
+def test_a_run_and_its_levels_in_a_network_are_worth_the_same_on_every_chip(tmp_path):
+    """The two doors to other chips, and to their drift, agree: a run's test set read by the program, and by the caller."""
+    datasets = pytest.importorskip("sklearn.datasets")
+    x, labels = datasets.load_digits(return_X_y=True)
+    keys = {"network.hidden": [16], "learning.epochs": 1, "learning.batch": 32}
+    flaws = {"device.faults.stuck_any": 0.05, "device.programming.sigma": [0.05], **DRIFT}
+    run = dalean.train(keys, out=tmp_path, seed=5, progress=False)
+    net = dalean.Network([64, 16, 10], dalean.Chip("ideal", flaws), seed=5)
+    net.restore_levels(run.path / "checkpoint.safetensors")
+    right = lambda net: (net.read(np.rint(x * 255 / 16).astype(np.uint8), learn=False).argmax(1) == labels).mean()
+    asked = {"samples": 3, "after": ["1h", "1y"], "compensate": True, "progress": False}
+    wanted, found = run.on_chips(overrides=flaws, **asked), net.on_chips(right, **asked)
+    assert wanted["chip"] == found["chip"] and wanted["after_s"] == found["after_s"]
+    assert np.abs(np.subtract(wanted["test_accuracy"], found["score"])).max() < 1e-3, (wanted.rows, found.rows)
+    assert np.ptp(found["score"]) > 0.01
+
+
+def test_what_cannot_be_asked_of_chips():
+    pairs, x = layers()
+    plain, faulty = dalean.deploy(pairs, x), dalean.deploy(pairs, x, dalean.Chip("ideal", FLAWS))
+    for net, score, asked, words in [
+        (plain, len, {"samples": 2}, "all alike"),
+        (plain, len, {"after": "1d"}, "`hw.device.drift` is missing"),
+        (faulty, len, {"samples": 2, "compensate": True}, "say with after"),
+        (faulty, lambda net: "good", {"samples": 2}, "score gives 'good'"),
+        (faulty, lambda net: net.on_chips(len, samples=2), {"samples": 2}, "on_chips is in progress"),
+    ]:
+        before = kept(net)
+        with pytest.raises(dalean.Error, match=words):
+            net.on_chips(score, **asked, progress=False)
+        assert kept(net) == before
+
+    def fails(net):
+        net.load(0, "e", np.zeros_like(net.levels(0, "e")))
+        raise ZeroDivisionError
+
+    before = kept(faulty)
+    with pytest.raises(ZeroDivisionError):
+        faulty.on_chips(fails, samples=2, progress=False)
+    assert kept(faulty) == before
+
+
+@pytest.mark.parametrize("activation", ["relu", "sigmoid"])
+@pytest.mark.parametrize("to", ["pairs", "dual"])
+def test_a_module_of_pytorch(tmp_path, to, activation):
+    """As a module, as its state, in a file of its state and in other precisions: the same chip as from NumPy, and the same answers."""
     torch = pytest.importorskip("torch")
-    net = torch.nn.Sequential(torch.nn.Linear(6, 9), torch.nn.ReLU(), torch.nn.Linear(9, 4))
-    _, x = layers()
-    found = sums(dalean.deploy(net, x), x)
-    wanted = net(torch.tensor(x, dtype=torch.float32)).detach().numpy()
-    assert np.mean(found.argmax(1) == wanted.argmax(1)) > 0.9
-    with pytest.raises(dalean.ArrayError, match="Tanh"):
-        dalean.deploy(torch.nn.Sequential(torch.nn.Linear(6, 9), torch.nn.Tanh()), x)
+    torch.manual_seed(1)
+    unit = {"relu": torch.nn.ReLU, "sigmoid": torch.nn.Sigmoid}[activation]
+    parts = [torch.nn.Flatten(), torch.nn.Linear(6, 9), unit(), torch.nn.Dropout(0.5), torch.nn.Linear(9, 4)]
+    module, (_, x) = torch.nn.Sequential(*parts), layers()
+    options = {"to": to, "activation": activation, "seed": 3}
+    net = dalean.deploy(module, x, **options)
+    assert module.training and all(one.requires_grad for one in module.parameters()), "the module is left as it was"
+    with torch.no_grad():
+        wanted = module.eval()(torch.tensor(x, dtype=torch.float32)).numpy()
+    found = sums(net, x)
+    assert all(np.corrcoef(wanted[:, of], found[:, of])[0, 1] > 0.98 for of in range(4))
+    assert np.abs(dalean.outputs(net) - wanted).max() < 0.1 * np.ptp(wanted)
+    state = module.state_dict()
+    arrays = [(state[f"{at}.weight"].numpy().T, state[f"{at}.bias"].numpy()) for at in (1, 4)]
+    assert dalean.deploy(arrays, x, **options).state_hash == net.state_hash
+    assert dalean.deploy(state, x, **options).state_hash == net.state_hash
+    assert dalean.deploy(module, torch.tensor(x), **options).state_hash == net.state_hash
+    np.savez(tmp_path / "net.npz", **state)
+    assert dalean.deploy(tmp_path / "net.npz", x, **options).state_hash == net.state_hash
+    half = module.to(torch.bfloat16)
+    assert dalean.deploy(half, x, **options).deployment[0].weight_max == net.deployment[0].weight_max
+    # on with it: other chips, in one call
+    chip = dalean.Chip("ideal", FLAWS)
+    same = lambda net: float(np.mean(sums(net, x).argmax(1) == wanted.argmax(1)))
+    assert len(dalean.deploy(half, x, chip, **options).on_chips(same, samples=3, progress=False)) == 3
+
+
+def test_modules_of_pytorch_that_a_chip_cannot_be(tmp_path):
+    torch = pytest.importorskip("torch")
+    nn, (_, x) = torch.nn, layers()
+    for parts, words in [
+        ([nn.Linear(6, 9), nn.Tanh(), nn.Linear(9, 4)], "Tanh"),
+        ([nn.Linear(6, 9), nn.Sigmoid(), nn.Linear(9, 4)], "Sigmoid"),
+        ([nn.Linear(6, 9), nn.BatchNorm1d(9), nn.ReLU(), nn.Linear(9, 4)], "BatchNorm1d"),
+        ([nn.Linear(6, 9), nn.ReLU(), nn.Linear(8, 4)], "layer 1 has weights"),
+        ([nn.Linear(6, 9), nn.Linear(9, 4)], "ReLU"),
+        ([nn.Linear(6, 9), nn.ReLU(), nn.Linear(9, 4), nn.ReLU()], "ReLU"),
+        ([nn.ReLU()], "are none"),
+    ]:
+        with pytest.raises(dalean.ArrayError, match=words):
+            dalean.deploy(nn.Sequential(*parts), x)
 
 
 @pytest.mark.parametrize(
