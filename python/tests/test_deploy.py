@@ -1,6 +1,7 @@
 """Networks that were trained elsewhere, on the chip."""
 
 import importlib.util
+import json
 
 import numpy as np
 import pytest
@@ -87,6 +88,17 @@ def test_where_a_network_comes_from_makes_no_difference(tmp_path):
     assert dalean.deploy(named, x).state_hash == wanted
     np.savez(tmp_path / "net.npz", **named)
     assert dalean.deploy(tmp_path / "net.npz", x).state_hash == wanted
+    # a safetensors file of halves, as many are: those of bfloat16 are the upper halves of floats
+    for kind, bits in (("F16", lambda a: a.astype("<f2")), ("BF16", lambda a: (a.astype("<f4").view("<u4") >> 16).astype("<u2"))):
+        parts, head, at = [], {}, 0
+        for name, array in named.items():
+            parts.append(bits(np.ascontiguousarray(array)).tobytes())
+            head[name] = {"dtype": kind, "shape": array.shape, "data_offsets": [at, at + len(parts[-1])]}
+            at += len(parts[-1])
+        words = json.dumps(head).encode()
+        (tmp_path / "net.safetensors").write_bytes(len(words).to_bytes(8, "little") + words + b"".join(parts))
+        halves = dalean.signed(dalean.deploy(tmp_path / "net.safetensors", x))
+        assert all(np.abs(of - weights).max() < 0.02 * np.abs(weights).max() for (of, _), (weights, _) in zip(halves, pairs))
     kept = dalean.deploy(pairs, x).save(tmp_path / "levels.npz")
     again = dalean.deploy([(w * 0.5, b) for w, b in pairs], x)
     again.restore(kept)
@@ -113,8 +125,7 @@ def test_chips_have_what_their_numbers_say(to):
         seen.append(net.all_levels())
         return (sums(net, x).argmax(1) == forward(pairs, x).argmax(1)).mean()
 
-    before, here = kept(net), score(net)
-    seen.clear()
+    before = kept(net)
     chips = net.on_chips(score, samples=3, progress=False)
     assert kept(net) == before
     assert chips["chip"] == [1, 2, 3] and chips["after_s"] == [None] * 3 and chips.of == "score"
@@ -124,26 +135,24 @@ def test_chips_have_what_their_numbers_say(to):
     assert any((seen[0][name] != seen[1][name]).any() for name in seen[0])
     # by its number, whatever was read before; chip 0 is the one that it is on
     assert net.on_chips(score, chip=3, progress=False).rows == chips.rows[2:]
-    fresh = dalean.deploy(pairs, x, chip, to=to)
-    assert fresh.on_chips(lambda net: 0 if seen.append(net.all_levels()) else 1, progress=False)["score"] == [1]
-    assert all((seen[-1][name] == fresh.levels(int(name[5]), name[7:])).all() for name in seen[-1])
-    assert here == net.on_chips(score, chip=0, progress=False)["score"][0] or "read_noise" in str(chip.settings)
+    seen.clear()
+    assert net.on_chips(score, progress=False)["chip"] == [0]
+    assert {name: array.tolist() for name, array in seen[0].items()} == before[2]
 
 
 def test_levels_of_a_network_fall_with_time_and_come_back():
     pairs, x = layers()
-    net = dalean.deploy(pairs, x, dalean.Chip("ideal", DRIFT))
+    net = dalean.deploy(pairs, x, dalean.Chip("ideal", {"device.drift": {"start_s": 20.0, "exponent": [0.05]}}))
     total = lambda net: float(sum(array.sum(dtype=float) for array in net.all_levels().values()))
     whole = total(net)
     chips = net.on_chips(total, after=[20, "1h", "1d", "1y"], progress=False)
     assert chips["score"][0] == whole and chips["score"] == sorted(chips["score"], reverse=True)
-    assert chips["score"][-1] < 0.9 * whole and chips["after_s"] == [20, 3600, 86_400, 31_557_600]
+    assert abs(chips["score"][-1] / whole - (31_557_600 / 20) ** -0.05) < 0.02 and chips["after_s"] == [20, 3600, 86_400, 31_557_600]
     assert [one["mean"] for one in chips.summary] == chips["score"]
     # what drift took from all cells of a layer alike, a factor gives back
     size = lambda net: float(np.abs(sums(net, x)).mean())
     plain, made_up = (net.on_chips(size, after="1y", compensate=on, progress=False)["score"][0] for on in (False, True))
-    now = size(net)
-    assert abs(made_up - now) < abs(plain - now)
+    assert plain < 0.5 * size(net) and abs(made_up / size(net) - 1) < 0.05
     assert total(net) == whole
 
 
@@ -180,11 +189,12 @@ def test_a_run_and_its_levels_in_a_network_are_worth_the_same_on_every_chip(tmp_
     run = dalean.train(keys, out=tmp_path, seed=5, progress=False)
     net = dalean.Network([64, 16, 10], dalean.Chip("ideal", flaws), seed=5)
     net.restore_levels(run.path / "checkpoint.safetensors")
-    right = lambda net: (net.read(np.rint(x * 255 / 16).astype(np.uint8), learn=False).argmax(1) == labels).mean()
+    codes = np.floor(x * 255 / 16 + 0.5).astype(np.uint8)
+    right = lambda net: float(np.mean(sums(net, codes).argmax(1) == labels))
     asked = {"samples": 3, "after": ["1h", "1y"], "compensate": True, "progress": False}
     wanted, found = run.on_chips(overrides=flaws, **asked), net.on_chips(right, **asked)
     assert wanted["chip"] == found["chip"] and wanted["after_s"] == found["after_s"]
-    assert np.abs(np.subtract(wanted["test_accuracy"], found["score"])).max() < 1e-3, (wanted.rows, found.rows)
+    assert np.array_equal(wanted["test_accuracy"], found["score"]), (wanted.rows, found.rows)
     assert np.ptp(found["score"]) > 0.01
 
 
@@ -224,6 +234,7 @@ def test_a_module_of_pytorch(tmp_path, to, activation):
     module, (_, x) = torch.nn.Sequential(*parts), layers()
     options = {"to": to, "activation": activation, "seed": 3}
     net = dalean.deploy(module, x, **options)
+    deployed = net.state_hash
     assert module.training and all(one.requires_grad for one in module.parameters()), "the module is left as it was"
     with torch.no_grad():
         wanted = module.eval()(torch.tensor(x, dtype=torch.float32)).numpy()
@@ -232,11 +243,11 @@ def test_a_module_of_pytorch(tmp_path, to, activation):
     assert np.abs(dalean.outputs(net) - wanted).max() < 0.1 * np.ptp(wanted)
     state = module.state_dict()
     arrays = [(state[f"{at}.weight"].numpy().T, state[f"{at}.bias"].numpy()) for at in (1, 4)]
-    assert dalean.deploy(arrays, x, **options).state_hash == net.state_hash
-    assert dalean.deploy(state, x, **options).state_hash == net.state_hash
-    assert dalean.deploy(module, torch.tensor(x), **options).state_hash == net.state_hash
+    assert dalean.deploy(arrays, x, **options).state_hash == deployed
+    assert dalean.deploy(state, x, **options).state_hash == deployed
+    assert dalean.deploy(module, torch.tensor(x), **options).state_hash == deployed
     np.savez(tmp_path / "net.npz", **state)
-    assert dalean.deploy(tmp_path / "net.npz", x, **options).state_hash == net.state_hash
+    assert dalean.deploy(tmp_path / "net.npz", x, **options).state_hash == deployed
     half = module.to(torch.bfloat16)
     assert dalean.deploy(half, x, **options).deployment[0].weight_max == net.deployment[0].weight_max
     # on with it: other chips, in one call
