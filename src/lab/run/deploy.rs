@@ -49,7 +49,8 @@ use crate::num::tables::DriftTables;
 /// let results = deploy(&run, &data, machine, &asked, &mut |_result| true)?;
 /// let [summary] = &summed_up(&results)[..] else { return Err("they were read once".into()) };
 /// assert_eq!((results.len(), summary.chips), (3, 3));
-/// assert!(summary.least <= summary.mean && summary.mean <= summary.greatest);
+/// let median = summary.quantiles[2];
+/// assert!(summary.least <= median && median <= summary.greatest);
 /// # std::fs::remove_dir_all(&runs)?;
 /// # Ok(())
 /// # }
@@ -103,14 +104,16 @@ pub struct ChipSummary {
 /// Puts results together, a summary a moment, in the order in which they were read.
 #[must_use]
 pub fn summed_up(results: &[ChipResult]) -> Vec<ChipSummary> {
-    let mut times: Vec<Option<f64>> = Vec::new();
+    // by their bits, as there are numbers that do not equal themselves
+    let time = |result: &ChipResult| result.after_s.map(f64::to_bits);
+    let mut times = Vec::new();
     for result in results {
-        if !times.contains(&result.after_s) {
-            times.push(result.after_s);
+        if !times.contains(&time(result)) {
+            times.push(time(result));
         }
     }
-    let at = |after_s: Option<f64>| {
-        let of: Vec<&ChipResult> = results.iter().filter(|one| one.after_s == after_s).collect();
+    let at = |bits: Option<u64>| {
+        let of: Vec<&ChipResult> = results.iter().filter(|&one| time(one) == bits).collect();
         let mut scores: Vec<f64> = of.iter().map(|one| one.score).collect();
         scores.sort_by(f64::total_cmp);
         let n = scores.len() as f64;
@@ -119,7 +122,7 @@ pub fn summed_up(results: &[ChipResult]) -> Vec<ChipSummary> {
         // the first of several that are as bad
         let worst = of.iter().min_by(|a, b| a.score.total_cmp(&b.score)).expect("one was read");
         ChipSummary {
-            after_s,
+            after_s: bits.map(f64::from_bits),
             chips: scores.len(),
             mean,
             sd: (scores.len() > 1).then(|| (squares / (n - 1.0)).sqrt()),
@@ -360,6 +363,19 @@ mod tests {
         let wanted = [25.0, 3.0, 120.0, 3600.0, 86_400.0, 31_557_600.0, 1000.0].map(Some);
         assert_eq!(found, wanted);
         assert_eq!(["", "d", "-1d", "1w", "1.2.3s", "infs"].map(seconds_of), [None; 6]);
+    }
+
+    #[test]
+    fn summaries_are_of_a_moment_each_and_name_the_first_of_the_worst() {
+        let of = |chip, after_s, score| ChipResult { chip, after_s, score };
+        let (now, later) = (Some(1.0), Some(2.0));
+        let results = [of(1, later, 0.5), of(1, now, 1.0), of(2, later, 0.25), of(3, later, 0.25)];
+        let [two, one] = &summed_up(&results)[..] else { panic!("two moments") };
+        assert_eq!((two.after_s, two.chips, two.worst_chip), (later, 3, 2));
+        assert_eq!((two.least, two.greatest, two.quantiles[2]), (0.25, 0.5, 0.25));
+        assert_eq!((one.after_s, one.chips, one.mean, one.sd), (now, 1, 1.0, None));
+        assert!(summed_up(&[]).is_empty());
+        assert_eq!(summed_up(&[of(1, Some(f64::NAN), f64::NAN)]).len(), 1);
     }
 
     #[test]
