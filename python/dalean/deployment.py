@@ -207,10 +207,12 @@ def signed(net: Network) -> list[tuple[NDArray[np.float64], NDArray[np.float64] 
 def _fractions(x: ArrayLike, most: int, inputs: int) -> np.ndarray:
     """What the chip is shown, from 0 to 1."""
     x = np.asarray(x)
+    whole = np.issubdtype(x.dtype, np.integer)
+    x = _real("x", x)
     x = x.reshape(1, -1) if x.ndim == 1 else x
     if x.ndim != 2 or x.shape[1] != inputs or not len(x):
         raise _wrong("x", f"has the shape {x.shape}", f"give samples of {inputs} numbers, [sample, input]")
-    return x.astype(np.float64) / (most if np.issubdtype(x.dtype, np.integer) else 1)
+    return x / (most if whole else 1)
 
 
 def _layers(layers: Any, activation: str) -> list[_Layer]:
@@ -239,8 +241,8 @@ def _layers(layers: Any, activation: str) -> list[_Layer]:
     checked: list[_Layer] = []
     units = None
     for at, (weights, biases) in enumerate(found):
-        weights = np.asarray(weights, dtype=np.float64)
-        biases = None if biases is None else np.asarray(biases, dtype=np.float64)
+        weights = _real(f"the weights of layer {at}", weights)
+        biases = None if biases is None else _real(f"the biases of layer {at}", biases)
         fits = weights.ndim == 2 and weights.size and units in (None, weights.shape[0])
         if not fits or (biases is not None and biases.shape != weights.shape[1:]):
             shapes = f"has weights of shape {weights.shape}" + ("" if biases is None else f" and biases of {biases.shape}")
@@ -257,6 +259,17 @@ def _layers(layers: Any, activation: str) -> list[_Layer]:
 def _numbers(array: Any) -> np.ndarray:
     """As NumPy has it: a tensor of PyTorch may be of a kind that NumPy has not, on another device, or learnt from."""
     return array.detach().cpu().double().numpy() if hasattr(array, "detach") else np.asarray(array)
+
+
+def _real(where: str, array: Any) -> np.ndarray:
+    """Numbers of double precision."""
+    try:
+        array = np.asarray(array)
+        if array.dtype.kind == "c":
+            raise TypeError("complex numbers")
+        return array.astype(np.float64)
+    except (TypeError, ValueError, OverflowError) as error:
+        raise _wrong(where, f"cannot be read: {error}", "give real numbers") from None
 
 
 def _check_module(module: Any, activation: str) -> None:

@@ -281,6 +281,8 @@ def test_modules_of_pytorch_that_a_chip_cannot_be(tmp_path):
         ([np.full((6, 3), np.nan)], {}, "no finite number"),
         ({"0.weight": np.zeros((3, 6)), "1.scale": np.zeros(3)}, {}, "name '1.scale'"),
         ([np.zeros((5, 3))], {}, "x has the shape"),
+        ([np.zeros((6, 3)) * 1j], {}, "the weights of layer 0 cannot be read: complex"),
+        ([(np.zeros((6, 3)), ["a", "b", "c"])], {}, "the biases of layer 0 cannot be read"),
         ([np.zeros((6, 3))], {"to": "triples"}, "triples"),
         ([np.zeros((6, 3))], {"to": "dual", "rule": "bp"}, "rule is 'bp'"),
         ([np.zeros((6, 3))], {"activation": "tanh"}, "tanh"),
