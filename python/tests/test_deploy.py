@@ -272,6 +272,18 @@ def test_modules_of_pytorch_that_a_chip_cannot_be(tmp_path):
             dalean.deploy(nn.Sequential(*parts), x)
 
 
+def test_standardised_inputs_fold_into_the_first_layer():
+    """As docs/python.md has it: what a network was trained on has a sign, what a chip is shown lies from 0 to 1."""
+    pairs, x = layers(seed=5)
+    mean, sd = x.mean(0), x.std(0)
+    wanted = forward(pairs, (x - mean) / sd)
+    (w, b), *rest = pairs
+    net = dalean.deploy([(w / sd[:, None], b - (mean / sd) @ w), *rest], x, dalean.Chip("ideal", {"cell.level_bits": 12}))
+    assert np.corrcoef(wanted.ravel(), sums(net, x).ravel())[0, 1] > 0.99
+    with pytest.raises(dalean.ArrayError, match="-"):
+        dalean.deploy(pairs, (x - mean) / sd)
+
+
 @pytest.mark.parametrize(
     ("given", "options", "words"),
     [
