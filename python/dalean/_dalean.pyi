@@ -105,6 +105,8 @@ class Network:
     """Bits of a stored level."""
     window: tuple[int, int]
     """Least and greatest level of a cell."""
+    signed: bool
+    """Whether what is shown has a sign."""
     updates: int
     samples: int
     """Samples loaded."""
@@ -118,7 +120,8 @@ class Network:
     def read(self, x: ArrayLike, learn: bool = True) -> NDArray[np.uint8] | NDArray[np.int64]:
         """``LOADX`` and ``FWD``: reads ``x`` ``[sample, input]`` through all layers.
 
-        ``uint8`` are drive codes up to ``code_max``; floats from 0 to 1 become the nearest one. Gives activities of the
+        ``uint8`` are drive codes up to ``code_max``; floats from 0 to 1 become the nearest one; with a sign, from -1 to 1, where the
+        network was made so. Gives activities of the
         outputs, ``[sample, output]``, 255 is 1.0; accumulators (``int64``) of outputs without a table. What is read with
         ``learn=False`` is charged to evaluation and cannot be learnt from.
 

@@ -63,6 +63,8 @@ class Network(_dalean.Network):
     :param rule: how arrays are wired: ``"ed"`` two populations under Dale's law, ``"dfa"`` and ``"bp"`` differential pairs.
     :param words: ``"routed"``: hidden layers hear the words of the output by the network's route; ``"own"``: whoever
         drives the network delivers words to each layer.
+    :param signed: whether what is shown has a sign, floats from -1 to 1 or whole numbers up to ``code_max``: rows are driven with what
+        lies above 0, then with what lies below.
     :param updates: updates of the whole training, over which rates fall where ``learning.decay`` says so.
     :param seed: seed of all draws.
     :param overrides: keys of ``network`` and ``learning``: ``{"network.alpha": 4, "learning.rate": 20}``.
@@ -81,6 +83,7 @@ class Network(_dalean.Network):
         *,
         rule: str = "ed",
         words: str = "routed",
+        signed: bool = False,
         updates: int = 1,
         seed: int = 1,
         overrides: Overrides | None = None,
@@ -108,6 +111,7 @@ class Network(_dalean.Network):
             seed,
             sizes[0],
             sizes[-1],
+            bool(signed),
             words == "own",
             updates,
             threads,

@@ -70,6 +70,7 @@ def deploy(
     to: str = "pairs",
     activation: str = "relu",
     rule: str | None = None,
+    signed: bool = False,
     quantile: float = 0.999,
     updates: int = 1,
     seed: int = 1,
@@ -87,6 +88,7 @@ def deploy(
     :param to: ``"pairs"`` or ``"dual"``.
     :param activation: of hidden layers, ``"relu"`` or ``"sigmoid"``; outputs are sums, whose greatest is the answer.
     :param rule: how arrays learn afterwards: of pairs ``"dfa"`` (default) or ``"bp"``; of dual ones ``"ed"``.
+    :param signed: whether ``x`` has a sign, as of :class:`Network`.
     :param quantile: share of what hidden units put out that lies within the chip's 0 to 1.
     :param overrides: keys of ``network`` and ``learning``, as of :class:`Network`.
     :raises dalean.ArrayError: when these are no layers of a network, or ``x`` does not fit them.
@@ -102,9 +104,9 @@ def deploy(
     rule = rule or ("dfa" if to == "pairs" else "ed")
     if (rule in ("dfa", "bp")) != (to == "pairs"):
         raise _wrong("rule", f"is {rule!r}", 'pairs learn by "dfa" or "bp", dual arrays by "ed"')
-    signed = _layers(layers, activation)
-    sizes = [signed[0][0].shape[0], *(weights.shape[1] for weights, _ in signed)]
-    biased = any(biases is not None for _, biases in signed)
+    dense = _layers(layers, activation)
+    sizes = [dense[0][0].shape[0], *(weights.shape[1] for weights, _ in dense)]
+    biased = any(biases is not None for _, biases in dense)
     chip = chip if isinstance(chip, Chip) else Chip(chip or "ideal")
     probe = Network([1, 2], chip)
     floor, ceiling = probe.window
@@ -114,8 +116,8 @@ def deploy(
 
     told, arrays = [], []
     active, before = _fractions(x, probe.code_max, sizes[0]), 1.0
-    for at, (weights, biases) in enumerate(signed):
-        last = at == len(signed) - 1
+    for at, (weights, biases) in enumerate(dense):
+        last = at == len(dense) - 1
         rows = weights * before
         shifts = np.zeros(sizes[at + 1]) if biases is None else biases
         sums = active @ weights + shifts
@@ -156,6 +158,7 @@ def deploy(
         sizes,
         chip,
         rule=rule,
+        signed=signed,
         updates=updates,
         seed=seed,
         overrides={**keys, **(overrides or {})},

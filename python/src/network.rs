@@ -3,12 +3,12 @@
 use std::collections::BTreeMap;
 
 use dalean::deployment::{Deployment, Moment, moments};
-use dalean::network::{HiddenWords, NetworkPlace};
+use dalean::network::{DrivenBy, HiddenWords, NetworkPlace};
 use dalean::{Checkpointed, Config, DrivenNetwork, Experiment, Sources, ledger_of};
 use pyo3::prelude::*;
 use pyo3::types::{PyAny, PyBytes};
 
-use crate::arrays::{codes, rows, table, wholes};
+use crate::arrays::{codes, rows, signed, table, two_phases, wholes};
 use crate::errors::{Raised, of_chips, wrong};
 use crate::waits::{Held, backend};
 
@@ -98,6 +98,20 @@ impl Network {
         self.units(self.network.layers() - 1)
     }
 
+    /// Codes of what is shown, and of how many samples.
+    fn shown(&self, x: &Bound<'_, PyAny>) -> PyResult<(Vec<u8>, usize)> {
+        let what = "numbers of x";
+        let inputs = self.network.size(0).map_err(Raised::from)?[0];
+        if self.signed() {
+            let (numbers, shape) = signed(what, x, self.network.code_max())?;
+            let samples = rows(what, &shape, inputs)?;
+            return Ok((two_phases(&numbers, inputs), samples));
+        }
+        let (codes, shape) = codes(what, x, self.network.code_max())?;
+        let samples = rows(what, &shape, inputs)?;
+        Ok((codes, samples))
+    }
+
     fn words(&self, x: &Bound<'_, PyAny>, width: usize) -> PyResult<Vec<i16>> {
         let (words, shape) = wholes("words", x)?;
         rows("words", &shape, width)?;
@@ -123,7 +137,7 @@ fn stream(name: &str) -> PyResult<char> {
 #[pymethods]
 impl Network {
     #[new]
-    #[pyo3(signature = (name, text, hw, settings, seed, inputs, outputs, own_words, updates, threads, kernel))]
+    #[pyo3(signature = (name, text, hw, settings, seed, inputs, outputs, signed, own_words, updates, threads, kernel))]
     #[expect(clippy::too_many_arguments, reason = "the package gives all of them by name")]
     fn new(
         py: Python<'_>,
@@ -134,6 +148,7 @@ impl Network {
         seed: Option<u64>,
         inputs: usize,
         outputs: usize,
+        signed: bool,
         own_words: bool,
         updates: u64,
         threads: usize,
@@ -153,11 +168,17 @@ impl Network {
             };
             let config = Config::load(&sources)?;
             // a single output tells two classes apart
-            let experiment = config.experiment(inputs, outputs.max(2), None)?;
+            let mut experiment = config.experiment(inputs, outputs.max(2), None)?;
+            if signed {
+                experiment.network.layers[0].driven_by = DrivenBy::Signed;
+            }
             let text = config.to_toml();
             let mut name = blake3::Hasher::new();
             name.update(text.as_bytes());
             name.update(format!("\n{inputs} {outputs} {own_words} {updates}").as_bytes());
+            if signed {
+                name.update(b" signed");
+            }
             let name = name.finalize().to_hex().to_string();
             let made = Made { config, experiment, updates, own: own_words, kernel, name };
             let network = made.build(threads)?;
@@ -210,6 +231,11 @@ impl Network {
     }
 
     #[getter]
+    fn signed(&self) -> bool {
+        self.made.experiment.network.layers[0].driven_by == DrivenBy::Signed
+    }
+
+    #[getter]
     fn samples(&self) -> usize {
         self.network.samples()
     }
@@ -238,9 +264,7 @@ impl Network {
         x: &Bound<'py, PyAny>,
         learn: bool,
     ) -> PyResult<Bound<'py, PyAny>> {
-        let (codes, shape) = codes("numbers of x", x, self.network.code_max())?;
-        let inputs = self.network.size(0).map_err(Raised::from)?[0];
-        let samples = rows("numbers of x", &shape, inputs)?;
+        let (codes, samples) = self.shown(x)?;
         self.told.add(if learn { "read" } else { "look" }, &codes);
         let network = self.held()?;
         py.detach(|| network.read(&codes, learn)).map_err(Raised::from)?;
@@ -253,8 +277,7 @@ impl Network {
     }
 
     fn calibrate(&mut self, py: Python<'_>, x: &Bound<'_, PyAny>) -> PyResult<()> {
-        let (codes, shape) = codes("numbers of x", x, self.network.code_max())?;
-        rows("numbers of x", &shape, self.network.size(0).map_err(Raised::from)?[0])?;
+        let (codes, _) = self.shown(x)?;
         self.told.add("calibrate", &codes);
         let network = self.held()?;
         Ok(py.detach(|| network.calibrate(&codes)).map_err(Raised::from)?)
