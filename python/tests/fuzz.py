@@ -103,6 +103,7 @@ def fuzz(calls, rng):
         dalean.Network([5, 70, 3], words="own", overrides={"learning.batch": 4}),
         dalean.Network([5, 70, 3], dalean.Chip("ideal", {"tile.transposed_read": True}), rule="bp", words="own"),
         dalean.Network([5, 7, 3], dalean.Chip("ideal", FLAWS), overrides={"learning.batch": 4}),
+        dalean.Network([5, 7, 3], overrides={"learning.batch": 4}, signed=True),
     ]
     whole = lambda: rng.choice([0, 1, 0, 1, 2, 3, -1, 2**40, 2**70, None, "a", 1.5])
     stream = lambda: rng.choice(["p", "n", "p", "n", "", "pp", "é", None, 3])

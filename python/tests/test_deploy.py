@@ -280,8 +280,22 @@ def test_standardised_inputs_fold_into_the_first_layer():
     (w, b), *rest = pairs
     net = dalean.deploy([(w / sd[:, None], b - (mean / sd) @ w), *rest], x, dalean.Chip("ideal", {"cell.level_bits": 12}))
     assert np.corrcoef(wanted.ravel(), sums(net, x).ravel())[0, 1] > 0.99
-    with pytest.raises(dalean.ArrayError, match="-"):
+    with pytest.raises(dalean.ArrayError, match="floats lie in 0 to 1"):
         dalean.deploy(pairs, (x - mean) / sd)
+
+
+@pytest.mark.parametrize("to", ["pairs", "dual"])
+def test_what_is_shown_may_have_a_sign(to):
+    pairs, x = layers()
+    x = 2 * x - 1
+    net = dalean.deploy(pairs, x, dalean.Chip("ideal", {"cell.level_bits": 10}), to=to, signed=True)
+    wanted, found = forward(pairs, x), sums(net, x)
+    assert all(np.corrcoef(wanted[:, of], found[:, of])[0, 1] > 0.995 for of in range(4))
+    assert np.abs(dalean.outputs(net) - wanted).max() < 0.05 * np.ptp(wanted)
+    codes = np.sign(x) * np.floor(np.abs(x) * 255 + 0.5)
+    assert (sums(net, codes.astype(np.int16)) == found).all()
+    chips = dalean.deploy(pairs, x, dalean.Chip("ideal", FLAWS), to=to, signed=True)
+    assert len(set(chips.on_chips(lambda net: sums(net, x).std(), samples=3, progress=False)["score"])) == 3
 
 
 @pytest.mark.parametrize(

@@ -28,7 +28,7 @@ use crate::chip::state::{State, StateError, Visitor};
 use crate::num::fixed::rail;
 use crate::num::tables::DriftTables;
 
-/// Samples read at a time, at most: a sum over a batch fits 32 bits.
+/// Samples read at a time, at most, or half as many of drives with a sign: a sum over a batch fits 32 bits.
 pub const SAMPLES_MAX: usize = 65_536;
 /// Greatest shift of a write.
 const SHIFT_MAX: u32 = 30;
@@ -206,9 +206,10 @@ impl DrivenNetwork {
             let found = format!("has {} codes", codes.len());
             return wrong("a read", found, format!("a sample has {inputs}; give whole samples"));
         }
-        if codes.len() / inputs > SAMPLES_MAX {
+        let samples_max = SAMPLES_MAX / spec.driven_by.phases();
+        if codes.len() / inputs > samples_max {
             let found = format!("has {} samples", codes.len() / inputs);
-            return wrong("a read", found, format!("give {SAMPLES_MAX} at most at a time"));
+            return wrong("a read", found, format!("give {samples_max} at most at a time"));
         }
         if let Some(at) = codes.iter().position(|&code| code > most) {
             let found = format!("has the code {} on row {}", codes[at], at % inputs % rows);
