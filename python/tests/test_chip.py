@@ -270,7 +270,7 @@ def test_drives_with_a_sign():
     assert all((before[name] == array).all() for name, array in still.all_levels().items())
     for given, words in [
         (x * 2.0, "floats lie in -1 to 1"),
-        (np.full((1, 5), np.nan), "hold nan"),
+        (np.full((1, 5), np.nan), "hold NaN"),
         (x * 2, "whole numbers lie in -255..=255"),
         (x[:, :4], "samples, 5"),
         (["a"] * 5, "give floats from -1 to 1"),
