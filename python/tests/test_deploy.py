@@ -326,11 +326,26 @@ def test_a_network_that_was_not_deployed_has_no_signed_weights():
         dalean.signed(dalean.Network([4, 3]))
 
 
-def test_the_example(examples):
-    spec = importlib.util.spec_from_file_location("deploy", examples / "deploy.py")
+def example(examples, name):
+    spec = importlib.util.spec_from_file_location(name, examples / f"{name}.py")
     made = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(made)
-    told = made.main(epochs=2)
+    return made
+
+
+def test_the_example_of_chips(examples, monkeypatch):
+    monkeypatch.syspath_prepend(examples)
+    told = example(examples, "chips").main(samples=6)
+    for to in ("pairs", "dual"):
+        plain, made_up = told[to, False].summary, told[to, True].summary
+        # nothing has moved at the start of the law; then it falls
+        assert plain[0] == made_up[0] and 0.5 < plain[0]["mean"] < 0.89
+        assert plain[0]["mean"] > plain[1]["mean"] > plain[2]["mean"] and made_up[2]["mean"] >= plain[2]["mean"]
+        assert len(told[to, True]) == 18 and told[to, True]["chip"] == [chip for chip in range(1, 7) for _ in range(3)]
+
+
+def test_the_example(examples):
+    told = example(examples, "deploy").main(epochs=2)
     for to in ("pairs", "dual"):
         before, after = told[to][0], told[to][-1]
         # a sign that is wrong somewhere answers by chance, 0.1; errors of the wrong sign lose a third in an epoch
