@@ -74,8 +74,9 @@ pub use crate::task::classify::{
 /// ```
 pub mod hardware {
     pub use crate::chip::device::{
-        CellSpread, Chance, Conductance, Conducting, DeviceError, DeviceSpec, FaultMap, Faults,
-        LetThrough, ListedCell, Programming, PulseNoise, ReadNoise, Reference, StuckAt, Wires,
+        Ageing, CellSpread, Chance, Conductance, Conducting, DeviceError, DeviceSpec, Endurance,
+        FaultMap, Faults, Leakage, LetThrough, ListedCell, Programming, PulseNoise, ReadNoise,
+        Reference, StuckAt, Wires, Worn,
     };
     pub use crate::chip::hardware::{
         Adc, AdcRange, CellSpec, ConverterKind, DigitalSpec, DitherBits, DitherPattern, DriveSpec,
@@ -87,8 +88,8 @@ pub mod hardware {
         ResidualBits,
     };
     pub use crate::num::tables::{
-        ExponentialSteps, LinearSteps, MeasuredSteps, NeurosimSteps, Response, SoftBoundSteps,
-        SpreadLaw, TableSteps,
+        DriftRates, ExponentialSteps, LinearSteps, MeasuredSteps, NeurosimSteps, Response,
+        SoftBoundSteps, SpreadLaw, TableSteps,
     };
 }
 

@@ -20,6 +20,7 @@ mod form;
 mod initial;
 pub mod kernel;
 pub mod layout;
+mod memory;
 mod optimise;
 mod own;
 mod pulses;
@@ -32,6 +33,8 @@ mod write;
 
 pub use form::{Form, LongSums, Met, SHORT_READS};
 pub use initial::{InitialLaw, initial_levels, initial_scale};
+use memory::stamp_of;
+pub use memory::{CellMemory, CellMemoryMut};
 pub use optimise::{Adam, Asks, Momentum};
 pub use own::{CellsMade, OwnCells};
 pub use pulses::{Collect, Collected, RowPeaks};
@@ -56,6 +59,8 @@ pub struct Crossbar {
     stuck: Vec<StuckCell>,
     /// What cells are made of, if they are not ideal.
     own: Option<Box<OwnCells>>,
+    /// What they remember beside their level, if anything.
+    memory: Option<Box<CellMemory>>,
 }
 
 /// The parts of some panels side by side that a write may change.
@@ -68,6 +73,7 @@ pub struct StripMut<'a> {
     residual: Option<&'a mut [u16]>,
     pruned: Option<&'a mut [u8]>,
     own: Option<&'a OwnCells>,
+    memory: Option<CellMemoryMut<'a>>,
 }
 
 /// A half block of a byte plane.
@@ -103,6 +109,7 @@ impl Crossbar {
             absorbs,
             stuck: vec![],
             own: None,
+            memory: None,
         }
     }
 
@@ -155,6 +162,7 @@ impl Crossbar {
         if let Some(plane) = &mut self.high {
             plane[at] = high;
         }
+        self.leave(at, level);
     }
 
     /// The levels, row-major.
@@ -215,7 +223,7 @@ impl Crossbar {
             .map(|residual| cells.map(|(r, c)| residual[self.layout.index(r, c)]).collect())
     }
 
-    /// Which cells are gone for good, row-major; `None` unless the floor absorbs. A stuck cell is none of them.
+    /// Which cells are gone for good, row-major; `None` unless the floor absorbs. A stuck or worn cell is none of them.
     #[must_use]
     pub fn pruned(&self) -> Option<BitVec<u8, Lsb0>> {
         let Layout { rows, columns } = self.layout;
@@ -225,6 +233,11 @@ impl Crossbar {
             cells.map(|(r, c)| pruned[self.layout.index(r, c)] != 0).collect();
         for cell in &self.stuck {
             gone.set(cell.row as usize * columns + cell.column as usize, false);
+        }
+        for (cell, [spent, limit]) in self.wear().into_iter().flatten().enumerate() {
+            if spent >= limit {
+                gone.set(cell, false);
+            }
         }
         Some(gone)
     }
@@ -304,6 +317,8 @@ impl Crossbar {
         let mut residual = self.residual.as_mut().map(|plane| plane.chunks_mut(cells));
         let mut pruned = self.pruned.as_mut().map(|plane| plane.chunks_mut(cells));
         let own = self.own.as_deref();
+        let absorbs = self.absorbs;
+        let mut memory = self.memory.as_mut().map(|memory| memory.strips(cells, absorbs));
         (0..layout.panels()).step_by(panels).map(move |first| StripMut {
             first,
             layout,
@@ -312,6 +327,7 @@ impl Crossbar {
             residual: residual.as_mut().map(|chunks| chunks.next().expect("one chunk a strip")),
             pruned: pruned.as_mut().map(|chunks| chunks.next().expect("one chunk a strip")),
             own,
+            memory: memory.as_mut().map(|strips| strips.next().expect("one a strip")),
         })
     }
 }

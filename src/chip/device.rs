@@ -6,16 +6,23 @@
 mod cell;
 mod conductance;
 mod drift;
+mod endurance;
 mod fault_map;
 mod faults;
+mod leakage;
+mod memory;
 mod programming;
 mod read_noise;
 mod response;
 
 pub use cell::{Device, DeviceLanes, OwnCell, PLACES, PulseWords};
 pub use conductance::{CONDUCTANCE_BITS, Conductance, Conducting, LetThrough, Reference, Wires};
+pub use drift::{Ageing, Ages};
+pub use endurance::{Endurance, Limits, Worn};
 pub use fault_map::{FaultMap, ListedCell, StuckAt};
 pub use faults::{Chance, Faults, StuckCell};
+pub use leakage::{Leakage, Leaks};
+pub use memory::{MemoryLaw, WriteNoise};
 pub use programming::{Programming, cell_words};
 pub use read_noise::{Direction, Noise, NoisePlace, ReadNoise};
 pub use response::{CellSpread, DeviceError, DeviceSpec, PulseNoise};

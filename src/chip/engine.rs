@@ -36,6 +36,7 @@ mod deploy;
 mod devices;
 mod each;
 mod error;
+mod forget;
 mod forward;
 mod homeostasis;
 mod look;
@@ -302,10 +303,7 @@ impl Engine {
         assert!(layers[0].spec.driven_by.is_shared(), "data drive both streams alike");
         let signed = |layer: &Layer| layer.spec.driven_by == DrivenBy::Signed;
         assert!(!layers[1..].iter().any(signed), "only data have a sign");
-        if let Some(device) = hardware.device() {
-            let device = Arc::new(device);
-            layers.iter_mut().for_each(|layer| layer.fit(&device, seed));
-        }
+        noise::make_cells(hardware.device(), &hardware, &mut layers, seed);
         let count = layers.len();
         let schedule = hardware.timing.map(|timing| Schedule::new(&hardware, timing, &layers));
         let ledger =

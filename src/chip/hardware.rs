@@ -2,13 +2,14 @@
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
 use super::device::{
-    CONDUCTANCE_BITS, Conductance, Conducting, Device, DeviceError, DeviceSpec, FaultMap, Faults,
-    Programming, ReadNoise, Reference, Wires,
+    Ageing, CONDUCTANCE_BITS, Conductance, DeviceError, DeviceSpec, Endurance, FaultMap, Faults,
+    Leakage, Programming, ReadNoise, Reference, Wires,
 };
 use crate::num::fixed::{
     AdcBits, DriveBits, ErrorBits, IncrementMax, LevelBits, LutBits, OutOfRange, ResidualBits, rsh,
 };
 
+mod cells;
 pub mod converter;
 mod driver;
 mod flaws;
@@ -287,6 +288,12 @@ pub struct HardwareSpec {
     pub read_noise: Option<ReadNoise>,
     /// What loads leave beside a level; `None`: nothing.
     pub programming: Option<Programming>,
+    /// How many pulses cells take; `None`: any number.
+    pub endurance: Option<Endurance>,
+    /// How cells forget; `None`: they do not.
+    pub leakage: Option<Leakage>,
+    /// How levels drift while others are written; `None`: a training takes no time in which they do.
+    pub ageing: Option<Ageing>,
 }
 
 /// Parts that make no chip.
@@ -362,6 +369,9 @@ impl Hardware {
             wires,
             read_noise,
             programming,
+            endurance,
+            leakage,
+            ageing,
         } = &spec;
         let CellSpec { level_bits, window, floor_kind: _ } = cell;
         let TileSpec { rows, columns, count_max, transposed_read: _ } = tile;
@@ -400,6 +410,8 @@ impl Hardware {
         if let Some(device) = device {
             let wrong = |DeviceError { key, found, allowed }| HardwareError { key, found, allowed };
             device.check().map_err(wrong)?;
+        }
+        if device.is_some() || endurance.is_some() || ageing.is_some() {
             driver::check_driver(*timing)?;
         }
         if let WriteScheme::Trains { slots_log2 } = *scheme {
@@ -409,7 +421,9 @@ impl Hardware {
             (*faults, fault_map, *window),
             (*conductance, *wires),
             (*read_noise, *programming),
+            (*endurance, *leakage),
         )?;
+        flaws::check_ageing(*ageing, *leakage, device.as_ref())?;
         Ok(Self(spec))
     }
 
@@ -464,6 +478,9 @@ impl Hardware {
             wires: None,
             read_noise: None,
             programming: None,
+            endurance: None,
+            leakage: None,
+            ageing: None,
         };
         Self::new(spec).expect("the reference is a chip")
     }
@@ -488,43 +505,6 @@ impl Hardware {
     #[must_use]
     pub const fn slices(&self) -> u32 {
         self.0.drive.bits.get().div_ceil(self.0.drive.dac_bits)
-    }
-
-    /// The greatest level that a cell of this chip can have: the ceiling, or where cells differ in theirs what a level holds.
-    #[must_use]
-    pub fn level_greatest(&self) -> u16 {
-        match &self.device {
-            Some(device) if device.spread.moves_window() => self.cell.level_bits.level_max(),
-            _ => self.cell.window.ceiling(),
-        }
-    }
-
-    /// The tables of its device, if it has one.
-    #[must_use]
-    pub(crate) fn device(&self) -> Option<Device> {
-        let ends = [self.cell.window.floor(), self.cell.window.ceiling()];
-        let of = |device| Device::new(device, ends, self.cell.level_bits.level_max());
-        self.device.as_ref().map(of)
-    }
-
-    /// The law of its currents, where cells conduct something else than their level.
-    #[must_use]
-    pub fn conducting(&self) -> Option<Conducting> {
-        Conducting::new(self.conductance, self.wires, self.cell.window.ceiling())
-    }
-
-    /// Whether cells are stuck, by a draw or a list.
-    #[must_use]
-    pub fn has_stuck_cells(&self) -> bool {
-        !self.faults.is_none() || !self.fault_map.is_empty()
-    }
-
-    /// Pulses across the window and levels they move a cell by, where those are not the same.
-    #[must_use]
-    pub fn pulses_of_window(&self) -> Option<[u32; 2]> {
-        let window = self.cell.window;
-        let span = u32::from(window.ceiling() - window.floor());
-        self.device.as_ref().map(|device| [device.states, span])
     }
 
     /// The shift at which no current of a tile can saturate a converter of `bits`.

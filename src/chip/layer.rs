@@ -11,7 +11,7 @@ use std::sync::Arc;
 use super::crossbar::Crossbar;
 use super::crossbar::kernel::{ConvShape, LookUp};
 use super::crossbar::layout::Layout;
-use super::device::Device;
+use super::device::{Device, MemoryLaw};
 use super::hardware::{Adc, AdcRange, Hardware};
 use super::periphery;
 use super::population::{Stream, Wiring};
@@ -239,6 +239,16 @@ impl Layer {
             let (layer, pathway) = (self.index, pathway.code);
             let place = Place { layer, pathway, ..Place::global(seed, Site::Variation, 0) };
             array.fit(Arc::clone(device), place);
+        }
+    }
+
+    /// Its cells remember from now on what a law says, of a chip of a seed.
+    pub(crate) fn remember(&mut self, law: &Arc<MemoryLaw>, seed: u64) {
+        let pathways = self.spec.wiring.pathways();
+        for (array, pathway) in self.arrays.iter_mut().zip(pathways) {
+            let (layer, pathway) = (self.index, pathway.code);
+            let place = Place { layer, pathway, ..Place::global(seed, Site::Variation, 0) };
+            array.remember(law, place);
         }
     }
 

@@ -267,6 +267,7 @@ impl MeasuredDevice {
             states: best.states,
             asymmetry: best.asymmetry,
             noise: noise(&settled.scatter),
+            write_noise: Millionths(0),
             spread: spread(&settled, &ends, &mut said),
         };
         let read_noise = settled.scatter.read;

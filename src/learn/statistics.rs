@@ -58,6 +58,44 @@ pub struct PathwayRecord {
     pub histogram: Vec<u64>,
     /// Events of the training ledger so far, by name (requested, bounded, pulses_attempted, ...).
     pub training: BTreeMap<String, u64>,
+    /// Pulses that its cells were sent, where they wear out by them.
+    #[cfg_attr(feature = "lab", serde(default, skip_serializing_if = "Option::is_none"))]
+    pub wear: Option<WearRecord>,
+}
+
+/// Pulses that the cells of a pathway were sent, where they wear out by them.
+#[derive(Debug, Clone, PartialEq, Eq)]
+#[cfg_attr(
+    feature = "lab",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(deny_unknown_fields)
+)]
+pub struct WearRecord {
+    /// Cells that are worn out.
+    pub worn: u64,
+    /// Pulses of the cell that was sent most.
+    pub most: u64,
+    /// Pulses of all cells.
+    pub pulses: u64,
+    /// Cells by pulses: none, 1, 2 to 3, 4 to 7, ... as far as there are some.
+    pub histogram: Vec<u64>,
+}
+
+impl WearRecord {
+    fn of(array: &Crossbar) -> Option<Self> {
+        let mut this = Self { worn: 0, most: 0, pulses: 0, histogram: vec![] };
+        for [spent, limit] in array.wear()? {
+            this.worn += u64::from(spent >= limit);
+            this.most = this.most.max(spent.into());
+            this.pulses += u64::from(spent);
+            let bin = (u32::BITS - spent.leading_zeros()) as usize;
+            if this.histogram.len() <= bin {
+                this.histogram.resize(bin + 1, 0);
+            }
+            this.histogram[bin] += 1;
+        }
+        Some(this)
+    }
 }
 
 /// Which cells lay on the floor when learning began, by layer and array, row-major.
@@ -122,6 +160,7 @@ fn of(array: &Crossbar, hardware: &Hardware, start: &[bool]) -> PathwayRecord {
         idle: [[0; 2]; 3],
         histogram: vec![0; bins],
         training: BTreeMap::new(),
+        wear: WearRecord::of(array),
     };
     // a cell may have a floor of its own
     let levels: Vec<_> = array.levels().zip(array.floors()).collect();

@@ -28,7 +28,7 @@ pub enum Site {
     InitialLevels = 1,
     /// Order of the samples in an epoch.
     Shuffle = 2,
-    /// What sets a cell apart from others of its device. Sub: 0 step, 1 asymmetry, 2 ceiling, 3 floor.
+    /// What sets a cell apart from others of its device. Sub: 0 step, 1 asymmetry, 2 ceiling, 3 floor, 4 endurance, 5 leakage.
     Variation = 3,
     /// Noise of a device's pulse. Sub: the pulse of the write.
     PulseNoise = 4,
@@ -56,6 +56,10 @@ pub enum Site {
     StuckCell = 16,
     /// What a load leaves beside a level.
     ProgrammingNoise = 17,
+    /// What a write leaves beside a level. Sub: 0 a Gaussian, 1 rounding.
+    WriteNoise = 18,
+    /// Rounding of what a volatile cell forgets.
+    Leakage = 19,
 }
 
 /// Bytes of one block.

@@ -28,7 +28,7 @@ mod softmax;
 mod spread;
 mod unit;
 
-pub use drift::{DriftLaw, DriftTables, OfLogarithm};
+pub use drift::{DriftLaw, DriftPace, DriftRates, DriftTables, OfLogarithm};
 pub use gaussian::{Gaussian, half_gaussian};
 pub use policy::PolicyTables;
 pub use rate::{Decay, LEVELS_SHIFT_MAX, Rate, RateOf, SHIFT_MAX};

@@ -79,7 +79,7 @@ fn every_experiment_learns_two_batches() {
 fn every_sweep_is_read_and_has_points() {
     let sweeps: Vec<_> =
         files(&examples(), "toml").into_iter().filter(|path| is_sweep(path)).collect();
-    assert_eq!(sweeps.len(), 21, "{sweeps:?}");
+    assert_eq!(sweeps.len(), 22, "{sweeps:?}");
     for path in sweeps {
         let sweep = Sweep::read(&path).unwrap_or_else(|error| panic!("{error}"));
         let (points, _) =

@@ -24,6 +24,7 @@ mod ir_drop;
 mod keys;
 mod laws;
 mod measure;
+mod memory;
 mod oracle;
 mod output;
 mod outside;

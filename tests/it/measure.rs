@@ -63,6 +63,7 @@ fn neurosim() -> DeviceSpec {
         states: 32,
         asymmetry: Millionths(0),
         noise: PulseNoise::OfWindow(millionths(0.01)),
+        write_noise: Millionths(0),
         spread: CellSpread::default(),
     }
 }
@@ -76,6 +77,7 @@ fn soft(spread: CellSpread) -> DeviceSpec {
         states: 64,
         asymmetry: Millionths(0),
         noise: PulseNoise::OfStep(millionths(0.3)),
+        write_noise: Millionths(0),
         spread,
     }
 }

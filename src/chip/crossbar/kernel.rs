@@ -74,7 +74,7 @@ pub use self::{
     offsets::{MiddleOf, OFFSET_MAX},
     optimise::{MEAN_BITS, SignLaw, Squares, joined},
     reads::ReadsScratch,
-    respond::{Answering, Answers},
+    respond::{Answering, Answers, Remembered},
     sums::Sums,
     team::Team,
 };

@@ -25,6 +25,7 @@ impl Crossbar {
             shape.into_iter().flat_map(side).collect()
         });
 
+        self.visit_wear(name, visitor)?;
         let levels = format!("{name}.levels");
         let [least, greatest] = self.reachable().map(i64::from);
         let window = least..=greatest;
@@ -32,6 +33,8 @@ impl Crossbar {
         for (row, levels) in seen.iter().flat_map(|all| all.chunks(shape[1]).enumerate()) {
             self.load_row(row, levels);
         }
+        self.visit_left(name, visitor)?;
+        self.visit_stamps(name, visitor)?;
         if self.absorbs {
             let pruned = format!("{name}.pruned");
             let bits = || self.pruned().expect("just seen");

@@ -28,7 +28,8 @@ impl Crossbar {
             }
         }
         if !self.absorbs {
-            self.pruned = (!stuck.is_empty()).then(|| vec![0; layout.cells_padded()]);
+            let some = !stuck.is_empty() || self.wears();
+            self.pruned = some.then(|| vec![0; layout.cells_padded()]);
         }
         self.stuck = stuck;
         (0..layout.rows).for_each(|row| self.hold_row(row));
@@ -64,8 +65,9 @@ impl Crossbar {
         }
     }
 
-    /// Marks stuck cells so that no write moves them.
+    /// Marks stuck and worn cells so that no write moves them.
     pub(super) fn mark_stuck(&mut self) {
+        self.mark_worn();
         let Some(pruned) = &mut self.pruned else { return };
         for cell in &self.stuck {
             pruned[self.layout.index(cell.row as usize, cell.column as usize)] = Cells::GONE;
@@ -74,7 +76,7 @@ impl Crossbar {
 
     /// After a write: a cell that came to rest on a floor that does not absorb is as free as before.
     pub(crate) fn end_write(&mut self) {
-        if self.absorbs || self.stuck.is_empty() {
+        if self.absorbs || (self.stuck.is_empty() && !self.wears()) {
             return;
         }
         if let Some(pruned) = &mut self.pruned {

@@ -192,6 +192,7 @@ impl StripMut<'_> {
             pruned: self.pruned.as_deref_mut().map(|plane| half_mut(plane, at)),
             pulses: None,
             answering: None,
+            remembered: self.memory.as_mut().map(|memory| memory.half(at)),
         }
     }
 

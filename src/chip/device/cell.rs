@@ -103,7 +103,7 @@ impl Device {
     /// When the window is empty.
     #[must_use]
     pub fn new(device: &DeviceSpec, [floor, ceiling]: [u16; 2], level_max: u16) -> Self {
-        let DeviceSpec { response, states, asymmetry, noise, spread } = device;
+        let DeviceSpec { response, states, asymmetry, noise, write_noise: _, spread } = device;
         let span = ceiling - floor;
         let scaled = |share: Millionths, whole: i64| (share.0 * whole + 500_000) / 1_000_000;
         let noise = match *noise {

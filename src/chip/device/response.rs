@@ -15,6 +15,7 @@ use crate::num::tables::{LinearSteps, Response, SpreadLaw};
 ///     states: 64,
 ///     asymmetry: Millionths(0),
 ///     noise: PulseNoise::OfStep(Millionths(300_000)),
+///     write_noise: Millionths(0),
 ///     spread: CellSpread::default(),
 /// };
 /// let chip = Hardware::reference().with(|parts| parts.device = Some(device)).expect("a chip");
@@ -30,6 +31,8 @@ pub struct DeviceSpec {
     pub asymmetry: Millionths,
     /// Noise from pulse to pulse.
     pub noise: PulseNoise,
+    /// Standard deviation of what a write leaves beside the level that its pulses reached, in windows.
+    pub write_noise: Millionths,
     /// Differences from cell to cell.
     pub spread: CellSpread,
 }
@@ -96,6 +99,7 @@ impl DeviceSpec {
             states,
             asymmetry: Millionths(0),
             noise: PulseNoise::Off,
+            write_noise: Millionths(0),
             spread: CellSpread::default(),
         }
     }
@@ -105,7 +109,7 @@ impl DeviceSpec {
     /// # Errors
     /// When one lies outside what it can be.
     pub fn check(&self) -> Result<(), DeviceError> {
-        let Self { response, states, asymmetry, noise, spread } = self;
+        let Self { response, states, asymmetry, noise, write_noise, spread } = self;
         if !(1..=Self::STATES_MAX).contains(states) {
             let allowed = format!("it must lie in 1..={}", Self::STATES_MAX);
             let found = format!("is {states}");
@@ -129,6 +133,7 @@ impl DeviceSpec {
             PulseNoise::OfStep(noise) => share("device.response.noise", noise, [0, 100])?,
             PulseNoise::OfWindow(noise) => share("device.response.noise", noise, [0, 1])?,
         }
+        share("device.response.write_noise", *write_noise, [0, 1])?;
         let CellSpread { step_law: _, step, asymmetry, ceiling, floor } = *spread;
         share("device.spread.step", step, [0, 2])?;
         share("device.spread.asymmetry", asymmetry, [0, 1])?;

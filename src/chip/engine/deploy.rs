@@ -122,7 +122,7 @@ impl Engine {
     /// Lets all levels but those of stuck cells drift; with `made_up`, a factor a layer makes up for it.
     pub fn age(&mut self, drift: &DriftTables, made_up: bool) {
         let gaussian = self.gaussian.clone().unwrap_or_else(|| Arc::new(Gaussian::new()));
-        let level_max = self.hardware.cell.window.ceiling();
+        let level_max = self.hardware.level_greatest();
         for layer in 0..self.layers.len() {
             let sum = |engine: &Self| {
                 let arrays = engine.layers[layer].arrays.iter();
@@ -154,7 +154,8 @@ impl Engine {
     pub(super) fn load_weights(&mut self, layer: usize, array: usize, row: usize, levels: &[u16]) {
         let pathway = self.layers[layer].spec.wiring.pathways()[array].code;
         let left = self.programmed(layer, array, row, levels);
-        self.layers[layer].arrays[array].load_row(row, &left);
+        let writes = self.layers[layer].writes[array];
+        self.layers[layer].arrays[array].program_row(row, &left, writes);
         self.levels_moved(layer);
         let (during, count) = (During::LoadWeights, levels.len() as u64);
         self.charge(layer, pathway, during, Event::CellLoads, count);
@@ -215,7 +216,7 @@ mod tests {
     fn much_later() -> DriftTables {
         let of = |x| OfLogarithm { slope: 0.0, offset: x, least: x, most: x };
         let law = DriftLaw::Power { exponent: of(0.05), spread: of(0.01) };
-        DriftTables::new(law, 255, 1e6)
+        DriftTables::new(law, [255; 2], 1e6)
     }
 
     /// Fails when a stuck cell drifts, when a cell has another's words, or when drift is applied twice.

@@ -5,7 +5,9 @@ use proptest::prelude::*;
 use super::tick::Network;
 use super::{Engine, Operation, Phase, Side, Write};
 use crate::chip::crossbar::kernel::Backend;
-use crate::chip::device::{CellSpread, DeviceSpec, PulseNoise};
+use crate::chip::device::{
+    Ageing, CellSpread, Chance, DeviceSpec, Endurance, Faults, Leakage, PulseNoise, Worn,
+};
 use crate::chip::hardware::timing::{PulseCode, Timing};
 use crate::chip::hardware::{DitherBits, FloorKind, Hardware, Window, WriteScheme};
 use crate::chip::layer::{
@@ -14,7 +16,7 @@ use crate::chip::layer::{
 use crate::chip::population::Wiring;
 use crate::num::fixed::{IncrementMax, LevelBits, Millionths, ResidualBits};
 use crate::num::tables::{
-    Activation, ExponentialSteps, LinearSteps, MeasuredSteps, NeurosimSteps, Response,
+    Activation, DriftRates, ExponentialSteps, LinearSteps, MeasuredSteps, NeurosimSteps, Response,
     SoftBoundSteps, SpreadLaw, TableSteps,
 };
 
@@ -82,12 +84,14 @@ fn device() -> impl Strategy<Value = DeviceSpec> {
         (1i64..=20).prop_map(|of| PulseNoise::OfWindow(Millionths(of * 10_000))),
     ];
     let spread = (share(80), share(30), share(40), share(40), any::<bool>());
+    let noise = (noise, share(30));
     (response(), 1u32..=200, -30i64..=30, noise, spread).prop_map(
         |(response, states, asymmetry, noise, (step, lean, ceiling, floor, log))| DeviceSpec {
             response,
             states,
             asymmetry: Millionths(asymmetry * 10_000),
-            noise,
+            noise: noise.0,
+            write_noise: noise.1,
             spread: CellSpread {
                 step_law: if log { SpreadLaw::LogNormal } else { SpreadLaw::Normal },
                 step,
@@ -97,6 +101,43 @@ fn device() -> impl Strategy<Value = DeviceSpec> {
             },
         },
     )
+}
+
+/// What cells do beside answering: some are stuck, some wear out after a few pulses, all forget.
+fn lasting() -> impl Strategy<Value = (Faults, Option<Endurance>, Option<Leakage>, Option<Ageing>)>
+{
+    let part = |most: i64| (0..=most).prop_map(|of| Millionths(of * 100_000));
+    let share = Chance::new(1 << 28).unwrap();
+    let faults = Faults { floor: share, ceiling: share, any: share };
+    let faults = prop_oneof![2 => Just(Faults::NONE), 1 => Just(faults)];
+    let worn = prop_oneof![Just(Worn::Level), Just(Worn::Floor), Just(Worn::Ceiling)];
+    let endurance = (1u32..=20, part(9), worn).prop_map(|(pulses, spread, worn)| Endurance {
+        pulses,
+        spread,
+        worn,
+    });
+    let leakage = (1u32..=u32::MAX, 0u32..=30, 1u32..=3, part(10), part(9)).prop_map(
+        |(lost, less, every, rest, spread)| Leakage {
+            lost: (lost >> less).max(1),
+            every,
+            rest,
+            spread,
+        },
+    );
+    let signed = |most: i64| (-most..=most).prop_map(|of| Millionths(of * 10_000));
+    let exponent = (signed(30), signed(60), part(2), part(9))
+        .prop_map(|(slope, offset, a, b)| [slope, offset, a.min(b), a.max(b)]);
+    let power = (exponent.clone(), exponent).prop_map(|(a, b)| DriftRates::Power([a, b]));
+    let log = (signed(20), part(1)).prop_map(|(change, spread)| DriftRates::Log([change, spread]));
+    let ageing = (prop_oneof![power, log], -3i64 << 16..=9 << 16, 1u32..=3)
+        .prop_map(|(rates, since, every)| Ageing { rates, since, every });
+    let forgets = prop_oneof![
+        Just((None, None)),
+        leakage.prop_map(|leakage| (Some(leakage), None)),
+        ageing.prop_map(|ageing| (None, Some(ageing))),
+    ];
+    (faults, prop::option::of(endurance), forgets)
+        .prop_map(|(faults, endurance, (leakage, ageing))| (faults, endurance, leakage, ageing))
 }
 
 fn chip() -> impl Strategy<Value = Hardware> {
@@ -151,12 +192,18 @@ fn case() -> impl Strategy<Value = Case> {
     ];
     let sizes = (3usize..=150, 1usize..=50);
     let learning = (mode, optimiser, any::<bool>(), 1usize..=5);
-    (any::<u64>(), sizes, wiring, learning, chip(), device()).prop_map(
-        |(seed, (rows, units), wiring, (mode, optimiser, centred, samples), chip, device)| {
+    let cells = (prop::option::weighted(0.9, device()), lasting());
+    (any::<u64>(), sizes, wiring, learning, chip(), cells).prop_map(
+        |(seed, (rows, units), wiring, learning, chip, (device, lasting))| {
+            let (mode, optimiser, centred, samples) = learning;
             let plain = mode != Mode::Accumulate;
             let optimiser = if plain { Optimiser::Plain } else { optimiser };
             let chip = chip.with(|h| {
-                h.device = Some(device);
+                h.device = device;
+                (h.faults, h.endurance, h.leakage, h.ageing) = lasting;
+                if let (Some(device), Some(_)) = (&mut h.device, h.ageing) {
+                    device.write_noise = Millionths(0);
+                }
                 if optimiser.is_sign() || mode == Mode::Trains {
                     h.write.residual_bits = ResidualBits::new(0).unwrap();
                 }
@@ -247,14 +294,18 @@ impl Case {
     }
 }
 
-/// Everything of an array that a write changes: levels, remainders, pruned cells.
-type CellsOf = (Vec<u16>, Option<Vec<u16>>, Vec<bool>);
+/// Everything of an array that a write changes: levels, remainders, pruned cells, what cells remember.
+type CellsOf = (Vec<u16>, Option<Vec<u16>>, Vec<bool>, Remembered);
+
+/// Pulses sent and their limits, what they left, and when.
+type Remembered = (Option<Vec<[u32; 2]>>, Option<Vec<u16>>, Option<Vec<u32>>);
 
 fn cells(engine: &Engine) -> Vec<CellsOf> {
     let arrays = engine.layers()[0].arrays.iter();
     let of = |array: &crate::chip::crossbar::Crossbar| {
         let pruned = array.pruned().map(|bits| bits.iter().by_vals().collect());
-        (array.levels().collect(), array.residuals(), pruned.unwrap_or_default())
+        let (levels, pruned) = (array.levels().collect(), pruned.unwrap_or_default());
+        (levels, array.residuals(), pruned, (array.wear(), array.left(), array.stamps()))
     };
     arrays.map(of).collect()
 }
@@ -263,7 +314,8 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(96))]
 
     /// Faults this is made for: words of the pulse before, a remainder held by any pulse but the last, the window
-    /// of the chip in place of the cell's, a column drawn alone from its neighbour's block.
+    /// of the chip in place of the cell's, a column drawn alone from its neighbour's block; a worn cell that moves, a pulse
+    /// that begins at what is read, a stuck cell that forgets.
     #[test]
     fn a_device_answers_in_tick_as_in_every_kernel(case in case()) {
         let mut engines: Vec<_> =
@@ -289,7 +341,7 @@ proptest! {
             prop_assert_eq!(fast.cycles(), slow.cycles());
             let [fast, slow] = [fast, slow].map(|ledger| ledger.entries().collect::<Vec<_>>());
             prop_assert_eq!(fast, slow);
-            for (array, (levels, residuals, pruned)) in want.iter().enumerate() {
+            for (array, (levels, residuals, pruned, (wear, left, stamps))) in want.iter().enumerate() {
                 prop_assert_eq!(levels, &tick.levels(0, array), "levels of {}", array);
                 if let Some(left) = residuals {
                     let left: Vec<_> = left.iter().map(|&left| i64::from(left)).collect();
@@ -298,11 +350,28 @@ proptest! {
                 if !pruned.is_empty() {
                     prop_assert_eq!(pruned, &tick.pruned(0, array));
                 }
-                // every cell in its own window
+                let memories = tick.memories(0, array);
+                for (at, &(spent, beside, when)) in memories.iter().enumerate() {
+                    if let Some(wear) = wear {
+                        prop_assert_eq!(wear[at][0], spent, "pulses of {} in {}", at, array);
+                    }
+                    if let Some(left) = left {
+                        prop_assert_eq!(left[at], beside, "what was left in {} of {}", at, array);
+                    }
+                    if let Some(stamps) = stamps {
+                        prop_assert_eq!(u64::from(stamps[at]), when, "when, in {} of {}", at, array);
+                    }
+                }
+                // every cell that is not stuck in its own window
                 let of = &engines[0].layers()[0].arrays[array];
+                let stuck = |at: usize| of.stuck().iter().any(|cell| {
+                    (cell.row as usize, cell.column as usize)
+                        == (at / case.sizes[1], at % case.sizes[1])
+                });
                 for (at, &level) in levels.iter().enumerate() {
-                    let own = of.own(at / case.sizes[1], at % case.sizes[1]).unwrap();
-                    prop_assert!((own.floor..=own.ceiling).contains(&level));
+                    let own = of.own(at / case.sizes[1], at % case.sizes[1]);
+                    let inside = own.is_none_or(|own| (own.floor..=own.ceiling).contains(&level));
+                    prop_assert!(inside || stuck(at));
                 }
             }
         }
@@ -310,13 +379,22 @@ proptest! {
 
     /// A device whose pulses are levels is no device: the same cells, counts and cycles, with the fused kernels on one side.
     #[test]
-    fn pulses_of_one_level_are_ideal_cells(case in case()) {
+    fn pulses_of_one_level_are_ideal_cells(mut case in case()) {
+        // remainders of cells that do not move follow the level that each law expects: docs/MODEL.md, 3.12
+        let plain = case.chip.with(|h| {
+            (h.endurance, h.ageing, h.faults) = (None, None, Faults::NONE);
+            if h.write.residual_bits.get() > 0 {
+                h.cell.floor_kind = FloorKind::Recoverable;
+            }
+        });
+        case.chip = plain.unwrap();
         let window = case.chip.cell.window;
         let device = DeviceSpec {
             response: Response::Linear(LinearSteps::default()),
             states: u32::from(window.ceiling() - window.floor()),
             asymmetry: Millionths(0),
             noise: PulseNoise::Off,
+            write_noise: Millionths(0),
             spread: CellSpread::default(),
         };
         let with = |device: Option<DeviceSpec>| {
@@ -346,12 +424,17 @@ fn threads_and_back_ends_have_the_same_devices() {
         states: 40,
         asymmetry: Millionths(0),
         noise: PulseNoise::OfStep(Millionths(500_000)),
+        write_noise: Millionths(20_000),
         spread,
     };
     let bits = LevelBits::new(8).unwrap();
     let chip = Hardware::reference().with(|h| {
         h.cell.window = Window::new(20, 220, bits).unwrap();
         h.device = Some(device);
+        let (spread, worn) = (Millionths(500_000), Worn::Ceiling);
+        h.endurance = Some(Endurance { pulses: 6, spread, worn });
+        let (rest, spread) = (Millionths(500_000), Millionths(300_000));
+        h.leakage = Some(Leakage { lost: 1 << 24, every: 1, rest, spread });
     });
     let case = Case {
         seed: 3,

@@ -21,6 +21,18 @@ pub(super) fn gaussian_of(hardware: &Hardware) -> Option<Arc<Gaussian>> {
     needed.then(|| Arc::new(Gaussian::new()))
 }
 
+/// Makes cells of a device, which remember what those of the chip do.
+pub(super) fn make_cells(device: Option<Device>, of: &Hardware, layers: &mut [Layer], seed: u64) {
+    if let Some(device) = device {
+        let device = Arc::new(device);
+        layers.iter_mut().for_each(|layer| layer.fit(&device, seed));
+    }
+    if let Some(law) = of.memory() {
+        let law = Arc::new(law);
+        layers.iter_mut().for_each(|layer| layer.remember(&law, seed));
+    }
+}
+
 /// What a reader does beside the ideal.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Beside {
@@ -54,16 +66,14 @@ fn sd(hardware: &Hardware) -> Option<i64> {
 
 impl Engine {
     /// Makes it another chip of the same kind: which cells are stuck, how their steps and windows differ, what loads leave and what reads
-    /// are off by are drawn with this seed. Levels of cells that were stuck before stay until they are loaded. An engine starts with the
+    /// are off by are drawn with this seed; none of its cells has been pulsed. Levels of cells that were stuck before stay until they are loaded. An engine starts with the
     /// seed of its run.
     pub fn set_chip_seed(&mut self, seed: u64) {
         self.chip_seed = seed;
         self.load_words.iter_mut().for_each(Vec::clear);
         let differs = |device: &Device| device.differs() != [false; 2];
-        if let Some(device) = self.hardware.device().filter(differs) {
-            let device = Arc::new(device);
-            self.layers.iter_mut().for_each(|layer| layer.fit(&device, seed));
-        }
+        let device = self.hardware.device().filter(differs);
+        make_cells(device, &self.hardware, &mut self.layers, seed);
         (0..self.layers.len()).for_each(|layer| self.levels_moved(layer));
         self.draw_faults();
     }

@@ -101,7 +101,7 @@ impl Engine {
                 self.charge(layer, pathway.code, During::Update, event, count);
             }
         }
-        self.layers[layer].writes.iter_mut().for_each(|writes| *writes += 1);
+        self.end_writes(layer);
         if let Some(timing) = self.hardware.timing {
             for &target in wiring.targets() {
                 let code = Self::code_of(wiring, target);

@@ -120,7 +120,7 @@ impl Engine {
                 }
             }
         }
-        self.layers[layer].writes.iter_mut().for_each(|writes| *writes += 1);
+        self.end_writes(layer);
         self.charge_cells(layer, Event::DeltaComputations, 1);
         let remainder = 2 * u64::from(self.hardware.write.residual_bits.get());
         self.charge_cells(layer, Event::SramBits, remainder);

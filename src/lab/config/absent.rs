@@ -121,6 +121,7 @@ impl Config {
             }
             (_, "stuck_cells") => !self.hardware.has_stuck_cells(),
             (_, "ir_drop") if self.hardware.wires.is_some() => false,
+            (_, "endurance") => self.hardware.endurance.is_none(),
             (_, "read_noise") => self.hardware.read_noise.is_none(),
             (_, "programming_noise") => self.hardware.programming.is_none(),
             (_, "write_nonlinearity") => self.hardware.device.is_none(),

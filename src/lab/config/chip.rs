@@ -109,8 +109,7 @@ pub(super) fn resolve(file: &mut HardwareFile, prefix: &str) -> Result<Hardware,
     let slices = Slices { mode, converter, count: drive_bits.get().div_ceil(dac_bits), dac_bits };
     let timing = file.timing.as_mut().map(|table| timing(table, &slices, &key)).transpose()?;
     let window_end = (window.ceiling(), light);
-    let device::Flaws { faults, fault_map, conductance, wires, read_noise, programming, drift: _ } =
-        device::flaws(file.device.as_ref(), window_end, &key)?;
+    let flaws = device::flaws(file.device.as_ref(), window_end, &key)?;
     let spec = HardwareSpec {
         cell: CellSpec { level_bits, window, floor_kind },
         tile: TileSpec { rows: tile_rows, columns: tile_columns, count_max, transposed_read },
@@ -120,12 +119,15 @@ pub(super) fn resolve(file: &mut HardwareFile, prefix: &str) -> Result<Hardware,
         write: WriteSpec { increment_max, dither_bits, dither_pattern, residual_bits, scheme },
         device,
         timing,
-        faults,
-        fault_map,
-        conductance,
-        wires,
-        read_noise,
-        programming,
+        faults: flaws.faults,
+        fault_map: flaws.fault_map,
+        conductance: flaws.conductance,
+        wires: flaws.wires,
+        read_noise: flaws.read_noise,
+        programming: flaws.programming,
+        endurance: flaws.endurance,
+        leakage: flaws.leakage,
+        ageing: flaws.ageing,
     };
     Hardware::new(spec)
         .map_err(|HardwareError { key: at, found, allowed }| wrong(&key(at), found, allowed))

@@ -11,13 +11,15 @@ use crate::chip::hardware::Window;
 mod currents;
 mod fault_list;
 mod flaws;
+mod lasting;
 mod response;
 
 pub(super) use fault_list::listed;
 
 pub(super) use currents::{ConductanceFile, WiresFile};
 pub use flaws::Retention;
-pub(super) use flaws::{DriftFile, FaultsFile, Flaws, ProgrammingFile, ReadNoiseFile, flaws};
+pub(super) use flaws::{DriftFile, FaultsFile, ProgrammingFile, ReadNoiseFile, flaws};
+pub(super) use lasting::{EnduranceFile, LeakageFile};
 pub(super) use response::{ResponseFile, SpreadFile};
 
 keys! {
@@ -39,6 +41,10 @@ keys! {
         programming: ProgrammingFile,
         /// What time does to levels, between programming and reading (`dalean eval --after`).
         drift: DriftFile,
+        /// How many pulses cells take.
+        endurance: EnduranceFile,
+        /// What volatile cells forget while they learn.
+        leakage: LeakageFile,
     }
 }
 

@@ -7,10 +7,8 @@
 
 use std::num::NonZeroU32;
 
-use super::device::listed;
 use super::{Config, ConfigError, Select, TrainOn};
 use crate::chip::crossbar::kernel::ConvShape;
-use crate::chip::device::{CellSpread, DeviceSpec, Faults, PulseNoise, Reference};
 use crate::chip::hardware::{
     Adc, AdcRange, CellSpec, DigitalSpec, DitherBits, DitherPattern, DriveSpec, FloorKind,
     HardwareSpec, PulseCode, Subtract, TileSpec, Timing, WriteScheme, WriteSpec,
@@ -20,9 +18,11 @@ use crate::learn::error::{Centre, OutputError};
 use crate::learn::network::NetworkSpec;
 use crate::learn::route::Route;
 use crate::learn::rule::{Control, Rule, UpdateMode};
-use crate::num::tables::{Activation, Decay, SpreadLaw};
+use crate::num::tables::{Activation, Decay};
 use crate::task::classify::{Augment, Coding, Experiment, WHITE_NAME};
 use crate::task::policy::{Evaluating, Evolution, InputCoding, Method, PolicyExperiment, Ppo};
+
+mod cells;
 
 /// Frozen defaults: of keys of a layer under `layer`, whatever its number.
 const FROZEN: &[(&str, &str)] = &[
@@ -102,6 +102,10 @@ const FROZEN: &[(&str, &str)] = &[
     ("faults.map", "none"),
     ("conductance.least", "0"),
     ("wires.segment", "0"),
+    ("device.write_noise", "0"),
+    ("endurance", "none"),
+    ("leakage", "none"),
+    ("ageing", "none"),
 ];
 
 /// Key and word.
@@ -431,34 +435,6 @@ impl List {
         put("homeostasis_window_log2", window_log2);
     }
 
-    fn device(&mut self, device: &DeviceSpec) {
-        let DeviceSpec { response, states, asymmetry, noise, spread } = device;
-        let CellSpread { step_law, step, asymmetry: lean, ceiling, floor } = spread;
-        // millionths, as integers
-        let numbers: Vec<_> = response.numbers().iter().map(|n| n.0.to_string()).collect();
-        let response = format!("{} {}", response.name(), numbers.join(" "));
-        self.put("device.response", response);
-        self.put("device.states", states);
-        self.put("device.asymmetry", asymmetry.0);
-        let noise = match *noise {
-            PulseNoise::Off => "off".into(),
-            PulseNoise::OfStep(share) => format!("of_step {}", share.0),
-            PulseNoise::OfWindow(share) => format!("of_window {}", share.0),
-        };
-        self.put("device.noise", noise);
-        let law = match step_law {
-            SpreadLaw::Normal => "normal",
-            SpreadLaw::LogNormal => "log_normal",
-        };
-        if step.0 != 0 {
-            self.put("device.spread.step_law", law);
-        }
-        self.put("device.spread.step", step.0);
-        self.put("device.spread.asymmetry", lean.0);
-        self.put("device.spread.ceiling", ceiling.0);
-        self.put("device.spread.floor", floor.0);
-    }
-
     fn chip(&mut self, hardware: &HardwareSpec) {
         let HardwareSpec {
             cell,
@@ -475,6 +451,9 @@ impl List {
             wires,
             read_noise,
             programming,
+            endurance,
+            leakage,
+            ageing,
         } = hardware;
         let CellSpec { level_bits, window, floor_kind } = cell;
         let TileSpec { rows, columns, count_max, transposed_read } = tile;
@@ -540,20 +519,11 @@ impl List {
         if let Some(timing) = *timing {
             self.timing(timing);
         }
-        let Faults { floor, ceiling, any } = faults;
-        self.put("faults.floor", floor.get());
-        self.put("faults.ceiling", ceiling.get());
-        self.put("faults.any", any.get());
-        self.put("faults.map", listed(fault_map));
-        let off = conductance.map(|of| match of.reference {
-            Reference::None => of.least.to_string(),
-            Reference::Column => format!("{} and a reference column", of.least),
-        });
-        self.put("conductance.least", off.unwrap_or_else(|| "0".into()));
-        self.put("wires.segment", wires.map_or(0, |of| of.segment));
+        self.faults(*faults, fault_map);
+        self.currents(*conductance, *wires);
         self.put("read_noise.sigma", read_noise.map_or(0, |noise| noise.sigma));
-        let sigma = programming.map(|loads| loads.coefficients.map(|c| c.to_string()).join(" "));
-        self.put("programming.sigma", sigma.unwrap_or_else(|| "none".into()));
+        self.loads(*programming);
+        self.memory(*endurance, *leakage, *ageing);
     }
 
     /// The clock turns cycles into seconds and is read by no schedule: it is no part of what decides a run.

@@ -166,7 +166,7 @@ fn provenance(file: &HardwareFile) -> Vec<(&'static str, Option<&str>, Option<&s
             }
         )*};
     }
-    device!(response spread faults conductance wires read_noise programming drift);
+    device!(response spread faults conductance wires read_noise programming drift endurance leakage);
     if let Some(super::file::AdcFile::Finite(table)) = &file.adc {
         all.push(("adc", table.source.as_deref(), table.kind.as_deref()));
     }

@@ -151,7 +151,7 @@ fn complete(hw: &mut HardwareFile, settings: &[String]) {
             }
         )*};
     }
-    device!(response spread faults read_noise programming drift);
+    device!(response spread faults conductance wires read_noise programming drift endurance leakage);
     if let Some(AdcFile::Finite(table)) = &mut hw.adc {
         settle("adc", &mut table.source, &mut table.kind);
     }

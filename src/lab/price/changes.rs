@@ -75,6 +75,9 @@ pub fn changes(run: &Hardware, other: &Hardware) -> Vec<Change> {
         wires,
         read_noise,
         programming,
+        endurance,
+        leakage,
+        ageing,
     } = &**run;
     let CellSpec { level_bits, window, floor_kind } = cell;
     let TileSpec { rows, columns, count_max: _, transposed_read: _ } = tile;
@@ -105,6 +108,9 @@ pub fn changes(run: &Hardware, other: &Hardware) -> Vec<Change> {
     differ("device.conductance", *conductance != other.conductance, LEARNT, true);
     differ("device.wires", *wires != other.wires, LEARNT, true);
     differ("device.programming", *programming != other.programming, LEARNT, true);
+    differ("device.endurance", *endurance != other.endurance, LEARNT, true);
+    differ("device.drift.update_s", *ageing != other.ageing, LEARNT, true);
+    differ("device.leakage", *leakage != other.leakage, LEARNT, true);
     differ("device.read_noise", *read_noise != other.read_noise, LEARNT, true);
     differ("write.scheme", *scheme != other.write.scheme, SCHEME, true);
     differ("device", *device != other.device, LEARNT, true);

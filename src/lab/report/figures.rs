@@ -20,6 +20,7 @@ mod saturation;
 mod time;
 mod timelines;
 mod turnover;
+mod wear;
 mod writes;
 
 use super::number::float;
@@ -55,7 +56,7 @@ const CLASSIFY: Of = Some("classify");
 const POLICY: Of = Some("policy");
 
 /// All figures, in the order of the page, each with the task that it belongs to.
-pub(super) const ALL: [(Of, Draw); 18] = [
+pub(super) const ALL: [(Of, Draw); 19] = [
     (CLASSIFY, accuracy::draw),
     (CLASSIFY, confusion::draw),
     (CLASSIFY, mistakes::draw),
@@ -68,6 +69,7 @@ pub(super) const ALL: [(Of, Draw); 18] = [
     (CLASSIFY, fields::draw),
     (None, heat::draw),
     (None, writes::draw),
+    (None, wear::draw),
     (None, saturation::draw),
     (None, time::draw),
     (None, energy::draw),

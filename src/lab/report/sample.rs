@@ -123,6 +123,7 @@ fn record(layers: &[(usize, usize, &[&str])], epoch: u32) -> EpochRecord {
                 idle: [[0, rows as u64], [0, columns as u64], [0, 1]],
                 histogram,
                 training: counts(1),
+                wear: None,
             });
         }
     }

@@ -148,6 +148,14 @@ pub(super) const COLUMNS: &[(&str, &str)] = &[
         "Cells at the lower end of the programming window after the last epoch, of the cells.",
     ),
     ("pruned_fraction", "Cells that an absorbing floor holds for good, of the cells."),
+    (
+        "worn_fraction",
+        "Cells that have taken all pulses they take (hw.device.endurance), of the cells.",
+    ),
+    (
+        "pulses_a_cell",
+        "Pulses given over the whole training, after the bound, over the cells: what endurance is asked for.",
+    ),
     ("ei_ratio", "Sum of excitatory levels over sum of inhibitory levels, all layers."),
     ("pulses_attempted", "Pulses given to cells over the whole training, after the bound."),
     ("pulses_effective", "Of these, pulses that moved their cell."),

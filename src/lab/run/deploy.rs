@@ -179,8 +179,9 @@ pub fn moments(config: &Config, deployment: &Deployment) -> Result<Vec<Moment>, 
         let allowed = "give hw.device.drift with --set, or --hw with a model that has it, such as hw_models/own/pcm_drift.toml";
         return Err(wrong("hw.device.drift", "is missing", allowed));
     };
+    let ends = [hardware.cell.window.ceiling(), hardware.level_greatest()];
     let at = |&seconds: &f64| {
-        let tables = drift.after(seconds, hardware.cell.window.ceiling()).ok_or_else(|| {
+        let tables = drift.after(seconds, ends).ok_or_else(|| {
             let found = format!("is {seconds} s");
             let start = drift.start_s();
             let allowed = format!("levels are of {start} s after programming: give that or more");
@@ -208,15 +209,24 @@ pub fn unread(deployment: &Deployment) -> Result<Option<String>, RunError> {
 }
 
 /// Keys that only a pulse has to do with.
-const UNREAD: [&str; 3] =
-    ["hw.device.response", "hw.device.spread.step", "hw.device.spread.asymmetry"];
+const UNREAD: [&str; 7] = [
+    "hw.device.response",
+    "hw.device.spread.step",
+    "hw.device.spread.asymmetry",
+    "hw.device.endurance",
+    "hw.device.leakage",
+    "hw.device.drift.update_s",
+    "hw.device.drift.every",
+];
+/// Tables that only a pulse has to do with, the spread where it has no windows.
+const PULSED: [&str; 4] = ["response", "spread", "endurance", "leakage"];
 
 /// Takes the tables out that only pulses have to do with; their names.
 fn without_pulses(device: &mut toml::Table) -> Vec<&'static str> {
     let windows =
         |spread: &toml::Value| ["ceiling", "floor"].iter().any(|key| spread.get(key).is_some());
     let read = device.get("spread").is_some_and(windows);
-    let names = ["response", "spread"].into_iter().filter(|name| *name == "response" || !read);
+    let names = PULSED.into_iter().filter(|name| *name != "spread" || !read);
     names.filter(|name| device.remove(*name).is_some()).collect()
 }
 

@@ -7,6 +7,7 @@
 //! still     a layer received no pulse in an epoch, at whose start the schedule had left 1/16 of its rate at least
 //! mute      the units of a layer put out the same whatever was shown
 //! forgot    an epoch knows less than half of the right answers of an earlier one
+//! worn      cells that were sent as many pulses as they take, and the first epoch with one
 //! chance    (correct - constant)^2 <= 9 constant (total - constant) / total, of the test, else of the last epoch;
 //!           constant: right answers of always naming the most frequent class. Of fewer than 50 answers, and where all
 //!           are right, correct <= constant
@@ -71,6 +72,7 @@ struct LayerSeen {
 pub(super) struct Watcher {
     layers: Vec<LayerSeen>,
     best: u64,
+    worn: Option<Note>,
     forgot: Option<Note>,
     answers: Option<Score>,
 }
@@ -123,6 +125,7 @@ impl Watcher {
                 new.extend(mute(layer.layer, seen.mute).filter(|_| seen.mute.epochs == 1));
             }
         }
+        new.extend(self.wear(record));
         self.answers = record.outcome.answers().filter(|_| epoch > 0);
         if let Some(Score { correct, .. }) = record.outcome.answers() {
             if correct.saturating_mul(2) < self.best && self.forgot.is_none() {
@@ -132,6 +135,22 @@ impl Watcher {
             self.best = self.best.max(correct);
         }
         new
+    }
+
+    /// Takes what is worn out; a note of the first cell.
+    fn wear(&mut self, record: &EpochRecord) -> Option<Note> {
+        let wear = record.pathways.iter().filter_map(|one| one.wear.as_ref());
+        let worn: u64 = wear.map(|wear| wear.worn).sum();
+        if worn == 0 {
+            return None;
+        }
+        let epoch = match self.worn {
+            Some(Note::Worn { epoch, .. }) => epoch,
+            _ => record.epoch,
+        };
+        let cells = record.pathways.iter().map(|one| one.cells).sum();
+        let before = self.worn.replace(Note::Worn { worn, cells, epoch });
+        self.worn.clone().filter(|_| before.is_none())
     }
 
     /// Everything so far, layer by layer; the test set was read with the given result.
@@ -148,7 +167,8 @@ impl Watcher {
             }
             None => self.answers.map(|score| (score, score.total.div_ceil(classes.max(1) as u64))),
         };
-        layers.chain(self.forgot.clone()).chain(answers.and_then(chance)).collect()
+        let worn = self.worn.clone();
+        layers.chain(worn).chain(self.forgot.clone()).chain(answers.and_then(chance)).collect()
     }
 }
 

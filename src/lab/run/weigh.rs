@@ -72,7 +72,17 @@ impl Memory {
         let planes = if hardware.cell.level_bits.get() > 8 { 2 } else { 1 };
         let residual = if hardware.write.residual_bits.get() > 0 { 2 } else { 0 };
         let absorbs = hardware.cell.floor_kind == FloorKind::Absorbing;
-        let pruned = u64::from(absorbs || hardware.has_stuck_cells());
+        let wears = hardware.endurance.is_some();
+        let pruned = u64::from(absorbs || wears || hardware.has_stuck_cells());
+        let beside = hardware.device.as_ref().is_some_and(|device| device.write_noise.0 != 0);
+        let beside = beside || hardware.ageing.is_some();
+        let drifts = hardware.ageing.is_some();
+        let forgets = hardware.leakage.is_some_and(|of| of.spread.0 != 0);
+        // a count is written with 8 bytes
+        let memory = 16 * u64::from(wears)
+            + 4 * u64::from(beside)
+            + 4 * u64::from(forgets)
+            + 16 * u64::from(drifts);
         let through = 3 * u64::from(hardware.wires.is_some());
         let spread = hardware.device.as_ref().map(|device| device.spread);
         let own = spread
@@ -83,7 +93,7 @@ impl Memory {
             let arrays = layer.wiring.pathways().len() as u64;
             let cells = |cells: usize| (cells as u64).saturating_mul(arrays);
             let stored = cells(layout.cells_padded())
-                .saturating_mul(planes + residual + pruned + own + through);
+                .saturating_mul(planes + residual + pruned + own + through + memory);
             let together = u64::from(batch.get()).max(READ_TOGETHER);
             let reads = together.saturating_mul(layer.positions() as u64);
             let sets = layer.drive_sets().len() * rows;

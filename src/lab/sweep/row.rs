@@ -66,6 +66,12 @@ impl Facts<'_> {
         self.last.pathways.iter().map(of).sum()
     }
 
+    /// Cells that are worn out, where cells wear out.
+    fn worn(&self) -> Option<u64> {
+        let wear = self.last.pathways.iter().map(|one| one.wear.as_ref());
+        wear.map(|wear| wear.map(|wear| wear.worn)).sum()
+    }
+
     fn levels(&self, bank: usize) -> u64 {
         self.last.layers.iter().map(|layer| layer.levels[bank]).sum()
     }
@@ -137,6 +143,8 @@ pub const RESULTS: &[ResultColumn] = results![
     "cells", "cells", Count, Whole, |f| Some(f.pathways(|p| p.cells).into());
     "floor_fraction", "cells at the floor", Fraction, Quotient, |f| over(f.pathways(|p| p.floor), f.pathways(|p| p.cells));
     "pruned_fraction", "cells pruned for good", Fraction, Quotient, |f| over(f.pathways(|p| p.pruned), f.pathways(|p| p.cells));
+    "worn_fraction", "cells worn out", Fraction, Quotient, |f| f.worn().and_then(|worn| over(worn, f.pathways(|p| p.cells)));
+    "pulses_a_cell", "pulses a cell was given", Plain, Quotient, |f| over(f.event("pulses_attempted"), f.pathways(|p| p.cells));
     "ei_ratio", "E/I of stored levels", Plain, Quotient, |f| over(f.levels(0), f.levels(1));
     "pulses_attempted", "pulses given", Count, Whole, |f| Some(f.event("pulses_attempted").into());
     "pulses_effective", "pulses that moved a cell", Count, Whole, |f| Some(f.event("pulses_effective").into());

@@ -2,9 +2,10 @@
 
 use dalean::HardwareSpec;
 use dalean::hardware::{
-    CellSpread, Chance, Conductance, DeviceSpec, ExponentialSteps, FaultMap, Faults, LinearSteps,
-    ListedCell, MeasuredSteps, Millionths, NeurosimSteps, Programming, PulseNoise, ReadNoise,
-    Reference, Response, SoftBoundSteps, SpreadLaw, StuckAt, TableSteps, Wires,
+    Ageing, CellSpread, Chance, Conductance, DeviceSpec, DriftRates, Endurance, ExponentialSteps,
+    FaultMap, Faults, Leakage, LinearSteps, ListedCell, MeasuredSteps, Millionths, NeurosimSteps,
+    Programming, PulseNoise, ReadNoise, Reference, Response, SoftBoundSteps, SpreadLaw, StuckAt,
+    TableSteps, Wires, Worn,
 };
 
 use super::Choices;
@@ -86,6 +87,7 @@ pub(super) fn devices(c: &mut Choices<'_>, spec: &mut HardwareSpec) {
             1 => PulseNoise::OfStep(part(c)),
             _ => PulseNoise::OfWindow(part(c)),
         },
+        write_noise: part(c),
         spread: spread(c),
     });
     if c.one_in(2) {
@@ -104,4 +106,23 @@ pub(super) fn devices(c: &mut Choices<'_>, spec: &mut HardwareSpec) {
     let coefficient = |c: &mut Choices<'_>| c.near(-(4 << 24), 4 << 24);
     spec.programming =
         c.one_in(3).then(|| Programming { coefficients: std::array::from_fn(|_| coefficient(c)) });
+    spec.endurance = c.one_in(3).then(|| Endurance {
+        pulses: (c.near(0, 1 << 32).unsigned_abs() >> (c.byte() % 33)) as u32,
+        spread: part(c),
+        worn: c.of(&[Worn::Level, Worn::Floor, Worn::Ceiling]),
+    });
+    spec.ageing = c.one_in(4).then(|| Ageing {
+        rates: match c.byte() % 2 {
+            0 => DriftRates::Power([parts(c), parts(c)]),
+            _ => DriftRates::Log(parts(c)),
+        },
+        since: c.near(-(100 << 16), 100 << 16),
+        every: c.near(0, 1 << 20) as u32,
+    });
+    spec.leakage = c.one_in(3).then(|| Leakage {
+        lost: (c.near(0, 1 << 32).unsigned_abs() >> (c.byte() % 33)) as u32,
+        every: c.near(0, 1 << 20) as u32,
+        rest: part(c),
+        spread: part(c),
+    });
 }

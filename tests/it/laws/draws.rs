@@ -162,7 +162,7 @@ fn a_level_falls_by_the_power_of_time_with_its_spread() {
         [(200u16, 4320.0, 0.049, 0.008), (60, 1.5e6, 0.046_827, 0.012_187)]
     {
         let nu = f64::max(nu, 0.049);
-        let tables = DriftTables::new(pcm_drift(), 255, ratio);
+        let tables = DriftTables::new(pcm_drift(), [255; 2], ratio);
         let aged =
             g.iter().zip(&r).map(|(&g, &r)| f64::from(tables.aged(&gaussian, level, [g, r], 255)));
         let aged: Vec<f64> = aged.collect();
@@ -184,7 +184,8 @@ fn nothing_has_moved_at_the_start_and_no_level_leaves_its_range() {
     let gaussian = Gaussian::new();
     let log = DriftLaw::Log { change: -0.01, spread: 0.5 };
     for law in [pcm_drift(), log] {
-        let (now, late) = (DriftTables::new(law, 255, 1.0), DriftTables::new(law, 255, 1e12));
+        let (now, late) =
+            (DriftTables::new(law, [255; 2], 1.0), DriftTables::new(law, [255; 2], 1e12));
         for level in 0..=255 {
             for word in (0..=u16::MAX).step_by(257) {
                 assert_eq!(now.aged(&gaussian, level, [word, !word], 255), level);
@@ -196,7 +197,7 @@ fn nothing_has_moved_at_the_start_and_no_level_leaves_its_range() {
 
 #[test]
 fn a_logarithm_moves_all_levels_alike() {
-    let tables = DriftTables::new(DriftLaw::Log { change: -0.01, spread: 0.0 }, 100, 1000.0);
+    let tables = DriftTables::new(DriftLaw::Log { change: -0.01, spread: 0.0 }, [100; 2], 1000.0);
     let gaussian = Gaussian::new();
     let aged = [0, 2, 50, 100].map(|level| tables.aged(&gaussian, level, [9, 0], 100));
     assert_eq!(aged, [0, 0, 47, 97]);

@@ -2,7 +2,7 @@
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
 use super::chacha::Draws;
-use super::respond::Answering;
+use super::respond::{Answering, Remembered};
 use crate::chip::crossbar::layout::{BLOCK_ROWS, HALF_CELLS, PANEL_COLUMNS};
 
 /// Sums, or levels, of a half block. Sums lie row-major, `[64 rows][16 columns]`; levels, residuals
@@ -265,6 +265,8 @@ pub struct Cells<'a> {
     pub pulses: Option<Pulsed<'a>>,
     /// What cells answer to pulses with, if they are not ideal.
     pub answering: Option<Answering<'a>>,
+    /// What such cells remember beside their level, if anything.
+    pub remembered: Option<Remembered<'a>>,
 }
 
 impl Cells<'_> {

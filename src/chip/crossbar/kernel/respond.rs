@@ -9,6 +9,8 @@
 //! words      of the cell, site 4 (16 bits) and 14 (8 bits), sub: the pulse of the write, from 0
 //! ```
 //!
+//! What cells remember beside their level is dealt with before all pulses and after them: `remembered`.
+//!
 //! Words that no cell of a column takes are not drawn. [`law`] goes cell by cell; where a back end has a twin of its pulse
 //! and a device's numbers fit 32 bits, [`side_by_side`] does the same. See docs/MODEL.md, 3.11.
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
@@ -21,8 +23,10 @@ use crate::num::draw::{Place, Site};
 use crate::num::fixed::narrow;
 
 mod lanes;
+mod remembered;
 
 pub(super) use lanes::{Sent, Words, pulse};
+pub use remembered::Remembered;
 
 /// So many columns with a pulse make it worth drawing the words of all sixteen at once.
 const ALL_AT_ONCE: u32 = 4;
@@ -41,6 +45,8 @@ pub struct Answers {
     rows: usize,
     /// By pulse: words of rounding and of noise.
     draws: Vec<[Draws; 2]>,
+    /// Words of what a write leaves beside a level, where it leaves something.
+    beside: Vec<(Draws, Half<u16>)>,
     /// Cells with a pulse.
     sent: Sent,
 }
@@ -61,7 +67,7 @@ impl Answers {
     #[must_use]
     pub const fn new(place: Place, rows: usize) -> Self {
         let (rounding, noise) = ([0; HALF_CELLS], [0; HALF_CELLS]);
-        Self { rounding, noise, place, rows, draws: vec![], sent: Sent::NONE }
+        Self { rounding, noise, place, rows, draws: vec![], beside: vec![], sent: Sent::NONE }
     }
 
     /// Draws the words of a pulse for the columns of a mask.
@@ -96,19 +102,69 @@ impl Answers {
                 }
             }
             if noisy {
-                for group in 0..2 {
-                    let words = noise.place().halves(self.rows, column + c, 2 * block + group);
-                    for (row, word) in words.into_iter().enumerate() {
-                        self.noise[in_half(32 * group + row, c)] = word;
-                    }
-                }
+                column_halves(noise, self.rows, (column, c, block), &mut self.noise);
             }
+        }
+    }
+
+    /// Draws the words of what a write leaves beside a level, for the columns of a mask.
+    fn draw_beside(&mut self, kernel: &Kernel, (column, block): (usize, usize), columns: u16) {
+        if self.beside.is_empty() {
+            let of = |sub| Place { site: Site::WriteNoise, sub, ..self.place };
+            let of = |sub| (Draws::new(of(sub), self.rows), [0; HALF_CELLS]);
+            self.beside.extend([0, 1].map(of));
+        }
+        for (draws, words) in &mut self.beside {
+            if columns.count_ones() >= ALL_AT_ONCE {
+                kernel.dither_words(draws, column, block, words);
+                continue;
+            }
+            for c in (0..HALF_COLUMNS).filter(|c| columns >> c & 1 == 1) {
+                column_halves(draws, self.rows, (column, c, block), words);
+            }
+        }
+    }
+
+    /// Those of a cell.
+    fn beside(&self, at: usize) -> [u16; 2] {
+        [self.beside[0].1[at], self.beside[1].1[at]]
+    }
+}
+
+/// Words of 16 bits of a column of a half block, of an array of so many rows.
+fn column_halves(
+    draws: &Draws,
+    rows: usize,
+    (column, c, block): (usize, usize, usize),
+    out: &mut Half<u16>,
+) {
+    for group in 0..2 {
+        let words = draws.place().halves(rows, column + c, 2 * block + group);
+        for (row, word) in words.into_iter().enumerate() {
+            out[in_half(32 * group + row, c)] = word;
         }
     }
 }
 
 /// What cells of a half block answer. Returns by how many levels pulses moved them.
 pub(super) fn respond(
+    kernel: &Kernel,
+    cells: &mut Cells<'_>,
+    answering: &mut Answering<'_>,
+    (pulses, groups): (&Half<i8>, u16),
+    ends: Ends,
+) -> u64 {
+    let Some(mut remembered) = cells.remembered.take() else {
+        return answer(kernel, cells, answering, (pulses, groups), ends);
+    };
+    let sending = remembered.before(cells, pulses, groups);
+    let effective = answer(kernel, cells, answering, (&sending.pulses, groups), ends);
+    remembered.after(kernel, cells, (pulses, groups, &sending), answering);
+    effective
+}
+
+/// The same of cells that remember nothing else.
+fn answer(
     kernel: &Kernel,
     cells: &mut Cells<'_>,
     answering: &mut Answering<'_>,

@@ -155,6 +155,12 @@ impl Network {
         self.layers[layer].residuals(array)
     }
 
+    /// Of each cell of an array, row by row: pulses that it was sent, what those left, and in which write.
+    #[must_use]
+    pub fn memories(&self, layer: usize, array: usize) -> Vec<(u32, u16, u64)> {
+        self.layers[layer].memories(array)
+    }
+
     /// What `rms` follows in a layer, and how often its factor was held.
     #[must_use]
     pub fn followed(&self, layer: usize) -> [i64; 2] {
@@ -258,6 +264,7 @@ impl Network {
                 Segment::LoadWeights { layer, array, row, levels } => {
                     let left = self.layers[layer].programmed(array, row, levels);
                     let code = self.layers[layer].load_row(array, row, &left);
+                    self.layers[layer].count_loads(array, row);
                     self.charge(
                         layer,
                         code,

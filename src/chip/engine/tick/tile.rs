@@ -15,6 +15,7 @@ mod conducting;
 mod config;
 mod device;
 mod events;
+mod memory;
 mod network;
 mod optimise;
 mod read;
@@ -30,6 +31,7 @@ pub(super) use config::TileNoise;
 pub use config::{More, Squares, TileAdc, TileConfig, TileSize, TileUnits};
 pub(super) use device::{TileDevice, laws};
 pub use events::{BankEvents, TileEvents};
+pub(super) use memory::{Memories, TileMemory, differing};
 use optimise::Kept;
 pub(super) use optimise::Said;
 
@@ -214,6 +216,8 @@ pub struct Tile {
     readings: TileReadings,
     /// What cells are made of, if they are not ideal.
     device: Option<Box<TileDevice>>,
+    /// What they remember, if anything.
+    memory: Option<Box<TileMemory>>,
     /// By bank: levels, and what they let through, where that is not the level itself.
     through: [Through; 2],
 }
@@ -271,6 +275,7 @@ impl Tile {
             looked_up: false,
             readings: TileReadings::default(),
             device: None,
+            memory: None,
             through: Default::default(),
             size,
             config,

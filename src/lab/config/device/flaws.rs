@@ -2,8 +2,11 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{DeviceFile, currents, fault_list};
-use crate::chip::device::{Chance, Conductance, FaultMap, Faults, Programming, ReadNoise, Wires};
+use super::{DeviceFile, currents, fault_list, lasting};
+use crate::chip::device::{
+    Ageing, Chance, Conductance, Endurance, FaultMap, Faults, Leakage, Programming, ReadNoise,
+    Wires,
+};
 use crate::lab::config::ConfigError;
 use crate::lab::config::check::wrong;
 use crate::lab::config::file::keys;
@@ -48,6 +51,10 @@ keys! {
         change: f64,
         /// Its standard deviation from cell to cell.
         change_spread: f64,
+        /// Seconds from one write of an array to the next while a net learns: levels drift meanwhile, each since the write that last pulsed its cell.
+        update_s: f64,
+        /// Writes of an array from one look to the next: levels are brought to where they have drifted to.
+        every: i64,
         /// Where the numbers come from.
         source: String,
         /// How far to trust the numbers.
@@ -88,6 +95,9 @@ pub(in crate::lab::config) struct Flaws {
     pub(in crate::lab::config) read_noise: Option<ReadNoise>,
     pub(in crate::lab::config) programming: Option<Programming>,
     pub(in crate::lab::config) drift: Option<Retention>,
+    pub(in crate::lab::config) endurance: Option<Endurance>,
+    pub(in crate::lab::config) leakage: Option<Leakage>,
+    pub(in crate::lab::config) ageing: Option<Ageing>,
 }
 
 /// How levels drift, and since when.
@@ -98,11 +108,11 @@ pub struct Retention {
 }
 
 impl Retention {
-    /// Tables for so many seconds after programming, of levels up to `level_max`; none before its start.
+    /// Tables for so many seconds after programming, of levels up to `greatest` on a chip of that ceiling; none before its start.
     #[must_use]
-    pub fn after(&self, seconds: f64, level_max: u16) -> Option<DriftTables> {
+    pub fn after(&self, seconds: f64, ends: [u16; 2]) -> Option<DriftTables> {
         let ratio = seconds / self.start_s;
-        (1.0..=1e30).contains(&ratio).then(|| DriftTables::new(self.law, level_max, ratio))
+        (1.0..=1e30).contains(&ratio).then(|| DriftTables::new(self.law, ends, ratio))
     }
 
     /// Seconds after programming that levels are of.
@@ -129,6 +139,8 @@ pub(in crate::lab::config) fn flaws(
         read_noise,
         programming,
         drift,
+        endurance,
+        leakage,
     } = device.unwrap_or(&none);
     let faults = faults.as_ref().map(|table| stuck(table, key)).transpose()?;
     let (faults, fault_map) = faults.unwrap_or((Faults::NONE, FaultMap::default()));
@@ -143,6 +155,9 @@ pub(in crate::lab::config) fn flaws(
         read_noise: read_noise.as_ref().map(|table| noise(table, key)).transpose()?,
         programming: programming.as_ref().map(|table| loads(table, key)).transpose()?,
         drift: drift.as_ref().map(|table| retention(table, key)).transpose()?,
+        endurance: endurance.as_ref().map(|table| lasting::endurance(table, key)).transpose()?,
+        leakage: leakage.as_ref().map(|table| lasting::leakage(table, key)).transpose()?,
+        ageing: drift.as_ref().map_or(Ok(None), |table| lasting::ageing(table, key))?,
     })
 }
 

@@ -42,6 +42,8 @@ keys! {
         noise: f64,
         /// What that is a share of.
         noise_of: String,
+        /// Standard deviation of what a write leaves beside the level that its pulses reached, in windows: reads see it, and the next pulse begins where pulses had left the cell.
+        write_noise: f64,
         /// Where the numbers come from.
         source: String,
         /// How far to trust the numbers.
@@ -79,7 +81,7 @@ const CURVES: [(&str, &[&str]); 6] = [
 type Key<'a> = &'a dyn Fn(&str) -> String;
 
 /// A number with at most six places behind the point, as it is kept.
-fn millionths(key: &str, value: f64) -> Result<Millionths, ConfigError> {
+pub(super) fn millionths(key: &str, value: f64) -> Result<Millionths, ConfigError> {
     let fine = (value * 1e6).round();
     let close = (fine - value * 1e6).abs() <= 1e-9 * fine.abs().max(1.0);
     if !close || fine.abs() > 1e15 {
@@ -186,6 +188,7 @@ pub(super) fn resolve(
         states,
         asymmetry,
         noise,
+        write_noise: above(&at("write_noise"), file.write_noise, "without the key there is none")?,
         spread: spread.map_or(Ok(CellSpread::default()), |table| differences(table, key))?,
     };
     device

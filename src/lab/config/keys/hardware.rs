@@ -3,8 +3,8 @@
 use super::KeyFileKind::Hardware;
 use super::{KeyEntry, KeyTable, KeyValues, flag, key, other, real, whole, words};
 use crate::lab::config::device::{
-    ConductanceFile, DeviceFile, DriftFile, FaultsFile, ProgrammingFile, ReadNoiseFile,
-    ResponseFile, SpreadFile, WiresFile,
+    ConductanceFile, DeviceFile, DriftFile, EnduranceFile, FaultsFile, LeakageFile,
+    ProgrammingFile, ReadNoiseFile, ResponseFile, SpreadFile, WiresFile,
 };
 use crate::lab::config::file::{
     AdcTable, CellFile, DriveFile, ErrorFile, HardwareFile, LutFile, NumberFile, TileFile,
@@ -84,9 +84,21 @@ pub(super) const TABLES: &[KeyTable] = &[
     ),
     table(
         "device.drift",
-        "What time does to levels between programming and reading: `dalean eval RUN --after 1d`. A training takes no time in which levels drift.",
+        "What time does to levels between programming and reading: `dalean eval RUN --after 1d`. With `update_s` also while a net learns.",
         DriftFile::MEANINGS,
         DRIFT,
+    ),
+    table(
+        "device.endurance",
+        "How many pulses cells take. One that has taken them is as a stuck cell to writes and loads.",
+        EnduranceFile::MEANINGS,
+        ENDURANCE,
+    ),
+    table(
+        "device.leakage",
+        "What volatile cells, such as capacitors, forget while others are written; time is counted in writes of their array.",
+        LeakageFile::MEANINGS,
+        LEAKAGE,
     ),
     table(
         "timing",
@@ -313,6 +325,8 @@ const DEVICE: &[KeyEntry] = &[
     other("read_noise", "a table").otherwise("reads are free of noise"),
     other("programming", "a table").otherwise("loads are exact"),
     other("drift", "a table").otherwise("a level stays as it was written"),
+    other("endurance", "a table").otherwise("cells take any number of pulses"),
+    other("leakage", "a table").otherwise("cells forget nothing while they learn"),
 ];
 
 const LINES: &[&str] = &["hw.device.response.curve=linear"];
@@ -364,6 +378,7 @@ const RESPONSE: &[KeyEntry] = &[
     )
     .otherwise("step")
     .only("with device.response.noise", &["hw.device.response.noise=0.5"]),
+    real("write_noise", 1e-6, 1.0).unit("windows").otherwise("none"),
     PROVENANCE[0],
     PROVENANCE[1],
 ];
@@ -484,6 +499,11 @@ const PROGRAMMING: &[KeyEntry] = &[
 ];
 
 const POWER: &[&str] = &["hw.device.drift.start_s=20", "hw.device.drift.exponent=[0.05]"];
+const LEARNING: &[&str] = &[
+    "hw.device.drift.start_s=20",
+    "hw.device.drift.exponent=[0.05]",
+    "hw.device.drift.update_s=1",
+];
 const LOGARITHM: &[&str] = &["hw.device.drift.start_s=1", "hw.device.drift.change=-0.01"];
 
 const DRIFT: &[KeyEntry] = &[
@@ -497,6 +517,43 @@ const DRIFT: &[KeyEntry] = &[
         .otherwise("none"),
     other("change", "a number in -1..=1").only("without `exponent`", LOGARITHM),
     other("change_spread", "a number in 0..=1").only("with `change`", LOGARITHM).otherwise("none"),
+    real("update_s", 1e-12, 1e12)
+        .unit("s")
+        .only("", POWER)
+        .otherwise("a training takes no time in which levels drift"),
+    whole("every", 1, 1_048_576)
+        .unit("writes")
+        .only("with `update_s`", LEARNING)
+        .otherwise("100 with `update_s`"),
+    PROVENANCE[0],
+    PROVENANCE[1],
+];
+
+const LASTING: &[&str] = &["hw.device.endurance.pulses=1000"];
+
+const ENDURANCE: &[KeyEntry] = &[
+    real("pulses", 1.0, 4_294_967_295.0)
+        .law("a whole number")
+        .unit("pulses")
+        .otherwise("the table needs it"),
+    real("spread", 1e-6, 2.0).only("", LASTING).otherwise("cells take as many"),
+    words(
+        "worn",
+        &[("level", "where it is"), ("floor", "at its floor"), ("ceiling", "at its ceiling")],
+    )
+    .only("", LASTING)
+    .otherwise("level"),
+    PROVENANCE[0],
+    PROVENANCE[1],
+];
+
+const VOLATILE: &[&str] = &["hw.device.leakage.lifetime=1000"];
+
+const LEAKAGE: &[KeyEntry] = &[
+    real("lifetime", 0.1, 1e11).unit("writes").otherwise("the table needs it"),
+    whole("every", 1, 1_048_576).unit("writes").only("", VOLATILE).otherwise("100"),
+    real("rest", 1e-6, 1.0).unit("windows").only("", VOLATILE).otherwise("the floor"),
+    real("spread", 1e-6, 1.0).only("", VOLATILE).otherwise("cells forget alike"),
     PROVENANCE[0],
     PROVENANCE[1],
 ];

@@ -86,6 +86,15 @@ pub enum Note {
         /// Such epochs.
         epochs: u32,
     },
+    /// Cells are worn out.
+    Worn {
+        /// Such cells at the end.
+        worn: u64,
+        /// Of so many.
+        cells: u64,
+        /// The first epoch after which there was one.
+        epoch: u32,
+    },
     /// Answers that are no better than always giving the same one.
     Chance {
         /// Right answers.
@@ -175,6 +184,11 @@ impl fmt::Display for Note {
                      hw.adc.bits or hw.lut.bits, or another learning.rate",
                 )
             }
+            Self::Worn { worn, cells, epoch } => write!(
+                f,
+                "{worn} of {cells} cells are worn out (hw.device.endurance), the first in epoch {epoch}: no pulse moves them \
+                 any more; larger batches, lower rates and learning.optimiser = \"sign\" take fewer pulses"
+            ),
             Self::Chance { correct, total, constant } => write!(
                 f,
                 "{correct} of {total} right answers are no better than chance: always naming the most frequent class \

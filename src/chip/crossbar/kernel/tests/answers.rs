@@ -32,6 +32,7 @@ fn device(spread: [bool; 3], noise: usize, states: u32, bits: u32) -> Device {
             PulseNoise::OfWindow(Millionths(40_000)),
             PulseNoise::OfStep(Millionths(90_000_000)),
         ][noise],
+        write_noise: Millionths(0),
         spread: CellSpread {
             step_law: if spread[0] { SpreadLaw::LogNormal } else { SpreadLaw::Normal },
             step: share(spread[0], 700_000),
@@ -108,6 +109,7 @@ proptest! {
                     pruned: pruned.then_some(&mut block.pruned),
                     pulses: None,
                     answering: Some(Answering { made, words: &mut words, at }),
+                    remembered: None,
                 };
                 block.moved += kernel.levels(cells, &pulses, ends, groups);
             }

@@ -116,6 +116,7 @@ proptest! {
             let mut state = fresh.clone();
             let cells = Cells {
                 answering: None,
+                remembered: None,
                 low: &mut state.low,
                 high: wide.then_some(&mut state.high),
                 residual: (write.residual_bits > 0).then_some(&mut state.residual),

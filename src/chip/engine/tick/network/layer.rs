@@ -10,7 +10,7 @@
 use std::ops::Range;
 use std::sync::Arc;
 
-use super::super::tile::{BankEvents, Command, Launch, Tile, TileEvents, TileSize};
+use super::super::tile::{BankEvents, Command, Launch, Memories, Tile, TileEvents, TileSize};
 use super::balance::Balancing;
 use super::normalise::{Normal, Normaliser};
 use super::pool::Pooler;
@@ -183,8 +183,13 @@ impl TickLayer {
             }
             let gone = array.pruned();
             let left = array.residuals();
+            let (wear, beside, stamps) = (array.wear(), array.left(), array.stamps());
             for cell in 0..levels.len() {
                 let (tile, bank, row, column) = self.cell(at, cell);
+                let spent = wear.as_ref().map(|wear| wear[cell][0]);
+                let beside = beside.as_ref().map(|beside| beside[cell]);
+                let stamp = stamps.as_ref().map(|stamps| stamps[cell]);
+                self.tiles[tile].recall(bank, [row, column], (spent, beside, stamp));
                 let gone = gone.as_ref().is_some_and(|gone| gone[cell]);
                 let left = left.as_ref().map_or(0, |left| i64::from(left[cell]));
                 self.tiles[tile].restore(bank, row, column, gone, left);
@@ -271,6 +276,19 @@ impl TickLayer {
 
     pub(super) fn residuals(&self, array: usize) -> Vec<i64> {
         self.cells(array, Tile::residual)
+    }
+
+    /// What cells remember.
+    pub(super) fn memories(&self, array: usize) -> Vec<Memories> {
+        self.cells(array, Tile::remembers)
+    }
+
+    /// An operation has loaded a row.
+    pub(super) fn count_loads(&mut self, array: usize, row: usize) {
+        for column in 0..self.columns {
+            let (tile, bank, row, column) = self.cell(array, row * self.columns + column);
+            self.tiles[tile].count_load(bank, [row, column], self.writes);
+        }
     }
 
     pub(super) fn targets(&self) -> Vec<Stream> {
@@ -415,6 +433,7 @@ impl TickLayer {
     pub(super) fn written(&mut self) {
         self.move_means();
         self.writes += 1;
+        self.tiles.iter_mut().for_each(|tile| tile.forget(self.writes));
     }
 
     /// Whether a command concerns a tile: words go to heads, transposed reads to target p.

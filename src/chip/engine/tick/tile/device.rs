@@ -147,9 +147,9 @@ impl Tile {
 
     /// How often every array has been written before.
     pub(in super::super) fn set_writes(&mut self, writes: u64) {
-        if let Some(device) = &mut self.device {
-            device.places.iter_mut().for_each(|place| place.count = writes);
-        }
+        let device = self.device.iter_mut().flat_map(|device| &mut device.places);
+        let memory = self.memory.iter_mut().flat_map(|memory| memory.places_mut());
+        device.chain(memory).for_each(|place| place.count = writes);
     }
 
     /// A level as a cell takes it.
@@ -168,20 +168,24 @@ impl Tile {
 
     /// A pulse of a cell that is not ideal. Whether it has one.
     pub(super) fn answers(&mut self, bank: usize, column: usize, rises: bool) -> bool {
-        let Some(device) = &mut self.device else { return false };
         let row = self.upd.row;
         let at = row * self.size.columns + column;
+        match &self.device {
+            None => return false,
+            Some(device) if device.given[bank][at] == 0 => self.recollect(bank, at),
+            Some(_) => {}
+        }
+        let [moves, last_ever] = self.spend(bank, at);
         let before = i64::from(self.level[bank][at]);
-        let reached = before + {
-            let step = device.step(bank, (row, column), at, (before, rises));
-            device.given[bank][at] += 1;
-            step
-        };
+        let device = self.device.as_mut().expect("just seen");
+        let reached = before + device.step(bank, (row, column), at, (before, rises));
+        device.given[bank][at] += 1;
         let last = i64::from(device.given[bank][at]) == self.pulse[bank][column].abs();
         let [floor, ceiling] = self.ends(bank, at);
-        let after = if self.pruned[bank][at] { before } else { reached.clamp(floor, ceiling) };
-        self.level[bank][at] = narrow(after, "inside the window");
-        if last && self.config.more.residual_bits > 0 {
+        let still = self.pruned[bank][at] || self.stuck[bank][at] || !moves;
+        let after = if still { before } else { reached.clamp(floor, ceiling) };
+        self.level[bank][at] = narrow(after, "a level");
+        if moves && (last || last_ever) && self.config.more.residual_bits > 0 {
             let rest = (1 << self.config.more.residual_bits) - 1;
             let left = &mut self.residual[bank][at];
             *left = match reached {
@@ -198,8 +202,15 @@ impl Tile {
 
     /// A write of these cells is over.
     pub(super) fn forget_pulses(&mut self, cells: std::ops::Range<usize>) {
-        if let Some(device) = &mut self.device {
-            device.given.iter_mut().for_each(|given| given[cells.clone()].fill(0));
+        let Some(device) = &mut self.device else { return };
+        let mut sent = Vec::new();
+        for (bank, given) in device.given.iter_mut().enumerate() {
+            let pulsed = given[cells.clone()].iter_mut().zip(cells.clone());
+            let pulsed = pulsed.filter(|(given, _)| **given > 0);
+            sent.extend(pulsed.map(|(given, at)| (bank, at, std::mem::take(given))));
+        }
+        for (bank, at, given) in sent {
+            self.end_memory(bank, at, given);
         }
     }
 }

@@ -16,9 +16,10 @@ impl Tile {
         level: u16,
     ) {
         let at = self.place(row, column);
-        if !self.stuck[bank][at] {
+        if !self.stuck[bank][at] && !self.is_worn(bank, at) {
             self.level[bank][at] = self.taken(bank, at, level);
         }
+        self.leaves(bank, at);
     }
 
     /// A cell holds this level from now on.
@@ -67,7 +68,8 @@ impl Tile {
     }
 
     pub(in super::super) fn is_pruned(&self, bank: usize, row: usize, column: usize) -> bool {
-        self.pruned[bank][self.place(row, column)]
+        let at = self.place(row, column);
+        self.pruned[bank][at] && !self.is_worn(bank, at)
     }
 
     pub(in super::super) fn residual(&self, bank: usize, row: usize, column: usize) -> i64 {

@@ -78,7 +78,6 @@ impl Tile {
 
     /// With an absorbing floor, cells that were pulsed and lie on it stay there.
     fn settle_floor(&mut self) {
-        self.forget_pulses(0..self.trained[0].len());
         for bank in 0..2 {
             for at in 0..self.trained[bank].len() {
                 let pulsed = std::mem::take(&mut self.trained[bank][at]);
@@ -87,5 +86,6 @@ impl Tile {
                 self.pruned[bank][at] |= self.config.absorbing && pulsed && rests;
             }
         }
+        self.forget_pulses(0..self.trained[0].len());
     }
 }

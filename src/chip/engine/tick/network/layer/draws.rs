@@ -1,7 +1,7 @@
 //! Draws of a layer's tiles, from the addresses of the logical array: dither of a row, lines that fire in a slot.
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
-use super::super::super::tile::{TileDevice, laws};
+use super::super::super::tile::{TileDevice, TileMemory, differing, laws};
 use super::TickLayer;
 use crate::chip::hardware::{DitherPattern, Hardware};
 use crate::chip::layer::Layer;
@@ -14,10 +14,11 @@ pub(super) fn bits(hardware: &Hardware, layer: &Layer) -> u32 {
 }
 
 impl TickLayer {
-    /// Makes cells of the chip's device, if it has one.
+    /// Makes cells of the chip's device, if it has one, that remember what they do.
     pub(super) fn fit(&mut self, hardware: &Hardware) {
-        let Some(spec) = &hardware.device else { return };
-        let laws = laws(spec);
+        let spec = hardware.answering();
+        let laws = spec.as_ref().map(|spec| laws(spec));
+        let differing = differing(hardware);
         for tile in 0..self.tiles.len() {
             let (down, across) = (tile / self.grid[1] % self.grid[0], tile % self.grid[1]);
             let (rows, columns) = (self.tile_rows(down), self.tile_columns(across));
@@ -29,8 +30,12 @@ impl TickLayer {
             let first = [rows.start, columns.start];
             let at = (self.rows, first);
             let size = [rows.len(), columns.len()];
-            let device = TileDevice::new(hardware, (spec, &laws), places, at, size);
-            self.tiles[tile].set_device(device);
+            if let (Some(spec), Some(laws)) = (&spec, &laws) {
+                let device = TileDevice::new(hardware, (spec, laws), places, at, size);
+                self.tiles[tile].set_device(device);
+            }
+            let memory = TileMemory::of(hardware, &differing, places, at, size);
+            self.tiles[tile].set_memory(memory);
         }
     }
 

@@ -1,0 +1,76 @@
+//! What the cells of a chip are made of: its device, what they remember, what they conduct.
+#![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
+
+use std::borrow::Cow;
+use std::sync::Arc;
+
+use super::Hardware;
+use crate::chip::device::{Conducting, Device, DeviceSpec, MemoryLaw, WriteNoise};
+use crate::num::tables::Gaussian;
+
+impl Hardware {
+    /// The greatest level that a cell of this chip can have: the ceiling, or where cells differ in theirs what a level holds.
+    #[must_use]
+    pub fn level_greatest(&self) -> u16 {
+        match &self.device {
+            Some(device) if device.spread.moves_window() => self.cell.level_bits.level_max(),
+            _ => self.cell.window.ceiling(),
+        }
+    }
+
+    /// What its cells answer to pulses by, if not by a level a pulse: the device, or where cells remember their pulses one like the ideal cell.
+    #[must_use]
+    pub(crate) fn answering(&self) -> Option<Cow<'_, DeviceSpec>> {
+        let window = self.cell.window;
+        let even = || DeviceSpec::even(u32::from(window.ceiling() - window.floor()));
+        let counted =
+            || (self.endurance.is_some() || self.ageing.is_some()).then(|| Cow::Owned(even()));
+        self.device.as_ref().map(Cow::Borrowed).or_else(counted)
+    }
+
+    /// The tables of what its cells answer by.
+    #[must_use]
+    pub(crate) fn device(&self) -> Option<Device> {
+        let ends = [self.cell.window.floor(), self.cell.window.ceiling()];
+        let level_max = self.cell.level_bits.level_max();
+        self.answering().map(|device| Device::new(&device, ends, level_max))
+    }
+
+    /// What its cells remember beside their level; `None`: nothing.
+    #[must_use]
+    pub(crate) fn memory(&self) -> Option<MemoryLaw> {
+        let window = self.cell.window;
+        let noise = self.device.as_ref().map(|device| device.write_noise);
+        let noise = noise.filter(|share| share.0 != 0).map(|share| {
+            let span = window.ceiling() - window.floor();
+            WriteNoise::new(Arc::new(Gaussian::new()), share, span)
+        });
+        let law = MemoryLaw {
+            endurance: self.endurance.map(|of| (of.worn, of.limits())),
+            write_noise: noise,
+            leakage: self.leakage.map(|of| of.ready()),
+            ageing: self.ageing.map(|of| of.ready([window.ceiling(), self.level_greatest()])),
+        };
+        (!law.is_nothing()).then_some(law)
+    }
+
+    /// The law of its currents, where cells conduct something else than their level.
+    #[must_use]
+    pub fn conducting(&self) -> Option<Conducting> {
+        Conducting::new(self.conductance, self.wires, self.cell.window.ceiling())
+    }
+
+    /// Whether cells are stuck, by a draw or a list.
+    #[must_use]
+    pub fn has_stuck_cells(&self) -> bool {
+        !self.faults.is_none() || !self.fault_map.is_empty()
+    }
+
+    /// Pulses across the window and levels they move a cell by, where those are not the same.
+    #[must_use]
+    pub fn pulses_of_window(&self) -> Option<[u32; 2]> {
+        let window = self.cell.window;
+        let span = u32::from(window.ceiling() - window.floor());
+        self.device.as_ref().map(|device| [device.states, span])
+    }
+}
