@@ -4,6 +4,8 @@
 //! A fault in any of these shows: cells that wear out alike, noise that adds up from write to write, a fraction of a level that is always
 //! or never lost, a cell that drifts since the start and not since it was written.
 
+use std::io::{BufRead, BufReader};
+use std::process::Stdio;
 use std::sync::Arc;
 
 use dalean::chip::crossbar::Crossbar;
@@ -13,6 +15,8 @@ use dalean::chip::hardware::{FloorKind, Hardware, Window};
 use dalean::num::draw::{Place, Site};
 use dalean::num::fixed::{LevelBits, Millionths};
 use dalean::num::tables::{DriftRates, Gaussian};
+
+use super::program::{dalean, only_run, run, train, trained};
 
 const SIZE: [usize; 2] = [400, 250];
 const CELLS: f64 = 1e5;
@@ -180,4 +184,101 @@ fn cells_drift_since_they_were_written() {
         assert!((variance / spread - 1.0).abs() < 0.04, "{passed}: {variance} {spread}");
     }
     assert_eq!(array.left().unwrap(), vec![3000; SIZE[0] * SIZE[1]]);
+}
+
+/// Everything that cells do, together; and drift, which goes with neither leakage nor write noise.
+const ALL: [&[&str]; 2] = [
+    &[
+        "hw.cell.ceiling=200",
+        "hw.device.response.curve=soft_bounds",
+        "hw.device.response.states=60",
+        "hw.device.response.noise=0.3",
+        "hw.device.response.write_noise=0.02",
+        "hw.device.spread.step=0.2",
+        "hw.device.spread.ceiling=0.05",
+        "hw.device.endurance.pulses=12",
+        "hw.device.endurance.spread=0.5",
+        "hw.device.leakage.lifetime=300",
+        "hw.device.leakage.every=3",
+        "hw.device.leakage.spread=0.3",
+        "hw.device.faults.stuck_any=0.02",
+        "hw.device.read_noise.sigma_cells=0.1",
+        "hw.device.wires.segment_ohm=1",
+        "hw.device.wires.cell_on_ohm=1e5",
+        "hw.write.residual_bits=2",
+    ],
+    &[
+        "hw.cell.ceiling=200",
+        "hw.cell.floor_kind=absorbing",
+        "hw.device.spread.ceiling=0.05",
+        "hw.device.endurance.pulses=12",
+        "hw.device.endurance.worn=ceiling",
+        "hw.device.drift.start_s=1",
+        "hw.device.drift.exponent=[0.05]",
+        "hw.device.drift.exponent_spread=[0.02]",
+        "hw.device.drift.update_s=10",
+        "hw.device.drift.every=5",
+    ],
+];
+
+/// Fails when what cells remember hangs on a back end or on threads, or is lost between a stop and a resumption; when nobody is told of
+/// cells that are worn out; and when a level above the chip's ceiling has no drift.
+#[test]
+fn cells_remember_the_same_however_a_run_is_carried_out() {
+    for settings in ALL {
+        let settings: Vec<&str> = settings.iter().flat_map(|one| ["--set", one]).collect();
+        let out = tempfile::tempdir().unwrap();
+        let hash = |more: &[&str]| {
+            let (folder, done) = trained(out.path(), &[&settings[..], more].concat());
+            (folder, done["state_hash"].as_str().unwrap().to_owned(), done)
+        };
+        let (folder, whole, done) = hash(&[]);
+        let notes = done["notes"].to_string();
+        assert!(notes.contains("worn"), "{notes}");
+        for variant in [["--threads", "3"], ["--kernel", "scalar"]] {
+            assert_eq!(hash(&variant).1, whole, "{variant:?}");
+        }
+        let ran = run(dalean().arg("verify").arg(&folder));
+        assert_eq!(ran.code, Some(0), "{ran:?}");
+        let last = std::fs::read_to_string(folder.join("metrics.jsonl")).unwrap();
+        let last: serde_json::Value = serde_json::from_str(last.lines().last().unwrap()).unwrap();
+        let wear = &last["pathways"][0]["wear"];
+        let cells: u64 =
+            wear["histogram"].as_array().unwrap().iter().map(|n| n.as_u64().unwrap()).sum();
+        assert_eq!(cells, last["pathways"][0]["cells"].as_u64().unwrap(), "{wear}");
+        assert!(
+            wear["worn"].as_u64().unwrap() > 0 && wear["most"].as_u64().unwrap() > 12,
+            "{wear}"
+        );
+        let page = std::fs::read_to_string(folder.join("report.html")).unwrap();
+        assert!(page.contains("id=\"wear\""), "a figure of wear");
+        // stopped in the middle
+        let root = tempfile::tempdir().unwrap();
+        let mut child = train(root.path()).args(&settings).stdout(Stdio::piped()).spawn().unwrap();
+        let lines = BufReader::new(child.stdout.take().unwrap()).lines();
+        for line in lines {
+            let event: serde_json::Value = serde_json::from_str(&line.unwrap()).unwrap();
+            if event["record"]["epoch"].as_u64() == Some(1) {
+                break;
+            }
+        }
+        child.kill().unwrap();
+        child.wait().unwrap();
+        let ran = run(dalean().args(["train", "--json", "--resume"]).arg(only_run(root.path())));
+        let outran = ran.code == Some(1) && ran.stderr.contains("is finished");
+        assert!(outran || ran.last()["state_hash"] == whole.as_str(), "{ran:?}");
+    }
+}
+
+#[test]
+fn cells_above_the_ceiling_of_their_chip_drift_too() {
+    let out = tempfile::tempdir().unwrap();
+    let ceiling = ["--set", "hw.cell.ceiling=100", "--set", "hw.device.spread.ceiling=0.3"];
+    let (folder, _) = trained(out.path(), &ceiling);
+    for law in ["exponent=[0.05]", "change=-0.01"] {
+        let drift = format!("hw.device.drift.{law}");
+        let eval = ["eval", "--after", "1d", "--set", "hw.device.drift.start_s=1", "--set", &drift];
+        let ran = run(dalean().args(eval).arg(&folder));
+        assert_eq!(ran.code, Some(0), "{ran:?}");
+    }
 }
