@@ -15,7 +15,7 @@ mod programming;
 mod read_noise;
 mod response;
 
-pub use cell::{Device, DeviceLanes, OwnCell, PLACES, PulseWords};
+pub use cell::{Device, DeviceLanes, OwnCell, PLACES, PulseWords, Verified};
 pub use conductance::{CONDUCTANCE_BITS, Conductance, Conducting, LetThrough, Reference, Wires};
 pub use drift::{Ageing, Ages};
 pub use endurance::{Endurance, Limits, Worn};

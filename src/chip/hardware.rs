@@ -412,7 +412,8 @@ impl Hardware {
             device.check().map_err(wrong)?;
         }
         if device.is_some() || endurance.is_some() || ageing.is_some() {
-            driver::check_driver(*timing)?;
+            let tries = device.as_ref().map_or(1, |device| device.tries);
+            driver::check_driver(*timing, tries, *increment_max)?;
         }
         if let WriteScheme::Trains { slots_log2 } = *scheme {
             driver::check_trains(slots_log2, *increment_max, *residual_bits, *timing)?;

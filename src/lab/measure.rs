@@ -268,6 +268,7 @@ impl MeasuredDevice {
             asymmetry: best.asymmetry,
             noise: noise(&settled.scatter),
             write_noise: Millionths(0),
+            tries: DeviceSpec::TRIES,
             spread: spread(&settled, &ends, &mut said),
         };
         let read_noise = settled.scatter.read;

@@ -64,6 +64,7 @@ fn neurosim() -> DeviceSpec {
         asymmetry: Millionths(0),
         noise: PulseNoise::OfWindow(millionths(0.01)),
         write_noise: Millionths(0),
+        tries: DeviceSpec::TRIES,
         spread: CellSpread::default(),
     }
 }
@@ -78,6 +79,7 @@ fn soft(spread: CellSpread) -> DeviceSpec {
         asymmetry: Millionths(0),
         noise: PulseNoise::OfStep(millionths(0.3)),
         write_noise: Millionths(0),
+        tries: DeviceSpec::TRIES,
         spread,
     }
 }

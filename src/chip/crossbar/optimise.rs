@@ -156,7 +156,11 @@ impl<'a> Pass<'a> {
     }
 
     fn end(self, kernel: &Kernel) -> Written {
-        Written { counts: self.counts, collected: self.collector.finish(kernel) }
+        let mut counts = self.counts;
+        if let Some(sent) = self.answers.as_ref().and_then(|answers| answers.verified) {
+            counts.attempted = sent;
+        }
+        Written { counts, collected: self.collector.finish(kernel) }
     }
 
     /// Programs a half block of a strip: its sums, and beside them what 32 bits do not hold.

@@ -54,8 +54,35 @@ pub struct Device {
     rounds: bool,
     /// Levels of the chip's window over those of a cell's own, by how many it has.
     reaches: Box<[u32; PLACES]>,
+    /// Where pulses are verified.
+    verified: Option<Verified>,
     /// Whether every number of a pulse fits a lane of 32 bits, and every product one of 64.
     fits_lanes: bool,
+}
+
+/// Pulses that are looked at one by one: a cell gets no more once it has moved as far as it should.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Verified {
+    /// Pulses at most for each that is asked for.
+    pub tries: u8,
+    /// The mean step, in 256ths of a level.
+    pub mean: i64,
+}
+
+impl Verified {
+    /// Pulses that a cell is given at most.
+    #[must_use]
+    pub const fn slots(self, asked: i8) -> u32 {
+        self.tries as u32 * asked.unsigned_abs() as u32
+    }
+
+    /// Whether a cell has moved as far as so many pulses of mean length would take it, to half of one.
+    #[must_use]
+    pub fn arrived(self, asked: i8, [start, level]: [u16; 2]) -> bool {
+        let moved = i64::from(level) - i64::from(start);
+        let moved = if asked < 0 { -moved } else { moved };
+        2 * (moved << STEP_BITS) >= (2 * i64::from(asked.unsigned_abs()) - 1) * self.mean
+    }
 }
 
 /// What sets a cell apart from others.
@@ -103,7 +130,8 @@ impl Device {
     /// When the window is empty.
     #[must_use]
     pub fn new(device: &DeviceSpec, [floor, ceiling]: [u16; 2], level_max: u16) -> Self {
-        let DeviceSpec { response, states, asymmetry, noise, write_noise: _, spread } = device;
+        let DeviceSpec { response, states, asymmetry, noise, write_noise: _, tries: _, spread } =
+            device;
         let span = ceiling - floor;
         let scaled = |share: Millionths, whole: i64| (share.0 * whole + 500_000) / 1_000_000;
         let noise = match *noise {
@@ -139,7 +167,35 @@ impl Device {
             *reach = narrow(wide, "2^12 windows at most");
         }
         let fits_lanes = fits_lanes(&steps[..], &spread, noise);
-        Self { reaches, fits_lanes, steps, floor, span, level_max, noise, gaussian, spread, rounds }
+        let verified = None;
+        Self {
+            reaches,
+            verified,
+            fits_lanes,
+            steps,
+            floor,
+            span,
+            level_max,
+            noise,
+            gaussian,
+            spread,
+            rounds,
+        }
+    }
+
+    /// The same, whose pulses are verified.
+    #[must_use]
+    pub fn with_verified(self, device: &DeviceSpec) -> Self {
+        let (span, states) = (i64::from(self.span), i64::from(device.states));
+        let mean = (2 * (span << STEP_BITS) + states) / (2 * states);
+        let tries = narrow(device.tries, "16 at most");
+        Self { verified: Some(Verified { tries, mean }), ..self }
+    }
+
+    /// How pulses are verified, if they are.
+    #[must_use]
+    pub const fn verified(&self) -> Option<Verified> {
+        self.verified
     }
 
     /// Whether steps are rounded with a word, and whether they take one for noise.

@@ -16,6 +16,7 @@ use crate::num::tables::{LinearSteps, Response, SpreadLaw};
 ///     asymmetry: Millionths(0),
 ///     noise: PulseNoise::OfStep(Millionths(300_000)),
 ///     write_noise: Millionths(0),
+///     tries: DeviceSpec::TRIES,
 ///     spread: CellSpread::default(),
 /// };
 /// let chip = Hardware::reference().with(|parts| parts.device = Some(device)).expect("a chip");
@@ -33,6 +34,8 @@ pub struct DeviceSpec {
     pub noise: PulseNoise,
     /// Standard deviation of what a write leaves beside the level that its pulses reached, in windows.
     pub write_noise: Millionths,
+    /// Where pulses are verified: pulses that a cell is given at most for each that is asked for.
+    pub tries: u32,
     /// Differences from cell to cell.
     pub spread: CellSpread,
 }
@@ -90,6 +93,10 @@ impl CellSpread {
 impl DeviceSpec {
     /// States, at most.
     pub const STATES_MAX: u32 = 1 << 16;
+    /// Pulses for each that is asked for, unless they are given.
+    pub const TRIES: u32 = 4;
+    /// The same, at most.
+    pub const TRIES_MAX: u32 = 16;
 
     /// A device of which every pulse is as long as the others, and every cell like the others.
     #[must_use]
@@ -100,6 +107,7 @@ impl DeviceSpec {
             asymmetry: Millionths(0),
             noise: PulseNoise::Off,
             write_noise: Millionths(0),
+            tries: Self::TRIES,
             spread: CellSpread::default(),
         }
     }
@@ -109,7 +117,7 @@ impl DeviceSpec {
     /// # Errors
     /// When one lies outside what it can be.
     pub fn check(&self) -> Result<(), DeviceError> {
-        let Self { response, states, asymmetry, noise, write_noise, spread } = self;
+        let Self { response, states, asymmetry, noise, write_noise, tries, spread } = self;
         if !(1..=Self::STATES_MAX).contains(states) {
             let allowed = format!("it must lie in 1..={}", Self::STATES_MAX);
             let found = format!("is {states}");
@@ -134,6 +142,11 @@ impl DeviceSpec {
             PulseNoise::OfWindow(noise) => share("device.response.noise", noise, [0, 1])?,
         }
         share("device.response.write_noise", *write_noise, [0, 1])?;
+        if !(1..=Self::TRIES_MAX).contains(tries) {
+            let allowed = format!("it must lie in 1..={}", Self::TRIES_MAX);
+            let found = format!("is {tries}");
+            return Err(DeviceError { key: "device.response.tries", found, allowed });
+        }
         let CellSpread { step_law: _, step, asymmetry, ceiling, floor } = *spread;
         share("device.spread.step", step, [0, 2])?;
         share("device.spread.asymmetry", asymmetry, [0, 1])?;

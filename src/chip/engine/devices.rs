@@ -84,7 +84,7 @@ fn device() -> impl Strategy<Value = DeviceSpec> {
         (1i64..=20).prop_map(|of| PulseNoise::OfWindow(Millionths(of * 10_000))),
     ];
     let spread = (share(80), share(30), share(40), share(40), any::<bool>());
-    let noise = (noise, share(30));
+    let noise = (noise, share(30), 1u32..=5);
     (response(), 1u32..=200, -30i64..=30, noise, spread).prop_map(
         |(response, states, asymmetry, noise, (step, lean, ceiling, floor, log))| DeviceSpec {
             response,
@@ -92,6 +92,7 @@ fn device() -> impl Strategy<Value = DeviceSpec> {
             asymmetry: Millionths(asymmetry * 10_000),
             noise: noise.0,
             write_noise: noise.1,
+            tries: noise.2,
             spread: CellSpread {
                 step_law: if log { SpreadLaw::LogNormal } else { SpreadLaw::Normal },
                 step,
@@ -145,8 +146,9 @@ fn chip() -> impl Strategy<Value = Hardware> {
     let active = prop::option::of(1u64..=4);
     let dither =
         prop_oneof![Just(DitherBits::Zero), Just(DitherBits::Eight), Just(DitherBits::Sixteen)];
-    (bits, 0u32..=4, any::<bool>(), active, (5usize..=80, 3usize..=40), 1i64..=12, dither).prop_map(
-        |(bits, residual, absorbs, active_max, tile, most, dither)| {
+    let looks = any::<[bool; 2]>();
+    (bits, 0u32..=4, looks, active, (5usize..=80, 3usize..=40), 1i64..=12, dither).prop_map(
+        |(bits, residual, [absorbs, verify], active_max, tile, most, dither)| {
             let level_bits = LevelBits::new(bits).unwrap();
             let top = i64::from(level_bits.level_max());
             let chip = Hardware::reference().with(|h| {
@@ -170,7 +172,7 @@ fn chip() -> impl Strategy<Value = Hardware> {
                     hops: 1,
                     pulse: 2,
                     pulse_code: PulseCode::Unary,
-                    verify: false,
+                    verify,
                     active_max,
                     slices: None,
                 });
@@ -211,6 +213,7 @@ fn case() -> impl Strategy<Value = Case> {
                     h.write.scheme = WriteScheme::Trains { slots_log2: 2 };
                     h.write.increment_max = IncrementMax::new(7).unwrap();
                     if let Some(timing) = &mut h.timing {
+                        timing.verify = false;
                         timing.active_max = None;
                     }
                 }
@@ -383,6 +386,10 @@ proptest! {
         // remainders of cells that do not move follow the level that each law expects: docs/MODEL.md, 3.12
         let plain = case.chip.with(|h| {
             (h.endurance, h.ageing, h.faults) = (None, None, Faults::NONE);
+            // verified pulses of ideal cells always arrive, and are no more than asked for
+            if let Some(timing) = &mut h.timing {
+                timing.verify = false;
+            }
             if h.write.residual_bits.get() > 0 {
                 h.cell.floor_kind = FloorKind::Recoverable;
             }
@@ -395,6 +402,7 @@ proptest! {
             asymmetry: Millionths(0),
             noise: PulseNoise::Off,
             write_noise: Millionths(0),
+            tries: DeviceSpec::TRIES,
             spread: CellSpread::default(),
         };
         let with = |device: Option<DeviceSpec>| {
@@ -425,6 +433,7 @@ fn threads_and_back_ends_have_the_same_devices() {
         asymmetry: Millionths(0),
         noise: PulseNoise::OfStep(Millionths(500_000)),
         write_noise: Millionths(20_000),
+        tries: DeviceSpec::TRIES,
         spread,
     };
     let bits = LevelBits::new(8).unwrap();

@@ -4,6 +4,7 @@
 //! row      2 + pass (passes+ + passes-)                             compute, set, reset, turn around
 //! passes   P (unary), P > 0 (amplitude)                             P: most pulses of a cell, both banks
 //!          sum_q ceil(active(q) / W)                                where only W cells can be pulsed at a time
+//!          tries times that, of verified pulses of a device
 //! ```
 //!
 //! The only place where numbers decide how long something takes. See docs/MODEL.md, 4.5.
@@ -44,6 +45,9 @@ impl Passes {
         pulses: Option<&Pulses>,
     ) -> Self {
         let mut passes = Self { busy: 0, by_target: [0; 2] };
+        // of verified pulses of a device all slots are waited for
+        let answering = hardware.answering().filter(|_| timing.verify);
+        let tries = answering.map_or(1, |device| u64::from(device.tries));
         // a row takes so long beside its pulses
         let beats = layer.requests.optimiser.beats();
         match pulses {
@@ -58,7 +62,12 @@ impl Passes {
                             PulseCode::Unary => peaks.map(|&peak| u32::from(peak)).sum(),
                             PulseCode::Amplitude => peaks.map(|&peak| u32::from(peak > 0)).sum(),
                         };
-                        passes.add(timing, tile.target, (rows.len(), beats), sum.into());
+                        passes.add(
+                            timing,
+                            tile.target,
+                            (rows.len(), beats),
+                            tries * u64::from(sum),
+                        );
                     }
                 }
             }
@@ -68,7 +77,12 @@ impl Passes {
                     for first in (0..layer.layout.columns).step_by(hardware.tile.columns) {
                         let rows = limited(hardware, timing, layer, banks, first);
                         for rows in rows.chunks(hardware.tile.rows) {
-                            passes.add(timing, target, (rows.len(), beats), rows.iter().sum());
+                            passes.add(
+                                timing,
+                                target,
+                                (rows.len(), beats),
+                                tries * rows.iter().sum::<u64>(),
+                            );
                         }
                     }
                 }

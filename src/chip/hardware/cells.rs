@@ -22,7 +22,9 @@ impl Hardware {
     #[must_use]
     pub(crate) fn answering(&self) -> Option<Cow<'_, DeviceSpec>> {
         let window = self.cell.window;
-        let even = || DeviceSpec::even(u32::from(window.ceiling() - window.floor()));
+        let states = u32::from(window.ceiling() - window.floor());
+        // a pulse of such a cell is always right
+        let even = || DeviceSpec { tries: 1, ..DeviceSpec::even(states) };
         let counted =
             || (self.endurance.is_some() || self.ageing.is_some()).then(|| Cow::Owned(even()));
         self.device.as_ref().map(Cow::Borrowed).or_else(counted)
@@ -33,7 +35,11 @@ impl Hardware {
     pub(crate) fn device(&self) -> Option<Device> {
         let ends = [self.cell.window.floor(), self.cell.window.ceiling()];
         let level_max = self.cell.level_bits.level_max();
-        self.answering().map(|device| Device::new(&device, ends, level_max))
+        let verified = self.timing.is_some_and(|timing| timing.verify);
+        self.answering().map(|device| {
+            let cells = Device::new(&device, ends, level_max);
+            if verified { cells.with_verified(&device) } else { cells }
+        })
     }
 
     /// What its cells remember beside their level; `None`: nothing.

@@ -3,22 +3,26 @@
 
 use super::{HardwareError, IncrementMax, PulseCode, ResidualBits, Timing, WriteScheme};
 
-/// Pulses of a real cell are equal, and what they did is not looked at.
-pub(super) fn check_driver(timing: Option<Timing>) -> Result<(), HardwareError> {
-    let wrong = |key, found: &str, allowed: &str| {
-        let (found, allowed) = (found.to_owned(), allowed.to_owned());
-        Err(HardwareError { key, found, allowed })
-    };
+/// Pulses of a real cell are equal; where each is looked at, few enough for a byte.
+pub(super) fn check_driver(
+    timing: Option<Timing>,
+    tries: u32,
+    increment_max: IncrementMax,
+) -> Result<(), HardwareError> {
+    let wrong = |key, found: String, allowed: String| Err(HardwareError { key, found, allowed });
     match timing {
-        Some(Timing { verify: true, .. }) => wrong(
-            "timing.verify",
-            "is true beside a device",
-            "verified pulses are always right, which those of a device are not: leave one of them out",
-        ),
         Some(Timing { pulse_code: PulseCode::Amplitude, .. }) => wrong(
             "timing.pulses",
-            "is \"amplitude\" beside a device",
-            "a response is one to equal pulses: use \"unary\"",
+            "is \"amplitude\" beside a device".to_owned(),
+            "a response is one to equal pulses: use \"unary\"".to_owned(),
+        ),
+        Some(Timing { verify: true, .. }) if tries * increment_max.get() > 127 => wrong(
+            "device.response.tries",
+            format!("is {tries}"),
+            format!(
+                "a write gives at most 127 verified pulses, and write.increment_max is {}: lower one of them",
+                increment_max.get()
+            ),
         ),
         _ => Ok(()),
     }

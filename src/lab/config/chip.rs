@@ -108,6 +108,7 @@ pub(super) fn resolve(file: &mut HardwareFile, prefix: &str) -> Result<Hardware,
     let light = mode == DriveMode::Amplitude;
     let slices = Slices { mode, converter, count: drive_bits.get().div_ceil(dac_bits), dac_bits };
     let timing = file.timing.as_mut().map(|table| timing(table, &slices, &key)).transpose()?;
+    device::check_tries(file.device.as_ref(), timing.is_some_and(|timing| timing.verify), &key)?;
     let window_end = (window.ceiling(), light);
     let flaws = device::flaws(file.device.as_ref(), window_end, &key)?;
     let spec = HardwareSpec {

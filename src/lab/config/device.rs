@@ -64,6 +64,18 @@ pub(super) fn keep_lists(
     Ok(())
 }
 
+/// Tries are those of verified pulses.
+pub(super) fn check_tries(
+    device: Option<&DeviceFile>,
+    verified: bool,
+    key: &dyn Fn(&str) -> String,
+) -> Result<(), ConfigError> {
+    let tries = device.and_then(|device| device.response.as_ref()?.tries);
+    let Some(tries) = tries.filter(|_| !verified) else { return Ok(()) };
+    let allowed = "pulses are not verified: set timing.verify, or remove the key";
+    Err(wrong(&key("device.response.tries"), format!("is {tries}"), allowed))
+}
+
 /// Checks `[device]` of a chip with that window. `key` puts the place of a table before a name.
 pub(super) fn resolve(
     device: Option<&DeviceFile>,

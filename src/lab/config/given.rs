@@ -103,6 +103,7 @@ const FROZEN: &[(&str, &str)] = &[
     ("conductance.least", "0"),
     ("wires.segment", "0"),
     ("device.write_noise", "0"),
+    ("device.tries", "4"),
     ("endurance", "none"),
     ("leakage", "none"),
     ("ageing", "none"),

@@ -88,6 +88,7 @@ pub(super) fn devices(c: &mut Choices<'_>, spec: &mut HardwareSpec) {
             _ => PulseNoise::OfWindow(part(c)),
         },
         write_noise: part(c),
+        tries: c.near(0, 17) as u32,
         spread: spread(c),
     });
     if c.one_in(2) {

@@ -18,12 +18,13 @@
 use super::{Cells, Draws, Ends, Half, Kernel, call};
 use crate::chip::crossbar::CellsMade;
 use crate::chip::crossbar::layout::{BLOCK_ROWS, HALF_CELLS, HALF_COLUMNS, in_half};
-use crate::chip::device::PulseWords;
+use crate::chip::device::{OwnCell, PulseWords};
 use crate::num::draw::{Place, Site};
 use crate::num::fixed::narrow;
 
 mod lanes;
 mod remembered;
+mod verified;
 
 pub(super) use lanes::{Sent, Words, pulse};
 pub use remembered::Remembered;
@@ -49,6 +50,8 @@ pub struct Answers {
     beside: Vec<(Draws, Half<u16>)>,
     /// Cells with a pulse.
     sent: Sent,
+    /// Pulses that were sent, where cells are looked at between them.
+    pub verified: Option<u64>,
 }
 
 /// What cells of a half block answer to pulses with.
@@ -67,7 +70,16 @@ impl Answers {
     #[must_use]
     pub const fn new(place: Place, rows: usize) -> Self {
         let (rounding, noise) = ([0; HALF_CELLS], [0; HALF_CELLS]);
-        Self { rounding, noise, place, rows, draws: vec![], beside: vec![], sent: Sent::NONE }
+        Self {
+            rounding,
+            noise,
+            place,
+            rows,
+            draws: vec![],
+            beside: vec![],
+            sent: Sent::NONE,
+            verified: None,
+        }
     }
 
     /// Draws the words of a pulse for the columns of a mask.
@@ -154,11 +166,21 @@ pub(super) fn respond(
     (pulses, groups): (&Half<i8>, u16),
     ends: Ends,
 ) -> u64 {
+    let verified = answering.made.device.verified();
     let Some(mut remembered) = cells.remembered.take() else {
-        return answer(kernel, cells, answering, (pulses, groups), ends);
+        return match verified {
+            Some(of) => verified::law(kernel, cells, None, answering, (pulses, groups), (of, ends)),
+            None => answer(kernel, cells, answering, (pulses, groups), ends),
+        };
     };
-    let sending = remembered.before(cells, pulses, groups);
-    let effective = answer(kernel, cells, answering, (&sending.pulses, groups), ends);
+    let sending = remembered.before(cells, pulses, groups, verified.is_none());
+    let effective = match verified {
+        Some(of) => {
+            let remembered = Some(&mut remembered);
+            verified::law(kernel, cells, remembered, answering, (pulses, groups), (of, ends))
+        }
+        None => answer(kernel, cells, answering, (&sending.pulses, groups), ends),
+    };
     remembered.after(kernel, cells, (pulses, groups, &sending), answering);
     effective
 }
@@ -265,9 +287,23 @@ fn one(
     ends: Ends,
 ) -> u64 {
     let cell = made.cell(at);
+    let [before, level, reached] = pulse_of(cells, made, (at, &cell), (rises, words));
+    if last {
+        settle(cells, (at, &cell), (level, reached), ends);
+    }
+    level.abs_diff(before)
+}
+
+/// A pulse of a cell, whatever comes after it: its level before it and after it, and the one that it led to.
+fn pulse_of(
+    cells: &mut Cells<'_>,
+    made: &CellsMade<'_>,
+    (at, cell): (usize, &OwnCell),
+    (rises, words): (bool, PulseWords),
+) -> [i64; 3] {
     let high = cells.high.as_ref().map_or(0, |high| high[at]);
     let before = u16::from_le_bytes([cells.low[at], high]);
-    let reached = i64::from(before) + made.device.moves(&cell, before, rises, words);
+    let reached = i64::from(before) + made.device.moves(cell, before, rises, words);
     let (floor, ceiling) = (i64::from(cell.floor), i64::from(cell.ceiling));
     let gone = cells.pruned.as_ref().is_some_and(|pruned| pruned[at] != 0);
     let held = narrow::<u16>(reached.clamp(floor, ceiling), "in the window");
@@ -277,18 +313,25 @@ fn one(
     if let Some(high) = &mut cells.high {
         high[at] = upper;
     }
-    if last {
-        if let Some(residual) = &mut cells.residual {
-            if reached < floor {
-                residual[at] = 0;
-            } else if reached > ceiling {
-                residual[at] = ends.most_left();
-            }
-        }
-        if let Some(pruned) = &mut cells.pruned {
-            let absorbed = gone || level == cell.floor;
-            pruned[at] = if absorbed { Cells::GONE } else { 0 };
+    [before.into(), level.into(), reached]
+}
+
+/// The last pulse of a cell is over.
+fn settle(
+    cells: &mut Cells<'_>,
+    (at, cell): (usize, &OwnCell),
+    (level, reached): (i64, i64),
+    ends: Ends,
+) {
+    if let Some(residual) = &mut cells.residual {
+        if reached < i64::from(cell.floor) {
+            residual[at] = 0;
+        } else if reached > i64::from(cell.ceiling) {
+            residual[at] = ends.most_left();
         }
     }
-    level.abs_diff(before).into()
+    if let Some(pruned) = &mut cells.pruned {
+        let absorbed = pruned[at] != 0 || level == i64::from(cell.floor);
+        pruned[at] = if absorbed { Cells::GONE } else { 0 };
+    }
 }

@@ -44,6 +44,8 @@ keys! {
         noise_of: String,
         /// Standard deviation of what a write leaves beside the level that its pulses reached, in windows: reads see it, and the next pulse begins where pulses had left the cell.
         write_noise: f64,
+        /// Where pulses are verified (`timing.verify`): pulses that a cell is given at most for each that is asked for. It gets no more once it has moved as far as pulses of mean length would take it, to half of one.
+        tries: i64,
         /// Where the numbers come from.
         source: String,
         /// How far to trust the numbers.
@@ -189,6 +191,12 @@ pub(super) fn resolve(
         asymmetry,
         noise,
         write_noise: above(&at("write_noise"), file.write_noise, "without the key there is none")?,
+        tries: file.tries.map_or(Ok(DeviceSpec::TRIES), |tries| {
+            u32::try_from(tries).map_err(|_| {
+                let allowed = format!("it must lie in 1..={}", DeviceSpec::TRIES_MAX);
+                wrong(&at("tries"), format!("is {tries}"), allowed)
+            })
+        })?,
         spread: spread.map_or(Ok(CellSpread::default()), |table| differences(table, key))?,
     };
     device

@@ -11,7 +11,7 @@ use crate::num::tables::{DriftRates, SpreadLaw};
 
 impl List {
     pub(super) fn device(&mut self, device: &DeviceSpec) {
-        let DeviceSpec { response, states, asymmetry, noise, write_noise, spread } = device;
+        let DeviceSpec { response, states, asymmetry, noise, write_noise, tries, spread } = device;
         let CellSpread { step_law, step, asymmetry: lean, ceiling, floor } = spread;
         // millionths, as integers
         let numbers: Vec<_> = response.numbers().iter().map(|n| n.0.to_string()).collect();
@@ -26,6 +26,7 @@ impl List {
         };
         self.put("device.noise", noise);
         self.put("device.write_noise", write_noise.0);
+        self.put("device.tries", tries);
         let law = match step_law {
             SpreadLaw::Normal => "normal",
             SpreadLaw::LogNormal => "log_normal",

@@ -379,6 +379,11 @@ const RESPONSE: &[KeyEntry] = &[
     .otherwise("step")
     .only("with device.response.noise", &["hw.device.response.noise=0.5"]),
     real("write_noise", 1e-6, 1.0).unit("windows").otherwise("none"),
+    whole("tries", 1, 16)
+        .law("at most 127 / write.increment_max")
+        .unit("pulses")
+        .only("with timing.verify", &["hw.timing.verify=true", "hw.timing.clock_mhz=1000"])
+        .otherwise("4"),
     PROVENANCE[0],
     PROVENANCE[1],
 ];

@@ -51,16 +51,18 @@ fn put(cells: &mut Cells<'_>, at: usize, level: u16) {
 }
 
 impl Remembered<'_> {
-    /// Counts pulses, cuts those off that move nothing any more, and brings cells to where pulses left them.
+    /// Counts pulses, if they are not looked at one by one, cuts those off that move nothing any more, and brings cells to where pulses
+    /// left them.
     pub(super) fn before(
         &mut self,
         cells: &mut Cells<'_>,
         pulses: &Half<i8>,
         groups: u16,
+        counts: bool,
     ) -> Sending {
         let mut sending = Sending { pulses: *pulses, free: [0; _] };
         for (at, asked) in pulsed(pulses, groups) {
-            if let Some((limits, spent)) = &mut self.wear {
+            if let Some((limits, spent)) = self.wear.as_mut().filter(|_| counts) {
                 let all = u32::from(asked.unsigned_abs());
                 let moving = limits[at].saturating_sub(spent[at]).min(all);
                 spent[at] = spent[at].saturating_add(all);

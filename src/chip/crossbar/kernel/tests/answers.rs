@@ -33,6 +33,7 @@ fn device(spread: [bool; 3], noise: usize, states: u32, bits: u32) -> Device {
             PulseNoise::OfStep(Millionths(90_000_000)),
         ][noise],
         write_noise: Millionths(0),
+        tries: DeviceSpec::TRIES,
         spread: CellSpread {
             step_law: if spread[0] { SpreadLaw::LogNormal } else { SpreadLaw::Normal },
             step: share(spread[0], 700_000),

@@ -27,6 +27,10 @@ pub(in super::super) struct TileDevice {
     /// By bank, as levels lie.
     cells: [Vec<Cell>; 2],
     given: [Vec<u32>; 2],
+    /// Of verified pulses: how many are given at most for each that is asked for, and the mean step in 2^-8 of a level.
+    verified: Option<[i64; 2]>,
+    /// Where cells were when their write began.
+    began: [Vec<u16>; 2],
     /// Of the chip's window.
     span: i64,
     /// In 2^-16 of a step, and in 2^-8 of a level.
@@ -99,6 +103,11 @@ impl TileDevice {
             gaussian: half_gaussian(),
             cells: places.each_ref().map(cells),
             given: [0, 1].map(|_| vec![0; size[0] * size[1]]),
+            verified: hardware.timing.filter(|timing| timing.verify).map(|_| {
+                let states = i64::from(spec.states);
+                [i64::from(spec.tries), (2 * 256 * span + states).div_euclid(2 * states)]
+            }),
+            began: [0, 1].map(|_| vec![0; size[0] * size[1]]),
             span,
             noise: match spec.noise {
                 PulseNoise::Off => [0, 0],
@@ -172,7 +181,11 @@ impl Tile {
         let at = row * self.size.columns + column;
         match &self.device {
             None => return false,
-            Some(device) if device.given[bank][at] == 0 => self.recollect(bank, at),
+            Some(device) if device.given[bank][at] == 0 => {
+                self.recollect(bank, at);
+                let level = self.level[bank][at];
+                self.device.as_mut().expect("just seen").began[bank][at] = level;
+            }
             Some(_) => {}
         }
         let [moves, last_ever] = self.spend(bank, at);
@@ -185,7 +198,8 @@ impl Tile {
         let still = self.pruned[bank][at] || self.stuck[bank][at] || !moves;
         let after = if still { before } else { reached.clamp(floor, ceiling) };
         self.level[bank][at] = narrow(after, "a level");
-        if moves && (last || last_ever) && self.config.more.residual_bits > 0 {
+        let last = last || last_ever || self.has_arrived(bank, column);
+        if moves && last && self.config.more.residual_bits > 0 {
             let rest = (1 << self.config.more.residual_bits) - 1;
             let left = &mut self.residual[bank][at];
             *left = match reached {
@@ -197,7 +211,25 @@ impl Tile {
         let events = &mut self.bank_events[bank];
         events.pulses_attempted += 1;
         events.pulses_effective += after.abs_diff(before);
+        events.verify_reads += u64::from(self.config.more.verify);
         true
+    }
+
+    /// Slots for the pulses that are asked of a cell.
+    pub(super) fn slots(&self, asked: i64) -> i64 {
+        let verified = self.device.as_ref().and_then(|device| device.verified);
+        verified.map_or(asked, |[tries, _]| tries * asked)
+    }
+
+    /// Whether a cell of the row was looked at and has moved as far as it should.
+    pub(super) fn has_arrived(&self, bank: usize, column: usize) -> bool {
+        let at = self.upd.row * self.size.columns + column;
+        let Some(device) = &self.device else { return false };
+        let Some([tries, mean]) = device.verified else { return false };
+        let asked = self.pulse[bank][column] / tries;
+        let moved = i64::from(self.level[bank][at]) - i64::from(device.began[bank][at]);
+        let far = 2 * 256 * moved * asked.signum();
+        device.given[bank][at] > 0 && far >= (2 * asked.abs() - 1) * mean
     }
 
     /// A write of these cells is over.

@@ -272,6 +272,7 @@ impl Tile {
                     let request = self.request(bank, at, sum);
                     self.bounded(bank, at, request, word)
                 };
+                let pulses = self.slots(pulses);
                 self.pulse[bank][column] = pulses;
                 self.peak_set = self.peak_set.max(pulses);
                 self.peak_reset = self.peak_reset.max(-pulses);
@@ -348,6 +349,9 @@ impl Tile {
         let together = self.config.more.active_max.unwrap_or(usize::MAX);
         let first = self.upd.pass * together;
         for &(bank, column) in active.iter().skip(first).take(together) {
+            if self.has_arrived(bank, column) {
+                continue;
+            }
             let by = match self.config.more.pulse_code {
                 PulseCode::Unary => 1,
                 PulseCode::Amplitude => self.pulse[bank][column].abs(),
