@@ -382,6 +382,8 @@ Keys = TypedDict(
         "hw.device.response.noise_of": Literal["step", "window"],
         # Standard deviation of what a write leaves beside the level that its pulses reached, in windows: reads see it, and the next pulse begins where pulses had left the cell. [windows]
         "hw.device.response.write_noise": float,
+        # Where pulses are verified (`timing.verify`): pulses that a cell is given at most for each that is asked for. It gets no more once it has moved as far as pulses of mean length would take it, to half of one. [pulses]
+        "hw.device.response.tries": int,
         # Where the numbers come from.
         "hw.device.response.source": Any,
         # How far to trust the numbers.
