@@ -140,7 +140,6 @@ pub mod deployment {
     pub use crate::lab::run::{
         ChipResult, ChipSummary, Deployment, Moment, deploy, moments, seconds_of, summed_up, unread,
     };
-    pub use crate::num::tables::DriftTables;
 }
 
 #[cfg(feature = "lab")]
