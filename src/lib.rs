@@ -134,6 +134,14 @@ pub mod sweep {
     pub use crate::lab::table::{Column, ColumnUnit, Format, Role, Table, Values, WriteError};
 }
 
+/// Finished runs on other chips of their kind and after a time: what [`Deployment`](deployment::Deployment) asks for.
+#[cfg(feature = "lab")]
+pub mod deployment {
+    pub use crate::lab::run::{
+        ChipResult, ChipSummary, Deployment, Moment, deploy, moments, seconds_of, summed_up, unread,
+    };
+}
+
 #[cfg(feature = "lab")]
 pub use crate::lab::{
     config::{Config, ConfigError, Sources},

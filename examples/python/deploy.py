@@ -11,6 +11,7 @@ import numpy as np
 import dalean
 
 NOISE, KEYS = 0.72, {"learning.batch": 20, "learning.rate": 0.05, "learning.control": "frozen_hidden"}
+softmax = lambda y: np.exp(y) / np.exp(y).sum(1, keepdims=True)  # noqa: E731
 
 
 def patterns(count: int, seed: int) -> tuple[np.ndarray, np.ndarray]:
@@ -18,9 +19,6 @@ def patterns(count: int, seed: int) -> tuple[np.ndarray, np.ndarray]:
     rng = np.random.default_rng(seed)
     labels = rng.integers(10, size=count)
     return (1 - NOISE) * np.random.default_rng(0).random((10, 64))[labels] + NOISE * rng.random((count, 64)), labels
-
-
-softmax = lambda y: np.exp(y) / np.exp(y).sum(1, keepdims=True)  # noqa: E731
 
 
 def trained(x: np.ndarray, labels: np.ndarray, units: int = 48) -> list[tuple[np.ndarray, np.ndarray]]:

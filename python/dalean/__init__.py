@@ -28,7 +28,7 @@ from .errors import (
     RunError,
 )
 from .runs import Report, Run, Verdict, configuration, resume, sweep, train
-from .tables import Table
+from .tables import Chips, Table
 
 if TYPE_CHECKING:
     from .estimator import EDClassifier
@@ -40,6 +40,7 @@ __all__ = [
     "CheckpointError",
     "Chip",
     "ChipError",
+    "Chips",
     "ConfigError",
     "DataError",
     "Deployed",

@@ -47,6 +47,23 @@ def verify(
 def evaluate(
     path: PathLike[str], data: PathLike[str], moved: PathLike[str] | None, threads: int, kernel: str | None
 ) -> tuple[tuple[int, int] | None, str]: ...
+def chips(
+    path: PathLike[str],
+    data: PathLike[str],
+    moved: PathLike[str] | None,
+    threads: int,
+    kernel: str | None,
+    chips: list[int],
+    after: list[float],
+    compensate: bool,
+    hw: str | None,
+    settings: list[str],
+    callback: _Told,
+) -> tuple[list[tuple[int, float | None, float]], str | None]: ...
+def chip_summaries(
+    rows: Sequence[tuple[int, float | None, float]],
+) -> list[tuple[float | None, int, float, float | None, list[float], float, float, int]]: ...
+def seconds(span: str) -> float | None: ...
 def price(path: PathLike[str], hw: str | None) -> str: ...
 def report(path: PathLike[str], data: PathLike[str], moved: PathLike[str] | None) -> tuple[str, str]: ...
 def sweep(
@@ -88,6 +105,8 @@ class Network:
     """Bits of a stored level."""
     window: tuple[int, int]
     """Least and greatest level of a cell."""
+    signed: bool
+    """Whether what is shown has a sign."""
     updates: int
     samples: int
     """Samples loaded."""
@@ -101,7 +120,8 @@ class Network:
     def read(self, x: ArrayLike, learn: bool = True) -> NDArray[np.uint8] | NDArray[np.int64]:
         """``LOADX`` and ``FWD``: reads ``x`` ``[sample, input]`` through all layers.
 
-        ``uint8`` are drive codes up to ``code_max``; floats from 0 to 1 become the nearest one. Gives activities of the
+        ``uint8`` are drive codes up to ``code_max``; floats from 0 to 1 become the nearest one; with a sign, from -1 to 1, where the
+        network was made so. Gives activities of the
         outputs, ``[sample, output]``, 255 is 1.0; accumulators (``int64``) of outputs without a table. What is read with
         ``learn=False`` is charged to evaluation and cannot be learnt from.
 
@@ -131,6 +151,12 @@ class Network:
         """Levels of an array, ``[row, column]``; a constant row is the last."""
     def load(self, layer: int, pathway: str, levels: ArrayLike) -> None:
         """``LOADW``: loads levels into an array, ``[row, column]``."""
+    def leave(self, chips: Sequence[int], after: Sequence[float], compensate: bool) -> list[float | None]:
+        """Gets ready for other chips, and gives the moments at which each is read: seconds after programming."""
+    def onto(self, number: int, moment: int) -> None:
+        """Goes to a chip at a moment."""
+    def home(self) -> None:
+        """Comes back, as it was."""
     def ledger_json(self) -> str: ...
     def told_hash(self) -> str:
         """BLAKE3 of everything that came from outside, in order."""

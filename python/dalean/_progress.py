@@ -21,8 +21,11 @@ class Progress:
     def __call__(self, kind: str, told: Any) -> None:
         if not self.show:
             return
-        if kind in ("batch", "sweep", "update"):
-            if kind == "sweep":
+        if kind in ("batch", "chips", "sweep", "update"):
+            if kind == "chips":
+                done, total = told["done"], told["total"]
+                words = f"{done:.0f} of {total:.0f} readings"
+            elif kind == "sweep":
                 done, total, words = told["share"], 1.0, f"{told['finished']:.0f} of {told['runs']:.0f} runs"
             else:
                 epochs = told.get("epochs", told["epoch"] + 1)

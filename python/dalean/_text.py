@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import json
 import math
+import numbers
+import operator
 import os
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from . import _dalean
 from .errors import ConfigError
 
 if TYPE_CHECKING:
@@ -107,3 +110,47 @@ def taps(rule: str, outputs: int, overrides: Overrides | None) -> dict[str, Any]
     said = {key for key, _ in flat(overrides or {})}
     routed = rule.startswith("ed") and not said & {"learning.route", "learning.taps", "learning.rule"}
     return {"learning.taps": outputs} if routed and outputs < 3 else {}
+
+
+SAMPLES_MAX = 1_000_000
+"""Chips of one call, at most."""
+Spans = str | float | Iterable[str | float]
+"""Seconds after programming, or spans such as ``"1d"``: s, min, h, d, y; one or several."""
+
+
+def asked(samples: int | None, chip: int | None, after: Spans | None) -> tuple[list[int], list[float]]:
+    """Numbers of the chips that are asked for, and seconds after programming."""
+    if samples is not None and chip is not None:
+        raise _wrong("chip", "is given beside samples", "give one of both: numbers 1 to samples, or one number")
+    if samples is not None:
+        chips = list(range(1, _whole("samples", samples, 1, SAMPLES_MAX) + 1))
+    else:
+        chips = [_whole("chip", chip or 0, 0, 2**64 - 1)]
+    spans = [] if after is None else [after] if isinstance(after, str | numbers.Real) else list(after)
+    seconds = []
+    for span in spans:
+        told = span if isinstance(span, str) else f"{float(span)!r}s" if isinstance(span, numbers.Real) else ""
+        found = _dalean.seconds(told)
+        if found is None:
+            raise _wrong("after", f"has {span!r}", 'give seconds, or a span such as "25s", "10min", "1h", "1d", "1y"')
+        seconds.append(found)
+    return chips, seconds
+
+
+def _whole(where: str, given: Any, least: int, most: int) -> int:
+    try:
+        number = operator.index(given)
+    except TypeError:
+        number = -1
+    if not least <= number <= most:
+        raise _wrong(where, f"is {given!r}", f"give a whole number, {least} to {most}")
+    return number
+
+
+def below_hw(overrides: Overrides | None) -> list[str]:
+    """Overrides of a chip as the command line's ``--set``; the prefix ``hw.`` may be left out."""
+    return [one if one.startswith(("hw.", "hw=")) else f"hw.{one}" for one in settings(overrides)]
+
+
+def _wrong(where: str, found: str, allowed: str) -> ConfigError:
+    return ConfigError(f"{where} {found}; {allowed}", where, found, allowed)

@@ -20,6 +20,8 @@ _KINDS = {
     "I32": np.int32,
     "U64": np.uint64,
     "I64": np.int64,
+    "F16": np.float16,
+    "BF16": np.uint16,  # the upper half of a float32
     "F32": np.float32,
     "F64": np.float64,
 }
@@ -46,6 +48,8 @@ def read_safetensors(source: str | os.PathLike | bytes) -> dict[str, np.ndarray]
             if not 0 <= first <= last <= len(content) - 8 - size:
                 raise ValueError(f"tensor {tensor} lies outside the file")
             numbers = np.frombuffer(content, kind, offset=8 + size + first, count=(last - first) // kind.itemsize)
+            if about["dtype"] == "BF16":
+                numbers = (numbers.astype(np.uint32) << 16).view(np.float32)
             arrays[tensor] = numbers.reshape(shape).copy()
         return arrays
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:

@@ -18,16 +18,18 @@ import hashlib
 import json
 import operator
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from . import _dalean
-from ._text import Overrides, settings, taps, text
+from ._progress import Progress
+from ._text import Overrides, Spans, asked, below_hw, settings, taps, text
 from .arrays import read_safetensors
 from .errors import ArrayError, ChipError
+from .tables import Chips
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -45,9 +47,7 @@ class Chip:
 
     def __init__(self, hw: str | os.PathLike = "ideal", overrides: Overrides | None = None) -> None:
         self.hw = os.fspath(hw)
-        self.settings = [
-            one if one.startswith(("hw.", "hw=")) else f"hw.{one}" for one in settings(overrides)
-        ]
+        self.settings = below_hw(overrides)
         self.config = _dalean.configuration(None, self.hw, self.settings, None)
         """The resolved configuration of the built-in digits on this chip, as TOML; the chip is ``[hw]``."""
 
@@ -63,6 +63,8 @@ class Network(_dalean.Network):
     :param rule: how arrays are wired: ``"ed"`` two populations under Dale's law, ``"dfa"`` and ``"bp"`` differential pairs.
     :param words: ``"routed"``: hidden layers hear the words of the output by the network's route; ``"own"``: whoever
         drives the network delivers words to each layer.
+    :param signed: whether what is shown has a sign, floats from -1 to 1 or whole numbers up to ``code_max``: rows are driven with what
+        lies above 0, then with what lies below.
     :param updates: updates of the whole training, over which rates fall where ``learning.decay`` says so.
     :param seed: seed of all draws.
     :param overrides: keys of ``network`` and ``learning``: ``{"network.alpha": 4, "learning.rate": 20}``.
@@ -81,6 +83,7 @@ class Network(_dalean.Network):
         *,
         rule: str = "ed",
         words: str = "routed",
+        signed: bool = False,
         updates: int = 1,
         seed: int = 1,
         overrides: Overrides | None = None,
@@ -108,6 +111,7 @@ class Network(_dalean.Network):
             seed,
             sizes[0],
             sizes[-1],
+            bool(signed),
             words == "own",
             updates,
             threads,
@@ -161,6 +165,52 @@ class Network(_dalean.Network):
             if not layer.isdigit():
                 raise _wrong("levels", f"name {name!r}", 'names are such as "layer0.pp"')
             self.load(int(layer), pathway, array)
+
+    def on_chips(
+        self,
+        score: Callable[[Network], float],
+        *,
+        samples: int | None = None,
+        chip: int | None = None,
+        after: Spans | None = None,
+        compensate: bool = False,
+        progress: bool | None = None,
+    ) -> Chips:
+        """Loads the network into other chips of its kind, lets it drift, and asks ``score`` what it is worth there: one row a chip
+        and a moment, with the column ``score``::
+
+            net = dalean.deploy(module, x, dalean.Chip("hw_models/own/pcm_drift.toml", {"device.faults.stuck_any": 0.01}))
+            right = lambda net: (net.read(test, learn=False).argmax(1) == labels).mean()
+            net.on_chips(right, samples=1000, after=["1d", "1y"], compensate=True).summary
+
+        Chips have the ``[device]`` of the network's. Into one of a number above 0 every array is loaded: what was last loaded into
+        it here or, where cells were written since, what it holds. Each begins with the counters, ranges of converters and
+        thresholds that the network has now, and afterwards the network is as it was.
+
+        :param score: is given the network, on the chip; reads it and gives a number, the more the better.
+        :param samples: chips 1 to ``samples``; the number decides stuck cells, windows, what loads leave, drift and noise.
+        :param chip: one chip, by its number; 0, the default, is the one that it is on.
+        :param after: seconds after programming, or spans such as ``"1d"`` (s, min, h, d, y); one or several. Without it, at once.
+        :param compensate: whether a factor a layer makes up for drift.
+        :raises dalean.ConfigError: when nothing of what is asked for varies on this chip, or a value cannot be.
+        """
+        chips, seconds = asked(samples, chip, after)
+        moments = super().leave(chips, seconds, compensate)
+        rows: list[tuple[int, float | None, float]] = []
+        try:
+            with Progress(progress, "readings") as told:
+                for number in chips:
+                    for at, after_s in enumerate(moments):
+                        super().onto(number, at)
+                        worth = score(self)
+                        try:
+                            rows.append((number, after_s, float(worth)))
+                        except (TypeError, ValueError):
+                            raise _wrong("score", f"gives {worth!r}", "it gives a number") from None
+                        told("chips", {"done": len(rows), "total": len(chips) * len(moments)})
+        finally:
+            super().home()
+        return Chips("score", rows)
 
     def save(self, path: str | os.PathLike) -> Path:
         """Writes levels as NPZ where the name ends with it, else the whole state as safetensors."""

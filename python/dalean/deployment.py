@@ -7,6 +7,7 @@
     y = dalean.outputs(net)                                     # in the units that the weights came in
     net.deliver(net.error_words(255 * (wanted - softmax(y))))   # and trained on, in place
     net.write()
+    net.on_chips(score, samples=1000, after="1d").summary       # and on others of its kind, later
 
 ``w = E - I`` of two cells, one of which rests on the floor::
 
@@ -69,6 +70,7 @@ def deploy(
     to: str = "pairs",
     activation: str = "relu",
     rule: str | None = None,
+    signed: bool = False,
     quantile: float = 0.999,
     updates: int = 1,
     seed: int = 1,
@@ -79,11 +81,14 @@ def deploy(
     """Maps a dense network of signed weights onto a chip, finds the ranges of its converters, and gives it to be read and trained on.
 
     :param layers: weights ``[inputs, units]`` of each layer, or pairs of them and biases; or arrays by name as PyTorch has them
-        (``0.weight`` ``[units, inputs]``, ``0.bias``): a mapping, an NPZ or safetensors file, a module.
+        (``0.weight`` ``[units, inputs]``, ``0.bias``): a mapping, an NPZ or safetensors file, a module, whose order of layers is that
+        of its state. Between the layers of a ``Sequential`` units are looked for; whatever else a module does in its ``forward`` is
+        the caller's to know.
     :param x: samples that the network is used for, as :meth:`Network.read` takes them: what units put out is measured on them.
     :param to: ``"pairs"`` or ``"dual"``.
     :param activation: of hidden layers, ``"relu"`` or ``"sigmoid"``; outputs are sums, whose greatest is the answer.
     :param rule: how arrays learn afterwards: of pairs ``"dfa"`` (default) or ``"bp"``; of dual ones ``"ed"``.
+    :param signed: whether ``x`` has a sign, as of :class:`Network`.
     :param quantile: share of what hidden units put out that lies within the chip's 0 to 1.
     :param overrides: keys of ``network`` and ``learning``, as of :class:`Network`.
     :raises dalean.ArrayError: when these are no layers of a network, or ``x`` does not fit them.
@@ -99,9 +104,9 @@ def deploy(
     rule = rule or ("dfa" if to == "pairs" else "ed")
     if (rule in ("dfa", "bp")) != (to == "pairs"):
         raise _wrong("rule", f"is {rule!r}", 'pairs learn by "dfa" or "bp", dual arrays by "ed"')
-    signed = _layers(layers, activation)
-    sizes = [signed[0][0].shape[0], *(weights.shape[1] for weights, _ in signed)]
-    biased = any(biases is not None for _, biases in signed)
+    dense = _layers(layers, activation)
+    sizes = [dense[0][0].shape[0], *(weights.shape[1] for weights, _ in dense)]
+    biased = any(biases is not None for _, biases in dense)
     chip = chip if isinstance(chip, Chip) else Chip(chip or "ideal")
     probe = Network([1, 2], chip)
     floor, ceiling = probe.window
@@ -111,8 +116,8 @@ def deploy(
 
     told, arrays = [], []
     active, before = _fractions(x, probe.code_max, sizes[0]), 1.0
-    for at, (weights, biases) in enumerate(signed):
-        last = at == len(signed) - 1
+    for at, (weights, biases) in enumerate(dense):
+        last = at == len(dense) - 1
         rows = weights * before
         shifts = np.zeros(sizes[at + 1]) if biases is None else biases
         sums = active @ weights + shifts
@@ -153,6 +158,7 @@ def deploy(
         sizes,
         chip,
         rule=rule,
+        signed=signed,
         updates=updates,
         seed=seed,
         overrides={**keys, **(overrides or {})},
@@ -204,20 +210,19 @@ def signed(net: Network) -> list[tuple[NDArray[np.float64], NDArray[np.float64] 
 def _fractions(x: ArrayLike, most: int, inputs: int) -> np.ndarray:
     """What the chip is shown, from 0 to 1."""
     x = np.asarray(x)
+    whole = np.issubdtype(x.dtype, np.integer)
+    x = _real("x", x)
     x = x.reshape(1, -1) if x.ndim == 1 else x
     if x.ndim != 2 or x.shape[1] != inputs or not len(x):
         raise _wrong("x", f"has the shape {x.shape}", f"give samples of {inputs} numbers, [sample, input]")
-    return x.astype(np.float64) / (most if np.issubdtype(x.dtype, np.integer) else 1)
+    return x / (most if whole else 1)
 
 
 def _layers(layers: Any, activation: str) -> list[_Layer]:
     """Weights ``[inputs, units]`` and biases, checked."""
     if hasattr(layers, "state_dict") and hasattr(layers, "modules"):
-        kinds = {type(one).__name__ for one in layers.modules() if not any(True for _ in one.children())}
-        other = kinds - {"Linear", "Flatten", "Dropout", "Identity", {"relu": "ReLU", "sigmoid": "Sigmoid"}[activation]}
-        if other:
-            raise _wrong("the module", f"has {', '.join(sorted(other))}", f"it may have Linear and, by activation={activation!r}, units of that kind")
-        layers = {name: tensor.detach().cpu().numpy() for name, tensor in layers.state_dict().items()}
+        _check_module(layers, activation)
+        layers = layers.state_dict()
     elif isinstance(layers, str | os.PathLike):
         if Path(layers).suffix == ".npz":
             with np.load(layers, allow_pickle=False) as arrays:
@@ -225,7 +230,7 @@ def _layers(layers: Any, activation: str) -> list[_Layer]:
         else:
             layers = read_safetensors(layers)
     if isinstance(layers, Mapping):
-        named = {name: np.asarray(array) for name, array in layers.items()}
+        named = {name: _numbers(array) for name, array in layers.items()}
         found: list[Any] = []
         for name, array in named.items():
             if name.endswith("weight"):
@@ -239,8 +244,8 @@ def _layers(layers: Any, activation: str) -> list[_Layer]:
     checked: list[_Layer] = []
     units = None
     for at, (weights, biases) in enumerate(found):
-        weights = np.asarray(weights, dtype=np.float64)
-        biases = None if biases is None else np.asarray(biases, dtype=np.float64)
+        weights = _real(f"the weights of layer {at}", weights)
+        biases = None if biases is None else _real(f"the biases of layer {at}", biases)
         fits = weights.ndim == 2 and weights.size and units in (None, weights.shape[0])
         if not fits or (biases is not None and biases.shape != weights.shape[1:]):
             shapes = f"has weights of shape {weights.shape}" + ("" if biases is None else f" and biases of {biases.shape}")
@@ -252,6 +257,37 @@ def _layers(layers: Any, activation: str) -> list[_Layer]:
     if not checked:
         raise _wrong("layers", "are none", "give at least one")
     return checked
+
+
+def _numbers(array: Any) -> np.ndarray:
+    """As NumPy has it: a tensor of PyTorch may be of a kind that NumPy has not, on another device, or learnt from."""
+    return array.detach().cpu().double().numpy() if hasattr(array, "detach") else np.asarray(array)
+
+
+def _real(where: str, array: Any) -> np.ndarray:
+    """Numbers of double precision."""
+    try:
+        array = np.asarray(array)
+        if array.dtype.kind == "c":
+            raise TypeError("complex numbers")
+        return array.astype(np.float64)
+    except (TypeError, ValueError, OverflowError) as error:
+        raise _wrong(where, f"cannot be read: {error}", "give real numbers") from None
+
+
+def _check_module(module: Any, activation: str) -> None:
+    """That a module of PyTorch has dense layers with units of that kind between them; of its own forward() nothing is known."""
+    unit = {"relu": "ReLU", "sigmoid": "Sigmoid"}[activation]
+    inner, leaves = [], []
+    for one in module.modules():
+        (inner if any(True for _ in one.children()) else leaves).append(type(one).__name__)
+    other = set(leaves) - {"Linear", "Flatten", "Dropout", "Identity", unit}
+    if other:
+        raise _wrong("the module", f"has {', '.join(sorted(other))}", f"it may have Linear and, by activation={activation!r}, units of that kind")
+    found = [name for name in leaves if name in ("Linear", unit)]
+    layers = found.count("Linear")
+    if set(inner) <= {"Sequential"} and layers and found != ["Linear", *[unit, "Linear"] * (layers - 1)]:
+        raise _wrong("the module", f"is {', '.join(found)}", f"it has {unit} behind every Linear but the last")
 
 
 def _wrong(where: str, found: str, allowed: str) -> ArrayError:

@@ -352,6 +352,10 @@ Keys = TypedDict(
         "hw.device.programming": Any,
         # What time does to levels, between programming and reading (`dalean eval --after`).
         "hw.device.drift": Any,
+        # How many pulses cells take.
+        "hw.device.endurance": Any,
+        # What volatile cells forget while they learn.
+        "hw.device.leakage": Any,
         # How the step of a pulse depends on where the cell lies in its window.
         "hw.device.response.curve": Literal["linear", "soft_bounds", "exponential", "neurosim", "table", "measured"],
         # Pulses of mean length across the window. Levels are the resolution that the cell is simulated with; rates count pulses. [pulses]
@@ -376,6 +380,10 @@ Keys = TypedDict(
         "hw.device.response.noise": float,
         # What that is a share of.
         "hw.device.response.noise_of": Literal["step", "window"],
+        # Standard deviation of what a write leaves beside the level that its pulses reached, in windows: reads see it, and the next pulse begins where pulses had left the cell. [windows]
+        "hw.device.response.write_noise": float,
+        # Where pulses are verified (`timing.verify`): pulses that a cell is given at most for each that is asked for. It gets no more once it has moved as far as pulses of mean length would take it, to half of one. [pulses]
+        "hw.device.response.tries": int,
         # Where the numbers come from.
         "hw.device.response.source": Any,
         # How far to trust the numbers.
@@ -446,10 +454,36 @@ Keys = TypedDict(
         "hw.device.drift.change": Any,
         # Its standard deviation from cell to cell.
         "hw.device.drift.change_spread": Any,
+        # Seconds from one write of an array to the next while a net learns: levels drift meanwhile, each since the write that last pulsed its cell. [s]
+        "hw.device.drift.update_s": float,
+        # Writes of an array from one look to the next: levels are brought to where they have drifted to. [writes]
+        "hw.device.drift.every": int,
         # Where the numbers come from.
         "hw.device.drift.source": Any,
         # How far to trust the numbers.
         "hw.device.drift.kind": Literal["measured", "fitted", "assumed"],
+        # Pulses that a cell takes before it moves no more: of the cell in the middle, where they differ. A load counts as a pulse. [pulses]
+        "hw.device.endurance.pulses": float,
+        # Standard deviation of the logarithm of that number, from cell to cell.
+        "hw.device.endurance.spread": float,
+        # Where a cell stays that is worn out.
+        "hw.device.endurance.worn": Literal["level", "floor", "ceiling"],
+        # Where the numbers come from.
+        "hw.device.endurance.source": Any,
+        # How far to trust the numbers.
+        "hw.device.endurance.kind": Literal["measured", "fitted", "assumed"],
+        # Writes of an array after which a cell that is not pulsed has lost 1 - 1/e of its distance to where it rests. [writes]
+        "hw.device.leakage.lifetime": float,
+        # Writes of an array from one look to the next: what was lost in between is taken off at once. [writes]
+        "hw.device.leakage.every": int,
+        # Where cells come to rest: 0 is the floor, 1 the ceiling of a cell. [windows]
+        "hw.device.leakage.rest": float,
+        # Standard deviation of what is lost, from cell to cell, in parts of the mean.
+        "hw.device.leakage.spread": float,
+        # Where the numbers come from.
+        "hw.device.leakage.source": Any,
+        # How far to trust the numbers.
+        "hw.device.leakage.kind": Literal["measured", "fitted", "assumed"],
         # Megahertz of the clock that counts cycles. [MHz]
         "hw.timing.clock_mhz": float,
         # `T_A`: cycles to settle and sample; with `pulse_width`, cycles beside the slots of a phase. [cycles] Default: 1.

@@ -6,6 +6,7 @@ import html
 import json
 import os
 import tempfile
+import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,9 +14,9 @@ from typing import Any
 
 from . import _dalean
 from ._progress import Progress
-from ._text import Overrides, place, settings, source, text, threads as _threads
+from ._text import Overrides, Spans, asked, below_hw, place, settings, source, text, threads as _threads
 from .errors import RunError
-from .tables import Table
+from .tables import Chips, Table
 
 PathLike = str | os.PathLike
 
@@ -251,6 +252,58 @@ class Run:
             kernel,
         )
         return None if score is None else score[0] / score[1]
+
+    def on_chips(
+        self,
+        *,
+        samples: int | None = None,
+        chip: int | None = None,
+        after: Spans | None = None,
+        compensate: bool = False,
+        hw: str | os.PathLike | None = None,
+        overrides: Overrides | None = None,
+        data: PathLike | None = None,
+        files: PathLike | None = None,
+        threads: int | None = None,
+        kernel: str | None = None,
+        progress: bool | None = None,
+    ) -> Chips:
+        """Loads what the run learnt into other chips of its kind, lets it drift and reads the test set, as ``dalean eval`` does with
+        ``--samples``, ``--chip``, ``--after``, ``--compensate``, ``--hw`` and ``--set``: the same numbers.
+
+        One row a chip and a moment, with the accuracy as a fraction (``test_accuracy``) or the mean return (``return_mean``)::
+
+            chips = run.on_chips(samples=1000, after=["1d", "1y"], compensate=True, hw="hw_models/own/pcm_drift.toml")
+            chips.summary[1]["worst_chip"], chips.to_pandas().groupby("after_s").test_accuracy.quantile(0.05)
+
+        :param samples: chips 1 to ``samples``; the number decides stuck cells, windows, what loads leave, drift and noise.
+        :param chip: one chip, by its number; 0, the default, is the one that learnt.
+        :param after: seconds after programming, or spans such as ``"1d"`` (s, min, h, d, y); one or several. Without it, at once.
+        :param compensate: whether a factor a layer makes up for drift.
+        :param hw: a hardware model whose ``[device]`` the chips have; a table in it that only pulses have to do with is warned of.
+        :param overrides: keys of ``hw.device``, such as ``{"hw.device.faults.stuck_any": 0.01}``; the prefix ``hw.`` may be left out.
+        :raises dalean.ConfigError: when nothing of what is asked for varies, or a value cannot be.
+        :raises KeyboardInterrupt: after the chip in progress.
+        """
+        chips, seconds = asked(samples, chip, after)
+        with Progress(progress, "readings") as told:
+            rows, unread = _dalean.chips(
+                self.path,
+                place(data, "DALEAN_DATA", "data"),
+                None if files is None else Path(files),
+                _threads(threads),
+                kernel,
+                chips,
+                seconds,
+                compensate,
+                None if hw is None else os.fspath(hw),
+                below_hw(overrides),
+                told if told.show else None,
+            )
+        if unread:
+            warnings.warn(unread, stacklevel=2)
+        policy = (self.test or {}).get("task") == "policy"
+        return Chips("return_mean" if policy else "test_accuracy", rows)
 
     def report(self, *, data: PathLike | None = None, files: PathLike | None = None) -> Report:
         """Draws the page of the run again."""

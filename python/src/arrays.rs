@@ -2,6 +2,7 @@
 //!
 //! ```text
 //! codes    uint8, other whole numbers: as they are.   floats: floor( x code_max + 1/2 ), x from 0 to 1
+//! signed   the same of |x|, in a first phase where x lies above 0, else in a second
 //! words    whole numbers
 //! ```
 //!
@@ -141,6 +142,50 @@ pub(crate) fn codes(what: &str, x: &Bound<'_, PyAny>, most: u8) -> PyResult<(Vec
     }
     let allowed = "give drive codes as numpy.uint8, or floats from 0 to 1";
     Err(wrong(what, &format!("are {}", kind(&x)), allowed))
+}
+
+/// Numbers with a sign, whole ones up to `most` or floats up to 1, as whole numbers up to `most`, and their shape.
+pub(crate) fn signed(
+    what: &str,
+    x: &Bound<'_, PyAny>,
+    most: u8,
+) -> PyResult<(Vec<i64>, Vec<usize>)> {
+    let (x, most) = (array(x)?, i64::from(most));
+    if let Ok(cast) = cast(&x, "int64") {
+        let (numbers, shape) = wholes(what, &cast)?;
+        return match numbers.iter().position(|&number| !(-most..=most).contains(&number)) {
+            None => Ok((numbers, shape)),
+            Some(at) => {
+                let found = format!("hold {} as number {at}", numbers[at]);
+                Err(wrong(what, &found, &format!("whole numbers lie in -{most}..={most}")))
+            }
+        };
+    }
+    let Some(floats) = cast(&x, "float64").ok().and_then(|x| numbers::<f64>(&x)) else {
+        let allowed = "give floats from -1 to 1, or whole numbers";
+        return Err(wrong(what, &format!("are {}", kind(&x)), allowed));
+    };
+    let (floats, shape) = floats?;
+    let code = |(at, &number): (usize, &f64)| {
+        if !(-1.0..=1.0).contains(&number) {
+            let found = format!("hold {number} as number {at}");
+            return Err(wrong(what, &found, "floats lie in -1 to 1: scale them"));
+        }
+        // whole, and at most `most`
+        let size = (number.abs() * most as f64 + 0.5).floor() as i64;
+        Ok(if number < 0.0 { -size } else { size })
+    };
+    Ok((floats.iter().enumerate().map(code).collect::<PyResult<_>>()?, shape))
+}
+
+/// Codes of numbers with a sign: of each sample what lies above 0, then what lies below.
+pub(crate) fn two_phases(numbers: &[i64], width: usize) -> Vec<u8> {
+    let phase = |sample: &[i64], sign: i64| -> Vec<u8> {
+        let side = |&number: &i64| u8::try_from((sign * number).max(0)).expect("at most a code");
+        sample.iter().map(side).collect()
+    };
+    let both = |sample: &[i64]| [phase(sample, 1), phase(sample, -1)].concat();
+    numbers.chunks_exact(width).flat_map(both).collect()
 }
 
 /// Numbers of any kind as doubles, and how many there are.

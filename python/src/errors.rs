@@ -151,6 +151,18 @@ impl From<SweepError> for Raised {
     }
 }
 
+/// What is asked of chips, in words of the command line, as arguments of Python have it.
+pub(crate) fn of_chips(error: impl Into<RunError>) -> Raised {
+    let argument = |text: String| text.replace("--set", "overrides").replace("--", "");
+    match error.into() {
+        RunError::Config(ConfigError::Value { key, found, allowed }) => {
+            let key = argument(key.strip_prefix("eval ").map_or(key.clone(), str::to_owned));
+            ConfigError::Value { key, found: argument(found), allowed: argument(allowed) }.into()
+        }
+        other => other.into(),
+    }
+}
+
 macro_rules! plain {
     ($($error:ty => $kind:literal),* $(,)?) => {
         $(impl From<$error> for Raised {

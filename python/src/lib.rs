@@ -23,8 +23,8 @@ mod _dalean {
     use crate::policy::PolicyLearner;
     #[pymodule_export]
     use crate::runs::{
-        configuration, evaluate, price, report, resume, sweep, sweep_part, sweep_runs, train,
-        verify,
+        chip_summaries, chips, configuration, evaluate, price, report, resume, seconds, sweep,
+        sweep_part, sweep_runs, train, verify,
     };
 
     /// The command line: the program with these arguments, its own name first. Gives its exit code.

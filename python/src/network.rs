@@ -1,17 +1,21 @@
 //! A network on a chip whose every operation is the caller's, for `dalean.Network`.
 
-use dalean::network::{HiddenWords, NetworkPlace};
+use std::collections::BTreeMap;
+
+use dalean::deployment::{Deployment, Moment, moments};
+use dalean::network::{DrivenBy, HiddenWords, NetworkPlace};
 use dalean::{Checkpointed, Config, DrivenNetwork, Experiment, Sources, ledger_of};
 use pyo3::prelude::*;
 use pyo3::types::{PyAny, PyBytes};
 
-use crate::arrays::{codes, rows, table, wholes};
-use crate::errors::{Raised, wrong};
+use crate::arrays::{codes, rows, signed, table, two_phases, wholes};
+use crate::errors::{Raised, of_chips, wrong};
 use crate::waits::{Held, backend};
 
 /// What a network is made of.
 #[derive(Debug, Clone)]
 struct Made {
+    config: Config,
     experiment: Experiment,
     updates: u64,
     own: bool,
@@ -34,7 +38,7 @@ impl Made {
 }
 
 /// Everything that came from outside, as one hash.
-#[derive(Debug, Default)]
+#[derive(Debug, Clone, Default)]
 struct Told(blake3::Hasher);
 
 impl Told {
@@ -51,16 +55,30 @@ impl Told {
     }
 }
 
+/// Levels as they were loaded, before what loads leave, of arrays that were not written since: by layer and pathway.
+type Asked = BTreeMap<(usize, String), Vec<u16>>;
+
+/// A network that is on another chip for now.
+#[derive(Debug)]
+struct Away {
+    kept: Vec<u8>,
+    told: Told,
+    asked: Asked,
+    moments: Vec<Moment>,
+    made_up: bool,
+}
+
 #[pyclass(module = "dalean._dalean", subclass)]
 pub(crate) struct Network {
     made: Made,
     network: Held<DrivenNetwork>,
     config: String,
     told: Told,
+    asked: Asked,
+    away: Option<Away>,
 }
 
 impl Network {
-    /// The network; in a child of a fork, with threads of its own.
     /// The thing itself; in a child of a fork, with threads of its own.
     fn held(&mut self) -> Result<&mut DrivenNetwork, Raised> {
         let Self { made, network, .. } = self;
@@ -78,6 +96,20 @@ impl Network {
 
     fn outputs(&self) -> Result<usize, Raised> {
         self.units(self.network.layers() - 1)
+    }
+
+    /// Codes of what is shown, and of how many samples.
+    fn shown(&self, x: &Bound<'_, PyAny>) -> PyResult<(Vec<u8>, usize)> {
+        let what = "numbers of x";
+        let inputs = self.network.size(0).map_err(Raised::from)?[0];
+        if self.signed() {
+            let (numbers, shape) = signed(what, x, self.network.code_max())?;
+            let samples = rows(what, &shape, inputs)?;
+            return Ok((two_phases(&numbers, inputs), samples));
+        }
+        let (codes, shape) = codes(what, x, self.network.code_max())?;
+        let samples = rows(what, &shape, inputs)?;
+        Ok((codes, samples))
     }
 
     fn words(&self, x: &Bound<'_, PyAny>, width: usize) -> PyResult<Vec<i16>> {
@@ -105,7 +137,7 @@ fn stream(name: &str) -> PyResult<char> {
 #[pymethods]
 impl Network {
     #[new]
-    #[pyo3(signature = (name, text, hw, settings, seed, inputs, outputs, own_words, updates, threads, kernel))]
+    #[pyo3(signature = (name, text, hw, settings, seed, inputs, outputs, signed, own_words, updates, threads, kernel))]
     #[expect(clippy::too_many_arguments, reason = "the package gives all of them by name")]
     fn new(
         py: Python<'_>,
@@ -116,6 +148,7 @@ impl Network {
         seed: Option<u64>,
         inputs: usize,
         outputs: usize,
+        signed: bool,
         own_words: bool,
         updates: u64,
         threads: usize,
@@ -135,19 +168,26 @@ impl Network {
             };
             let config = Config::load(&sources)?;
             // a single output tells two classes apart
-            let experiment = config.experiment(inputs, outputs.max(2), None)?;
-            let config = config.to_toml();
+            let mut experiment = config.experiment(inputs, outputs.max(2), None)?;
+            if signed {
+                experiment.network.layers[0].driven_by = DrivenBy::Signed;
+            }
+            let text = config.to_toml();
             let mut name = blake3::Hasher::new();
-            name.update(config.as_bytes());
+            name.update(text.as_bytes());
             name.update(format!("\n{inputs} {outputs} {own_words} {updates}").as_bytes());
+            if signed {
+                name.update(b" signed");
+            }
             let name = name.finalize().to_hex().to_string();
-            let made = Made { experiment, updates, own: own_words, kernel, name };
+            let made = Made { config, experiment, updates, own: own_words, kernel, name };
             let network = made.build(threads)?;
-            Ok((made, network, config))
+            Ok((made, network, text))
         })?;
         let (made, network, config) = made;
         let network = Held::new(network, threads);
-        Ok(Self { made, network, config, told: Told::default() })
+        let (told, asked) = (Told::default(), Asked::new());
+        Ok(Self { made, network, config, told, asked, away: None })
     }
 
     #[getter]
@@ -191,6 +231,11 @@ impl Network {
     }
 
     #[getter]
+    fn signed(&self) -> bool {
+        self.made.experiment.network.layers[0].driven_by == DrivenBy::Signed
+    }
+
+    #[getter]
     fn samples(&self) -> usize {
         self.network.samples()
     }
@@ -219,9 +264,7 @@ impl Network {
         x: &Bound<'py, PyAny>,
         learn: bool,
     ) -> PyResult<Bound<'py, PyAny>> {
-        let (codes, shape) = codes("numbers of x", x, self.network.code_max())?;
-        let inputs = self.network.size(0).map_err(Raised::from)?[0];
-        let samples = rows("numbers of x", &shape, inputs)?;
+        let (codes, samples) = self.shown(x)?;
         self.told.add(if learn { "read" } else { "look" }, &codes);
         let network = self.held()?;
         py.detach(|| network.read(&codes, learn)).map_err(Raised::from)?;
@@ -234,8 +277,7 @@ impl Network {
     }
 
     fn calibrate(&mut self, py: Python<'_>, x: &Bound<'_, PyAny>) -> PyResult<()> {
-        let (codes, shape) = codes("numbers of x", x, self.network.code_max())?;
-        rows("numbers of x", &shape, self.network.size(0).map_err(Raised::from)?[0])?;
+        let (codes, _) = self.shown(x)?;
         self.told.add("calibrate", &codes);
         let network = self.held()?;
         Ok(py.detach(|| network.calibrate(&codes)).map_err(Raised::from)?)
@@ -333,7 +375,9 @@ impl Network {
     fn write(&mut self, py: Python<'_>, shifts: Vec<Option<u32>>) -> PyResult<()> {
         self.told.add(&format!("write {shifts:?}"), &[]);
         let network = self.held()?;
-        Ok(py.detach(|| network.write(&shifts)).map_err(Raised::from)?)
+        py.detach(|| network.write(&shifts)).map_err(Raised::from)?;
+        self.asked.clear();
+        Ok(())
     }
 
     fn levels<'py>(
@@ -363,7 +407,67 @@ impl Network {
         let levels: Vec<u16> = levels.iter().map(level).collect::<PyResult<_>>()?;
         let bytes: Vec<u8> = levels.iter().flat_map(|level| level.to_le_bytes()).collect();
         self.told.add(&format!("load {layer} {pathway}"), &bytes);
-        Ok(self.held()?.load(layer, pathway, &levels).map_err(Raised::from)?)
+        self.held()?.load(layer, pathway, &levels).map_err(Raised::from)?;
+        self.asked.insert((layer, pathway.to_owned()), levels);
+        Ok(())
+    }
+
+    /// Gets ready for other chips: what there is now is kept, and the moments are those at which each is read.
+    fn leave(
+        &mut self,
+        chips: Vec<u64>,
+        after: Vec<f64>,
+        compensate: bool,
+    ) -> PyResult<Vec<Option<f64>>> {
+        if self.away.is_some() {
+            let allowed =
+                "what is read on a chip may not ask for others: call it when on_chips is done";
+            return Err(wrong("on_chips", "is in progress", allowed));
+        }
+        let asked = Deployment { after, chips, compensated: compensate, ..Deployment::default() };
+        let moments = moments(&self.made.config, &asked).map_err(of_chips)?;
+        let name = self.made.name.clone();
+        let kept = self.held()?.checkpoint(&name);
+        let (told, asked) = (self.told.clone(), self.asked.clone());
+        let times = moments.iter().map(|moment| moment.after_s).collect();
+        self.away = Some(Away { kept, told, asked, moments, made_up: compensate });
+        Ok(times)
+    }
+
+    /// Goes to chip `number`, 0 the one that it was made on, at a moment.
+    fn onto(&mut self, py: Python<'_>, number: u64, moment: usize) -> PyResult<()> {
+        let Self { made, network, away, .. } = self;
+        let moment = away.as_ref().and_then(|away| Some((away, away.moments.get(moment)?)));
+        let Some((away, Moment { drift, .. })) = moment else {
+            return Err(wrong("onto", "has nowhere to go", "call on_chips"));
+        };
+        py.detach(|| -> Result<(), Raised> {
+            let network = network.renew(|threads| made.build(threads))?;
+            network.put_back(&made.name, &away.kept)?;
+            if number > 0 {
+                network.set_chip(number);
+                for ((layer, pathway), levels) in &away.asked {
+                    network.load(*layer, pathway, levels)?;
+                }
+            }
+            if let Some(drift) = drift {
+                network.age(drift, away.made_up);
+            }
+            Ok(())
+        })?;
+        Ok(())
+    }
+
+    /// Comes back to the chip that it was made on, as it was.
+    fn home(&mut self, py: Python<'_>) -> PyResult<()> {
+        let Some(Away { kept, told, asked, .. }) = self.away.take() else { return Ok(()) };
+        (self.told, self.asked) = (told, asked);
+        let Self { made, network, .. } = self;
+        py.detach(|| -> Result<(), Raised> {
+            let network = network.renew(|threads| made.build(threads))?;
+            Ok(network.put_back(&made.name, &kept)?)
+        })?;
+        Ok(())
     }
 
     fn ledger_json(&mut self) -> PyResult<String> {
@@ -390,6 +494,8 @@ impl Network {
         self.told.add("put back", bytes);
         let name = self.made.name.clone();
         let network = self.held()?;
-        Ok(py.detach(|| network.put_back(&name, bytes)).map_err(Raised::from)?)
+        py.detach(|| network.put_back(&name, bytes)).map_err(Raised::from)?;
+        self.asked.clear();
+        Ok(())
     }
 }

@@ -5,6 +5,7 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
+use dalean::deployment::{ChipResult, Deployment, deploy, seconds_of, summed_up, unread};
 use dalean::sweep::{
     Format, SweepError, SweepOptions, SweepProgress, Swept, Values, sweep as carry_out,
 };
@@ -14,7 +15,7 @@ use dalean::{
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 
-use crate::errors::{Raised, wrong};
+use crate::errors::{Raised, of_chips, wrong};
 use crate::waits::{Watch, machine};
 
 /// Reads and checks a configuration.
@@ -213,6 +214,70 @@ pub(crate) fn evaluate(
         _ => None,
     };
     Ok((score, hash))
+}
+
+/// Reads a run on other chips and after a time: `(chip, seconds after programming, score)` each, and what a model has that
+/// was not looked at.
+#[pyfunction]
+#[pyo3(signature = (path, data, moved, threads, kernel, chips, after, compensate, hw, settings, callback))]
+#[expect(clippy::too_many_arguments, reason = "the package gives all of them")]
+pub(crate) fn chips(
+    py: Python<'_>,
+    path: PathBuf,
+    data: PathBuf,
+    moved: Option<PathBuf>,
+    threads: usize,
+    kernel: Option<String>,
+    chips: Vec<u64>,
+    after: Vec<f64>,
+    compensate: bool,
+    hw: Option<String>,
+    settings: Vec<String>,
+    callback: Option<Py<PyAny>>,
+) -> PyResult<(Vec<ChipRow>, Option<String>)> {
+    let machine = machine(kernel.as_deref(), threads)?;
+    let asked = Deployment { after, chips, compensated: compensate, device: hw, settings };
+    let all = (asked.chips.len() * asked.after.len().max(1)) as f64;
+    let (mut watch, mut done) = (Watch::new(callback), 0.0);
+    let read = py.detach(|| -> Result<_, RunError> {
+        let unread = unread(&asked)?;
+        let read = deploy(&path, &root(data, moved), machine, &asked, &mut |_| {
+            done += 1.0;
+            watch.go_on("chips", || vec![("done", done), ("total", all)])
+        })?;
+        Ok((read.iter().map(row).collect(), unread))
+    });
+    match watch.error {
+        Some(error) => Err(error),
+        None => Ok(read.map_err(of_chips)?),
+    }
+}
+
+/// Chip, seconds after programming, score.
+type ChipRow = (u64, Option<f64>, f64);
+
+fn row(result: &ChipResult) -> ChipRow {
+    (result.chip, result.after_s, result.score)
+}
+
+/// What chips came to, moment by moment: seconds after programming, chips, mean, standard deviation, quantiles, least, greatest, the worst
+/// chip.
+#[pyfunction]
+#[expect(clippy::type_complexity, reason = "a row, named in the package")]
+pub(crate) fn chip_summaries(
+    rows: Vec<ChipRow>,
+) -> Vec<(Option<f64>, usize, f64, Option<f64>, [f64; 5], f64, f64, u64)> {
+    let result = |(chip, after_s, score)| ChipResult { chip, after_s, score };
+    let results: Vec<ChipResult> = rows.into_iter().map(result).collect();
+    let of = summed_up(&results).into_iter();
+    of.map(|s| (s.after_s, s.chips, s.mean, s.sd, s.quantiles, s.least, s.greatest, s.worst_chip))
+        .collect()
+}
+
+/// Seconds of a span such as `1d`.
+#[pyfunction]
+pub(crate) fn seconds(span: &str) -> Option<f64> {
+    seconds_of(span)
 }
 
 /// What a finished run cost, as JSON.

@@ -117,6 +117,20 @@ impl<T> Held<T> {
         }
         Ok(self)
     }
+
+    /// Puts another in its place, made with as many threads.
+    pub(crate) fn renew(
+        &mut self,
+        again: impl FnOnce(usize) -> Result<T, Raised>,
+    ) -> Result<&mut T, Raised> {
+        let made = again(self.threads)?;
+        let old = self.inner.replace(made);
+        if self.lost_threads() {
+            std::mem::forget(old);
+        }
+        self.process = std::process::id();
+        Ok(self)
+    }
 }
 
 impl<T> Deref for Held<T> {

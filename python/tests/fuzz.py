@@ -60,6 +60,7 @@ def array(rng):
     return made
 
 
+FLAWS = {"device": {"faults": {"stuck_any": 0.1}, "programming": {"sigma": [0.02]}, "drift": {"start_s": 20.0, "change": -0.05, "change_spread": 0.02}}}
 POLICY = '''task = "policy"
 environment = { count = 2, horizon = 4, steps = 64, rollouts = 1 }
 network.hidden = [5]
@@ -101,10 +102,15 @@ def fuzz(calls, rng):
         dalean.Network([5, 70, 3], overrides={"learning.batch": 4}),
         dalean.Network([5, 70, 3], words="own", overrides={"learning.batch": 4}),
         dalean.Network([5, 70, 3], dalean.Chip("ideal", {"tile.transposed_read": True}), rule="bp", words="own"),
+        dalean.Network([5, 7, 3], dalean.Chip("ideal", FLAWS), overrides={"learning.batch": 4}),
+        dalean.Network([5, 7, 3], overrides={"learning.batch": 4}, signed=True),
     ]
     whole = lambda: rng.choice([0, 1, 0, 1, 2, 3, -1, 2**40, 2**70, None, "a", 1.5])
     stream = lambda: rng.choice(["p", "n", "p", "n", "", "pp", "é", None, 3])
     pathway = lambda: rng.choice(["pp", "np", "e", "i", "", "\0", "nn", 4])
+    spans = lambda: rng.choice([None, 100, "1d", ["1h", 1e9], 1, -1, float("nan"), 1e40, "x", [], [None], array(rng)])
+    worth = lambda net: rng.choice([1, 0.5, float("nan"), None, "x", net.read(x).sum(), net.on_chips(len, samples=1)])
+    rows = [[], [(1, None, 0.5)], [(1, 2.0, float("nan")), (2, float("nan"), 1.0)], [(-1, 0, 0)], [(1, 2)], "x", None]
     x = np.arange(20, dtype=np.uint8).reshape(4, 5)
     policies = [learner(None, True), learner(None, False), learner(2, True)]
     refused = done = 0
@@ -132,6 +138,13 @@ def fuzz(calls, rng):
                 lambda: net.load(whole(), pathway(), array(rng)),
                 lambda: net.put_back(rng.choice([b"", bytes(100), net.checkpoint(), net.checkpoint()[:-1], "x"])),
                 lambda: net.state_hash,
+                lambda: net.on_chips(worth, samples=rng.choice([None, 1, 2, 0, whole()]), after=spans(), compensate=rng.choice([True, False, 3])),
+                lambda: net.on_chips(lambda net: net.read(x).sum(), chip=rng.choice([0, 1, 2**64 - 1, -1, whole()]), after=rng.choice([None, "1d"])),
+                lambda: net.leave(rng.choice([[0, 1], [2**64 - 1], [-1], "x"]), rng.choice([[], [100.0], [0], [float("inf")], "x"]), rng.choice([True, False, 2])),
+                lambda: net.onto(whole(), whole()),
+                lambda: net.home(),
+                lambda: _dalean.seconds(rng.choice(["1d", "", "e", "1e400d", "-1s", "\0", "é", 3])),
+                lambda: _dalean.chip_summaries(rng.choice(rows)),
                 lambda: policy.turn(),
                 lambda: policy.turn(),
                 lambda: policy.begin(shown(rng)),

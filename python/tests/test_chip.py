@@ -234,3 +234,53 @@ def test_the_custom_rule_learns_and_has_a_receipt(examples):
 def test_no_call_crashes():
     refused, done = fuzz(1500, random.Random(7))
     assert refused > 300 and done > 50
+
+
+def test_drives_with_a_sign():
+    """A sum is that of numbers with their signs; where none lies below 0 the same is read and learnt as without one."""
+    rng = np.random.default_rng(1)
+    x = rng.integers(-255, 256, (7, 5))
+    net = dalean.Network([5, 3], rule="bp", signed=True)
+    net.read(x)
+    assert net.signed and net.samples == 7
+    levels = {name: net.levels(0, name).astype(int) for name in ("e", "i")}
+    assert (net.accumulators() == x @ (levels["e"] - levels["i"])).all()
+    # floats, and a sample alone
+    net.read(x / 255)
+    assert (net.accumulators() == x @ (levels["e"] - levels["i"])).all()
+    net.read(x[2])
+    assert (net.accumulators() == x[2:3] @ (levels["e"] - levels["i"])).all()
+    both = [dalean.Network([5, 9, 3], overrides={"learning.batch": 7}, updates=9, signed=signed) for signed in (False, True)]
+    for _ in range(9):
+        y, errors = rng.random((7, 5)), rng.integers(-255, 256, (7, 3))
+        for one in both:
+            one.read(y)
+            one.deliver(one.error_words(errors))
+            one.write()
+    assert all((one == two).all() for one, two in zip(both[0].all_levels().values(), both[1].all_levels().values()))
+    assert both[0].key != both[1].key
+    # what lies below 0 moves cells the other way: the same sum of a number and its opposite moves none
+    still = dalean.Network([5, 3], rule="bp", overrides={"learning.batch": 2}, signed=True)
+    before = still.all_levels()
+    still.read(np.stack([y[0], -y[0]]))
+    slopes, words = still.slopes(0).astype(int), still.error_words(np.full((2, 3), 90))
+    still.deliver(words)
+    assert (slopes[0] == slopes[1]).all() and (still.gates(0)[0] == still.gates(0)[1]).all()
+    still.write()
+    assert all((before[name] == array).all() for name, array in still.all_levels().items())
+    for given, words in [
+        (x * 2.0, "floats lie in -1 to 1"),
+        (np.full((1, 5), np.nan), "hold NaN"),
+        (x * 2, "whole numbers lie in -255..=255"),
+        (x[:, :4], "samples, 5"),
+        (["a"] * 5, "give floats from -1 to 1"),
+    ]:
+        with pytest.raises(dalean.ArrayError, match=words):
+            net.read(given)
+    deep = dalean.Network([5, 4, 3], dalean.Chip("ideal", {"tile.transposed_read": True}), rule="bp", words="own", signed=True)
+    deep.read(x)
+    for layer in (1, 0):
+        deep.deliver(np.ones((7, deep.size(layer)[1]), np.int16), layer)
+    assert deep.read_back(1).shape == (7, 4)
+    with pytest.raises(dalean.ChipError, match="is not read from its columns"):
+        deep.read_back(0)

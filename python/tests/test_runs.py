@@ -65,6 +65,93 @@ def test_a_run_knows_what_its_folder_says(tmp_path, small):
         run.verify(progress=False)
 
 
+FLAWS = {
+    "hw.device.faults.stuck_any": 0.05,
+    "hw.device.read_noise.sigma_cells": 2.0,
+    "hw.device.programming.sigma": [0.03],
+    "hw.device.drift": {"start_s": 20.0, "change": -0.03, "change_spread": 0.02},
+}
+
+
+def told_by_eval(path, *arguments):
+    """Rows and summaries of the command line."""
+    done = command("eval", path, "--json", "--threads", 1, *arguments)
+    assert done.returncode == 0, done.stderr
+    *lines, last = map(json.loads, done.stdout.splitlines())
+    rows = [{name: line[name] for name in line if name != "event"} for line in lines if line["event"] == "chip"]
+    return rows, last["results"], last["of"]
+
+
+def test_chips_are_those_of_the_command_line(tmp_path, small):
+    """Rows and quantiles to the last bit: on several chips at several moments, on one chip, and on the one that learnt."""
+    run = dalean.train(small, out=tmp_path, progress=False)
+    keys = settings({key: value for key, value in FLAWS.items() if not isinstance(value, dict)})
+    keys += settings({f"hw.device.drift.{key}": value for key, value in FLAWS["hw.device.drift"].items()})
+    asked = {"overrides": FLAWS, "progress": False}
+    chips = run.on_chips(samples=3, after=["1d", 3e7], compensate=True, **asked)
+    rows, summary, of = told_by_eval(run.path, "--samples", 3, "--after", "1d,30000000s", "--compensate", *keys)
+    assert (chips.rows, chips.summary, chips.of) == (rows, summary, of) and len(chips) == 6
+    assert chips["after_s"][:2] == [86_400, 3e7] and len(set(chips["test_accuracy"])) > 3
+    assert "<table" in chips._repr_html_() and "3 chips" in repr(chips) and list(chips)[0]["chip"] == 1
+    # a chip is found again by its number, whatever was read before and by how many threads
+    assert run.on_chips(chip=2, after="1d", compensate=True, threads=2, **asked).rows == rows[2:3]
+    assert run.on_chips(chip=2, after=86_400, **asked).rows == told_by_eval(run.path, "--chip", 2, "--after", "1d", *keys)[0]
+    # the one that learnt, as it is
+    assert run.on_chips(progress=False)["test_accuracy"] == [run.accuracy]
+    short = {key.removeprefix("hw."): value for key, value in FLAWS.items()}
+    assert run.on_chips(chip=7, overrides=short, progress=False).rows == run.on_chips(chip=7, **asked).rows
+    # what only pulses have to do with is not looked at, and that is said
+    with pytest.warns(UserWarning, match="it is not looked at"):
+        chips = run.on_chips(samples=2, hw="aihwkit_pcm", progress=False)
+    assert (chips.rows, chips.summary, chips.of) == told_by_eval(run.path, "--samples", 2, "--hw", "aihwkit_pcm")
+    pandas = pytest.importorskip("pandas")
+    assert isinstance(chips.to_pandas(), pandas.DataFrame) and list(chips.to_pandas()["chip"]) == [1, 2]
+
+
+def test_chips_of_a_policy_have_returns(tmp_path):
+    keys = {"task": "policy", "environment": {"steps": 64, "count": 2, "horizon": 16, "rollouts": 1}, "network.hidden": [4]}
+    run = dalean.train({**keys, "evaluation.final_episodes": 4}, out=tmp_path, progress=False)
+    flaws = {"hw.device.faults.stuck_any": 0.3}
+    chips = run.on_chips(samples=2, overrides=flaws, progress=False)
+    assert (chips.rows, chips.summary, chips.of) == told_by_eval(run.path, "--samples", 2, *settings(flaws))
+    assert chips.of == "return_mean" and min(chips["return_mean"]) >= 1
+
+
+@pytest.mark.parametrize(
+    ("asked", "where", "words"),
+    [
+        ({"samples": 2}, "samples", "chips of this kind are all alike"),
+        ({"after": "1d"}, "hw.device.drift", "is missing"),
+        ({"compensate": True}, "compensate", "say with after when chips are read"),
+        ({"overrides": {"hw.adc.bits": 4}}, "overrides", "changes what cells and reads do"),
+        ({"overrides": {"device.response.states": 9}}, "overrides", "gives no pulses"),
+        ({"hw": "reram"}, "hw", "names reram, which has none"),
+        ({"hw": "epiram"}, "hw", "response alone"),
+        ({"hw": "no/such.toml"}, None, "no/such.toml"),
+        ({"after": 1, "overrides": FLAWS}, "after", "levels are of 20 s after programming"),
+        ({"after": ["1d", "soon"]}, "after", "has 'soon'"),
+        ({"after": [None]}, "after", "has None"),
+        ({"after": float("nan")}, "after", "has nan"),
+        ({"samples": 0}, "samples", "is 0"),
+        ({"samples": 1.5}, "samples", "1 to 1000000"),
+        ({"chip": -1}, "chip", "is -1"),
+        ({"chip": 2**64}, "chip", "is 18446744073709551616"),
+        ({"chip": 1, "samples": 1}, "chip", "beside samples"),
+    ],
+)
+def test_what_changes_nothing_on_a_chip_is_refused(shared_run, asked, where, words):
+    with pytest.raises(dalean.ConfigError, match=words) as caught:
+        shared_run.on_chips(**asked, progress=False)
+    assert where is None or caught.value.where == where
+    assert "--" not in str(caught.value)
+
+
+@pytest.fixture(scope="module")
+def shared_run(tmp_path_factory):
+    keys = {"network.hidden": [4], "learning.epochs": 1, "data.set": "xor"}
+    return dalean.train(keys, out=tmp_path_factory.mktemp("runs"), progress=False)
+
+
 def test_a_file_and_overrides(tmp_path, small):
     file = tmp_path / "mine.toml"
     file.write_text("[network]\nhidden = [16]\n[learning]\nepochs = 1\nbatch = 32\ntaps = 2\n")

@@ -96,44 +96,28 @@ pub(super) fn deploy(
             .to_vec(),
     ];
     let mut rows = Vec::new();
-    let mut times: Vec<Option<f64>> = Vec::new();
-    for result in &results {
-        if !times.contains(&result.after_s) {
-            times.push(result.after_s);
-        }
-    }
-    for time in times {
-        let of: Vec<&ChipResult> = results.iter().filter(|r| r.after_s == time).collect();
-        let mut scores: Vec<f64> = of.iter().map(|result| result.score).collect();
-        scores.sort_by(f64::total_cmp);
-        let n = scores.len() as f64;
-        let mean = scores.iter().sum::<f64>() / n;
-        let squares: f64 = scores.iter().map(|score| (score - mean).powi(2)).sum();
-        let sd = (scores.len() > 1).then(|| (squares / (n - 1.0)).sqrt());
-        let [low, median, high] = [0.05, 0.5, 0.95].map(|place| run::quantile(&scores, place));
-        // the first of several that are as bad
-        let worst = of.iter().min_by(|a, b| a.score.total_cmp(&b.score)).expect("chips were read");
+    for summary in run::summed_up(&results) {
+        let [low, lower, median, upper, high] = summary.quantiles;
         lines.push(vec![
-            time.map_or("-".into(), |seconds| format!("{seconds} s")),
-            of.len().to_string(),
-            shown(mean),
-            sd.map_or("-".into(), shown),
+            summary.after_s.map_or("-".into(), |seconds| format!("{seconds} s")),
+            summary.chips.to_string(),
+            shown(summary.mean),
+            summary.sd.map_or("-".into(), shown),
             shown(low),
             shown(median),
             shown(high),
-            shown(worst.score),
-            worst.chip.to_string(),
+            shown(summary.least),
+            summary.worst_chip.to_string(),
         ]);
         rows.push(json!({
-            "after_s": time,
-            "chips": of.len(),
-            "mean": mean,
-            "sd": sd,
-            "quantiles": {"0.05": low, "0.25": run::quantile(&scores, 0.25), "0.5": median,
-                "0.75": run::quantile(&scores, 0.75), "0.95": high},
-            "least": scores.first(),
-            "greatest": scores.last(),
-            "worst_chip": worst.chip,
+            "after_s": summary.after_s,
+            "chips": summary.chips,
+            "mean": summary.mean,
+            "sd": summary.sd,
+            "quantiles": {"0.05": low, "0.25": lower, "0.5": median, "0.75": upper, "0.95": high},
+            "least": summary.least,
+            "greatest": summary.greatest,
+            "worst_chip": summary.worst_chip,
         }));
     }
     if shared.json {

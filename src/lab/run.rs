@@ -22,7 +22,9 @@ mod weigh;
 
 pub use again::{address_of, configuration, evaluate};
 pub use analyse::analyse;
-pub use deploy::{ChipResult, Deployment, deploy, quantile, seconds_of, unread};
+pub use deploy::{
+    ChipResult, ChipSummary, Deployment, Moment, deploy, moments, seconds_of, summed_up, unread,
+};
 pub use notes::notes;
 pub use profile::{Act, ModeUse, Profile, profile};
 pub use proof::{records, untouched};

@@ -26,8 +26,9 @@ use crate::chip::layer::{DrivenBy, LayerSpec};
 use crate::chip::population::{Pathway, Stream, Wiring};
 use crate::chip::state::{State, StateError, Visitor};
 use crate::num::fixed::rail;
+use crate::num::tables::DriftTables;
 
-/// Samples read at a time, at most: a sum over a batch fits 32 bits.
+/// Samples read at a time, at most, or half as many of drives with a sign: a sum over a batch fits 32 bits.
 pub const SAMPLES_MAX: usize = 65_536;
 /// Greatest shift of a write.
 const SHIFT_MAX: u32 = 30;
@@ -101,7 +102,7 @@ impl DrivenNetwork {
     /// Builds the network with its initial levels. A place says of how many updates the training is, over which rates fall.
     ///
     /// # Errors
-    /// When it does not fit together, not on the chip, or has convolutions or drives with a sign.
+    /// When it does not fit together, not on the chip, or has convolutions.
     pub fn new(
         network: &NetworkSpec,
         hardware: &Hardware,
@@ -113,10 +114,6 @@ impl DrivenNetwork {
             let allowed =
                 "a network that is driven from outside is dense; leave network.channels out";
             return Err(NetworkError::misfit("network.channels", "is given", allowed));
-        }
-        if network.layers.first().is_some_and(|layer| layer.driven_by == DrivenBy::Signed) {
-            let allowed = "codes of a network that is driven from outside have none: give the first layer one set of drives";
-            return Err(NetworkError::misfit("network.input", "gives drives a sign", allowed));
         }
         let driver = network.build_hearing(hardware, backend, place, words)?;
         let heard = vec![false; network.layers.len()];
@@ -203,33 +200,42 @@ impl DrivenNetwork {
     }
 
     fn codes_fit(&self, codes: &[u8]) -> Result<(), DriveError> {
-        let inputs = self.engine().layers()[0].spec.inputs;
-        let most = self.code_max();
+        let spec = &self.engine().layers()[0].spec;
+        let (inputs, rows, most) = (spec.sample_inputs(), spec.inputs, self.code_max());
         if codes.is_empty() || !codes.len().is_multiple_of(inputs) {
             let found = format!("has {} codes", codes.len());
             return wrong("a read", found, format!("a sample has {inputs}; give whole samples"));
         }
-        if codes.len() / inputs > SAMPLES_MAX {
+        let samples_max = SAMPLES_MAX / spec.driven_by.phases();
+        if codes.len() / inputs > samples_max {
             let found = format!("has {} samples", codes.len() / inputs);
-            return wrong("a read", found, format!("give {SAMPLES_MAX} at most at a time"));
+            return wrong("a read", found, format!("give {samples_max} at most at a time"));
         }
         if let Some(at) = codes.iter().position(|&code| code > most) {
-            let found = format!("has the code {} on row {}", codes[at], at % inputs);
+            let found = format!("has the code {} on row {}", codes[at], at % inputs % rows);
             let place = format!("sample {}", at / inputs);
             return wrong(place, found, format!("drive codes lie in 0..={most} on this chip"));
+        }
+        let both = |sample: &[u8]| {
+            let (above, below) = sample.split_at(rows);
+            above.iter().zip(below).any(|(&above, &below)| above > 0 && below > 0)
+        };
+        if let Some(at) = codes.chunks_exact(inputs).position(both) {
+            let (found, allowed) = ("has two codes on a row", "a number lies above 0 or below");
+            return wrong(format!("sample {at}"), found, allowed);
         }
         Ok(())
     }
 
-    /// Reads drive codes, `[sample][input]`, through all layers. What is read to learn from is charged to training, else to
-    /// evaluation.
+    /// Reads drive codes, `[sample][input]`, through all layers; of drives with a sign a sample has the codes of what lies above 0, then of
+    /// what lies below. What is read to learn from is charged to training, else to evaluation.
     ///
     /// # Errors
     /// When these are no whole samples of codes.
     pub fn read(&mut self, codes: &[u8], learning: bool) -> Result<(), DriveError> {
         self.codes_fit(codes)?;
         if learning && self.driver.mode() == UpdateMode::Online {
-            let samples = codes.len() / self.engine().layers()[0].spec.inputs;
+            let samples = codes.len() / self.engine().layers()[0].spec.sample_inputs();
             if samples > 1 {
                 let allowed =
                     "learning.mode = \"online\" writes after every sample: read one at a time";
@@ -439,6 +445,10 @@ impl DrivenNetwork {
         let spec = self.spec(layer)?;
         let hardware = self.engine().hardware();
         let place = format!("layer {layer}");
+        if spec.driven_by == DrivenBy::Signed {
+            let found = "has drives with a sign and is not read from its columns";
+            return wrong(place, found, "ask for the layers above it");
+        }
         if spec.wiring != Wiring::Single {
             let allowed =
                 "arrays of differential pairs are: build it with rule = \"bp\" or \"dfa\"";
@@ -555,6 +565,22 @@ impl DrivenNetwork {
             self.driver.engine_mut().execute(&load);
         }
         Ok(())
+    }
+
+    /// Makes it chip `number` of its kind and loads its levels into that one: the number is the seed of which cells are stuck, how windows
+    /// differ, what loads leave and what reads are off by. What was read is forgotten.
+    pub fn set_chip(&mut self, number: u64) {
+        self.forget();
+        let engine = self.driver.engine_mut();
+        let levels = engine.all_levels();
+        engine.set_chip_seed(number);
+        engine.load_all(&levels);
+    }
+
+    /// Lets levels drift; with `made_up`, a factor a layer makes up for it. What was read is forgotten.
+    pub fn age(&mut self, drift: &DriftTables, made_up: bool) {
+        self.forget();
+        self.driver.engine_mut().age(drift, made_up);
     }
 
     /// Learning in progress, with its chip.

@@ -92,7 +92,9 @@ impl DriftTables {
         let (old, r) = (i64::from(level), i64::from(r));
         let moved = match self {
             Self::Power { exponents, doublings, powers } => {
-                let [mean, sd] = exponents[usize::from(level)];
+                // of a chip with fewer levels, the greatest stands for those above
+                let last = exponents.len() - 1;
+                let [mean, sd] = exponents[usize::from(level).min(last)];
                 let exponent = (mean + rsh(gaussian.of(g) * sd, 12)).max(0);
                 let x = rsh(exponent * rsh(doublings * times, 16), 16);
                 let (whole, part) = (x >> 16, rsh(x & 0xffff, 4));
