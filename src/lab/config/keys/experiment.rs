@@ -395,7 +395,7 @@ const LEARNING: &[KeyEntry] = &[
         .default("false")
         .otherwise("true with convolutions, but with preset = \"paper\", and with task = \"policy\""),
     real("rate", 1e-6, 1e6).default("18.0").otherwise(
-        "20.0 with other data than the built-in digits; with a batch below the default one less, in proportion; 0.25 \
+        "20.0 with other data than the built-in digits, 7.5 with fashion-mnist; with a batch below the default one less, in proportion; 0.25 \
          with optimiser = \"sign\" (0.5 of policies with rule = \"dfa\" or \"bp\"), 0.002 with \"rms\" and \"adam_fx\"; 0.1 with convolutions and \"rms\", 0.3 with convolutions and \
          others, but with preset = \"paper\"; 1.0 of policies with others",
     ),
