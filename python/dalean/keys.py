@@ -1,5 +1,4 @@
 """Every key of an experiment with what it takes, for type checkers and editors; `docs/CONFIG.md` is made of the same.
-
 Made by `stubs.py` from `dalean keys --json`.
 """
 
