@@ -193,6 +193,18 @@ def test_mujoco(name):
     assert made.steps == 512 and policy().learn(name, 512, envs=4).state_hash == made.state_hash
 
 
+@pytest.mark.filterwarnings("ignore")
+def test_envpool():
+    envpool = pytest.importorskip("envpool")
+    hashes = set()
+    for seed in (1, 1, 2):
+        env = envpool.make("CartPole-v1", env_type="gymnasium", num_envs=4, seed=seed)
+        made = policy().learn(env, 2048)
+        assert made.steps == 2048 and made.epochs[-1]["episodes"] > 0
+        hashes.add(made.state_hash)
+    assert len(hashes) == 2  # what an environment draws follows its own seed
+
+
 def test_the_paper_s_algorithms(examples, tmp_path, monkeypatch, capsys):
     pytest.importorskip("gymnasium")
     made = example(examples, "paper_rl")
