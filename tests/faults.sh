@@ -104,8 +104,8 @@ fault "1 stream n not negated" $error \
     'let negate = target == Stream::N && !alike;' 'let negate = alike;' laws::law_1
 fault "1 a batch is not divided by its size" src/chip/engine/unit.rs \
     'let m = samples << (9 - bits);' 'let m = 1i64 << (9 - bits);' laws::law_1
-fault "1 write count stands still" $update \
-    'self.layers[layer].writes.iter_mut().for_each(|writes| *writes += 1);' '' laws::law_1
+fault "1 write count stands still" src/chip/engine/forget.rs \
+    '*writes += 1;' '' laws::law_1
 fault "1 slices trade weight" $read \
     'let shift = adc.shift + e.slice as u32 * self.dac_bits;' \
     'let shift = adc.shift + e.slice as u32 * (self.dac_bits - 1);' laws::law_1
@@ -113,7 +113,7 @@ fault "1 wide slices trade weight" $read \
     'let weight = slice as u32 * self.dac_bits;' \
     'let weight = slice as u32 * (self.dac_bits - 1);' laws::law_1
 fault "1 np hears what pp hears" $read \
-    'reads: places.map(reads),' 'reads: places.map(|_| reads(places[0])),' laws::law_1
+    'let reads = places.map(reads);' 'let reads = places.map(|_| reads(places[0]));' laws::law_1
 fault "1 32-bit sums cut too late" $read \
     'use crate::chip::layer::{CHUNK_BLOCKS, Layer};' \
     'use crate::chip::layer::Layer; const CHUNK_BLOCKS: usize = 1024;' laws::bounds
@@ -156,7 +156,7 @@ fault "3 a section has another one's tag" $layer_state \
 fault "3 a draw depends on the tile" $update \
     'layer: this.index,' 'layer: this.index + (self.hardware.tile.rows & 1) as u16,' laws::runs
 fault "4 layers wait for one another" $schedule \
-    '(*again).max(shape.positions * front).max(shape.stage)' '*again + shape.positions * front + shape.stage' laws::law_4
+    '(*again).max(shape.turns * front).max(shape.stage)' '*again + shape.turns * front + shape.stage' laws::law_4
 fault "4 updates one after the other" $schedule \
     'self.longest = self.longest.max(cycles);' 'self.longest += cycles;' laws::law_4
 fault "4 all words are shared" $schedule \
@@ -246,7 +246,7 @@ fault "6 one position is read" $schedule \
     'cycles.occupy(layer, During::ForwardRows, count * front);' \
     'cycles.occupy(layer, During::ForwardRows, samples as u64 * front);' 'tick::network oracle::conv'
 fault "6 positions are read at once" $schedule \
-    '*again = (*again).max(shape.positions * front).max(shape.stage);' '*again = (*again).max(front).max(shape.stage);' 'tick::network oracle::conv'
+    '*again = (*again).max(shape.turns * front).max(shape.stage);' '*again = (*again).max(front).max(shape.stage);' 'tick::network oracle::conv'
 fault "6 a pool takes no time" $schedule \
     '*latency += one + shape.stage;' '*latency += one;' 'tick::network oracle::conv'
 fault "6 gates of one position are formed" $schedule \
@@ -256,4 +256,22 @@ fault "6 columns are read at one position" $schedule \
     'cycles.occupy(layer, During::ForwardColumns, samples as u64 * front);' 'tick::network engine::window'
 fault "6 thresholds move in no time" $schedule \
     'longest = longest.max(one);' 'longest = longest.max(0 * one);' 'engine::homeostasis oracle::conv'
+fault "6 copies share out no reads" $schedule \
+    'turns: layer.spec.turns() as u64,' 'turns: layer.spec.positions() as u64,' tick::network
+fault "6 a turn of fewer reads takes no time" src/chip/layer/stage.rs \
+    'self.positions().div_ceil(self.copies.max(1))' 'self.positions() / self.copies.max(1)' tick::network
+fault "6 rows of one copy are pulsed" $update \
+    'let count = copies * passes.by_target[target.index()];' 'let count = passes.by_target[target.index()];' tick::network
+fault "6 cells of one copy are pulsed" $update \
+    '(copies - 1) * counts.attempted' '0 * counts.attempted' tick::network
+fault "6 one copy is verified" $update \
+    'copies * verified(self.hardware.timing, counts)' 'verified(self.hardware.timing, counts)' tick::network
+fault "6 one copy is loaded" src/chip/engine/deploy.rs \
+    'let others = self.copies_of(layer) - 1;' 'let others = 0 * self.copies_of(layer);' tick::network
+fault "6 a chip has the cells of one copy" src/lab/price/plan.rs \
+    'self.layers.iter().map(|l| l.copies * l.cells()).sum()' 'self.layers.iter().map(|l| l.cells()).sum()' price::plan
+fault "6 a chip has the tiles of one copy" src/lab/price/plan.rs \
+    'l.copies * l.targets * l.rows.div_ceil(rows)' 'l.targets * l.rows.div_ceil(rows)' price::plan
+fault "6 cells that answer by draws have copies" src/chip/hardware/cells.rs \
+    '(self.device.is_some(), "hw.device.response"),' '(false, "hw.device.response"),' check::window
 exit $status

@@ -91,6 +91,8 @@ Keys = TypedDict(
         "network.pool": Literal["average", "max", "none"] | list[Literal["average", "max", "none"]],
         # Convolutions: rows and columns of such a square. [pixels] Default: 2.
         "network.pool_side": Any,
+        # Convolutions: how often their arrays stand on the chip, each written, to read as many positions at a time. Default: 1.
+        "network.copies": Any,
         # Units of each hidden layer; of policies, of the network that acts. [units] Default: [256].
         "network.hidden": Any,
         # Policies: units of each hidden layer of the network that says what a state is worth. [units] Default: [64, 64].

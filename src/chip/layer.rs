@@ -92,6 +92,8 @@ pub struct LayerSpec {
     pub constant_row: bool,
     /// The window that moves over the image below; none of a dense layer.
     pub convolution: Option<ConvShape>,
+    /// How often its arrays stand on the chip, to read as many positions of a convolution at a time; 1 of a dense layer.
+    pub copies: usize,
     /// What lies between its units and what they drive.
     pub pool: Pool,
     /// What its units do beside their table.
@@ -371,6 +373,14 @@ fn tiles(layout: Layout, hardware: &Hardware) -> [usize; 2] {
     [layout.rows.div_ceil(hardware.tile.rows), layout.columns.div_ceil(hardware.tile.columns)]
 }
 
+/// Tiles of a layer in words, and how many copies there are of them.
+fn of_copies((tiles, copies): (usize, usize)) -> String {
+    match copies {
+        1 => tiles.to_string(),
+        _ => format!("{tiles} x {copies} copies"),
+    }
+}
+
 /// Proves that a network fits: addresses, words and physical tiles. A tile holds two banks of one target.
 ///
 /// # Errors
@@ -392,15 +402,18 @@ pub fn check(specs: &[LayerSpec], hardware: &Hardware) -> Result<(), PlanError> 
             return Err(PlanError::Size { layer, rows, columns, max: SIDE_MAX });
         }
         let [down, across] = tiles(layout, hardware);
-        by_layer.push(down * across * spec.wiring.planes().count());
+        let tiles = down * across * spec.wiring.planes().count();
+        by_layer.push((tiles, spec.copies.max(1)));
     }
-    let needed = by_layer.iter().sum();
+    // a product that saturates is refused as too many
+    let all = by_layer.iter().map(|&(tiles, copies)| tiles.saturating_mul(copies));
+    let needed = all.fold(0, usize::saturating_add);
     match hardware.tile.count_max {
         Some(allowed) if needed > allowed => Err(PlanError::Tiles {
             needed,
             rows: hardware.tile.rows,
             columns: hardware.tile.columns,
-            by_layer: by_layer.iter().map(ToString::to_string).collect::<Vec<_>>().join(" + "),
+            by_layer: by_layer.into_iter().map(of_copies).collect::<Vec<_>>().join(" + "),
             allowed,
         }),
         _ => Ok(()),

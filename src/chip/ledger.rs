@@ -121,15 +121,19 @@ coded! {
         StatisticAdds = 30, "statistic_adds";
         /// A table of the softmax of outputs was looked up.
         SoftmaxLookUps = 31, "softmax_look_ups";
+        /// A pulse was given to a cell of a further copy of its array: one that the cell of the first was given too.
+        PulsesCopied = 32, "pulses_copied";
+        /// A level was loaded into a cell of a further copy of its array.
+        LoadsCopied = 33, "loads_copied";
         /// What a later program counts and no run of this one ever does.
         #[cfg(feature = "grown")]
-        Grown = 32, "grown";
+        Grown = 34, "grown";
     }
 }
 
 impl Event {
-    /// Whether the count follows from how arrays are cut into tiles, from timing or from memories beside them. Such
-    /// counts are no part of the state hash: re-tiling with ideal converters changes no state.
+    /// Whether the count follows from how arrays are cut into tiles, from how many copies there are of them, from timing or
+    /// from memories beside them. Such counts are no part of the state hash: re-tiling with ideal converters changes no state.
     #[must_use]
     pub const fn moves_with_tiling(self) -> bool {
         matches!(
@@ -141,6 +145,8 @@ impl Event {
                 | Self::RowPulses
                 | Self::VerifyReads
                 | Self::SramBits
+                | Self::PulsesCopied
+                | Self::LoadsCopied
         )
     }
 }

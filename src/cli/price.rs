@@ -185,11 +185,15 @@ pub(super) fn profile(args: &ProfileArgs) -> Done {
         return Ok(());
     }
     let tiles = profile.plan.tiles(&profile.hardware);
+    let [cells, apart] = [profile.plan.cells(), profile.plan.cells_apart()];
+    let copies = match cells == apart {
+        true => String::new(),
+        false => format!(", copies of {apart} that hold the network"),
+    };
     say(&format!(
-        "{} on {}: {} cells on {tiles} tiles",
+        "{} on {}: {cells} cells on {tiles} tiles{copies}",
         config.data_name(),
-        config.hardware_name,
-        profile.plan.cells()
+        config.hardware_name
     ));
     show_nodes(&profile.constants);
     for (name, area) in areas(&profile.plan, &profile.hardware, &profile.constants) {
@@ -244,7 +248,7 @@ fn plan_json(config: &Config, profile: &Profile) -> serde_json::Value {
     let areas: Vec<_> =
         areas.map(|(name, area)| json!({"name": name, "square_metres": area})).collect();
     json!({"event": "plan", "data": config.data_name(), "hardware": config.hardware_name,
-        "cells": plan.cells(), "tiles": plan.tiles(hardware), "areas": areas,
+        "cells": plan.cells(), "cells_apart": plan.cells_apart(), "tiles": plan.tiles(hardware), "areas": areas,
         "nodes": run::nodes_json(constants),
         "warnings": profile.warnings})
 }

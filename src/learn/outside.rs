@@ -577,7 +577,7 @@ impl DrivenNetwork {
         engine.load_all(&levels);
     }
 
-    /// Lets levels drift; with `made_up`, a factor a layer makes up for it. What was read is forgotten.
+    /// Lets levels drift, copies of an array as the first of them; with `made_up`, a factor a layer makes up for it. What was read is forgotten.
     pub fn age(&mut self, drift: &DriftTables, made_up: bool) {
         self.forget();
         self.driver.engine_mut().age(drift, made_up);

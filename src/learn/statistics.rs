@@ -286,6 +286,7 @@ mod tests {
             initial: InitialLevels::Uniform { gain_64ths: [64, 64] },
             constant_row: false,
             convolution: None,
+            copies: 1,
             pool: Pool::None,
             homeostasis: Homeostasis::OFF,
         };

@@ -78,6 +78,7 @@ fn layer(hardware: &Hardware) -> Layer {
         initial: InitialLevels::Uniform { gain_64ths: [64, 64] },
         constant_row: false,
         convolution: None,
+        copies: 1,
         pool: Pool::None,
         homeostasis: Homeostasis::OFF,
     };

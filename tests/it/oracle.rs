@@ -135,6 +135,7 @@ fn experiment(s: &Value) -> Experiment {
                 },
                 constant_row: false,
                 convolution: None,
+                copies: 1,
                 pool: Pool::None,
                 homeostasis: Homeostasis::OFF,
             }

@@ -46,12 +46,24 @@ impl Engine {
                 h.device = Some(device.clone());
             }
         })?;
+        if let (true, Some(key)) = (self.has_copies(), hardware.differs_by_cell()) {
+            let found = "is given where arrays have copies".to_owned();
+            let allowed = "cells of it differ, so copies of an array would not be alike: it is not simulated; take it out, \
+                           or learn with network.copies = 1";
+            return Err(HardwareError { key, found, allowed: allowed.into() });
+        }
         let layers = self.layers.iter().map(|layer| (layer.index, &layer.spec));
         check_listed(&hardware.fault_map, layers, Listed::Some)?;
         self.gaussian = gaussian_of(&hardware);
         self.hardware = hardware;
         self.set_chip_seed(self.chip_seed);
         Ok(())
+    }
+
+    /// Whether an array stands more than once on the chip.
+    #[must_use]
+    pub fn has_copies(&self) -> bool {
+        self.layers.iter().any(|layer| layer.spec.copies > 1)
     }
 
     /// Its levels.
@@ -159,6 +171,8 @@ impl Engine {
         self.levels_moved(layer);
         let (during, count) = (During::LoadWeights, levels.len() as u64);
         self.charge(layer, pathway, during, Event::CellLoads, count);
+        let others = self.copies_of(layer) - 1;
+        self.charge(layer, pathway, during, Event::LoadsCopied, others * count);
         self.time(|schedule, cycles| schedule.load(cycles, layer));
     }
 }
@@ -192,6 +206,7 @@ mod tests {
             initial: InitialLevels::Uniform { gain_64ths: [64, 64] },
             constant_row: false,
             convolution: None,
+            copies: 1,
             pool: Pool::None,
             homeostasis: Homeostasis::OFF,
         };

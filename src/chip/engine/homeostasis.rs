@@ -250,9 +250,11 @@ impl Engine {
             this.balance.written(&readings);
             let (wiring, units) = (this.spec.wiring, this.spec.units as u64);
             if this.balance.law().threshold {
+                // every copy has added up its own reads
+                let bits = SUM_BITS * units * self.copies_of(layer);
                 for &target in wiring.targets() {
                     let code = Self::code_of(wiring, target);
-                    self.charge(layer, code, During::Update, Event::SramBits, SUM_BITS * units);
+                    self.charge(layer, code, During::Update, Event::SramBits, bits);
                 }
             }
         }

@@ -58,6 +58,7 @@ fn engine(adc: Adc, backend: Backend) -> Engine {
         initial: InitialLevels::Uniform { gain_64ths: [64, 64] },
         constant_row: false,
         convolution: None,
+        copies: 1,
         pool: Pool::None,
         homeostasis: Homeostasis::OFF,
     };

@@ -6,8 +6,9 @@
 //! ```text
 //! reads      FWD(rows) of successive layers, in a pipeline of layers and samples
 //!                sum_l (1 + T_fwd(l)) + (B - 1) max_l (1 + again(l))
-//!            a convolution is read P times a sample, back to back:  1 + T_fwd + (P - 1) (1 + again), and P (1 + again);
-//!            from its columns, in rounds, likewise
+//!            a convolution is read in G = ceil(P / copies) turns a sample, back to back, in each at as many of its P
+//!            positions as its array has copies:  1 + T_fwd + (G - 1) (1 + again), and G (1 + again);
+//!            from its columns, in rounds, likewise; gates and sums are formed position by position beside the first copy
 //!            a normalised layer is followed by a digital stage of its own, of 2 NG + 32 beats in both sums; one with a
 //!            pool by one of NG beats a position that the pool puts out
 //! rounds     ERR, FWD(columns), UPD(add), UPD(now), sample by sample in the order of the list; in a round a run of
@@ -48,8 +49,9 @@ struct Shape {
     words: u64,
     /// Cycles in which the error unit forms the words of a sample.
     form: u64,
-    /// Reads of a sample.
+    /// Reads of a sample, and turns in which its copies take them.
     positions: u64,
+    turns: u64,
     /// Times that rows are driven for a read.
     phases: u64,
     /// Cycles of the stage behind it, which normalises or pools a sample and which no command begins; 0 where there is none.
@@ -192,6 +194,7 @@ impl Schedule {
                 words: (layer.delivery.taps.width * layer.heard()) as u64,
                 form: timing.form(layer.delivery.terms() as u64),
                 positions: layer.spec.positions() as u64,
+                turns: layer.spec.turns() as u64,
                 phases: layer.spec.driven_by.phases() as u64,
                 stage: match layer.spec.pool {
                     Pool::None if normalised => timing.normalise(columns),
@@ -228,14 +231,14 @@ impl Schedule {
         }
         let front = t.accept() + self.reads.again(shape.phases, shape.columns);
         let one = t.accept() + self.reads.read(shape.phases, shape.columns, shape.levels[0]);
-        let one = one + (shape.positions - 1) * front;
+        let one = one + (shape.turns - 1) * front;
         if let Segment::Reads { next, samples: count, latency, again } = &mut self.segment {
             *next = layer + 1;
             *count = samples as u64;
             *latency += one + shape.stage;
-            *again = (*again).max(shape.positions * front).max(shape.stage);
+            *again = (*again).max(shape.turns * front).max(shape.stage);
         }
-        let count = samples as u64 * shape.positions;
+        let count = samples as u64 * shape.turns;
         cycles.occupy(layer, During::ForwardRows, count * front);
         self.engage_read(cycles, layer, [count, shape.phases], shape.columns, shape.levels[0]);
     }
@@ -330,7 +333,7 @@ impl Schedule {
         let (t, shape) = (self.timing, self.shapes[layer]);
         let front = t.accept() + self.reads.again(2, shape.rows);
         let one = t.accept() + self.reads.read(2, shape.rows, shape.levels[1]);
-        let one = one + (shape.positions - 1) * front;
+        let one = one + (shape.turns - 1) * front;
         for round in self.rounds(cycles, &(0..samples)) {
             round.close();
             round.passed[Interval::Columns as usize] += one;
@@ -338,7 +341,7 @@ impl Schedule {
         if let Segment::Rounds { columns, .. } = &mut self.segment {
             *columns = true;
         }
-        let count = samples as u64 * shape.positions;
+        let count = samples as u64 * shape.turns;
         cycles.occupy(layer, During::ForwardColumns, count * front);
         self.engage_read(cycles, layer, [count, 2], shape.rows, shape.levels[1]);
     }

@@ -75,10 +75,11 @@ impl Engine {
         let Some(timing) = self.hardware.timing else { return };
         let pulses = self.take_pulses(layer);
         let passes = Passes::new(&self.hardware, timing, &self.layers[layer], pulses.as_ref());
-        let wiring = self.layers[layer].spec.wiring;
+        let (wiring, copies) = (self.layers[layer].spec.wiring, self.copies_of(layer));
         for &target in wiring.targets() {
             let code = Self::code_of(wiring, target);
-            let count = passes.by_target[target.index()];
+            // drivers of every copy move
+            let count = copies * passes.by_target[target.index()];
             self.charge(layer, code, During::Update, Event::RowPulses, count);
         }
         let looks = self.layers[layer].requests.optimiser.looks_at_layer();
@@ -100,7 +101,7 @@ impl Engine {
 
     /// Programs the sums over `samples` and counts one write of each array.
     fn program(&mut self, layer: usize, samples: Range<usize>, shift: u32) {
-        let wiring = self.layers[layer].spec.wiring;
+        let (wiring, copies) = (self.layers[layer].spec.wiring, self.copies_of(layer));
         self.levels_moved(layer);
         self.registers[layer].pulses = Pulses::none(self.collect, &self.layers[layer]);
         // words are moved by a write of nothing too
@@ -114,7 +115,8 @@ impl Engine {
                     (Event::Bounded, counts.bounded),
                     (Event::PulsesAttempted, counts.attempted),
                     (Event::PulsesEffective, counts.effective),
-                    (Event::VerifyReads, verified(self.hardware.timing, counts)),
+                    (Event::VerifyReads, copies * verified(self.hardware.timing, counts)),
+                    (Event::PulsesCopied, (copies - 1) * counts.attempted),
                 ] {
                     self.charge(layer, code, During::Update, event, count);
                 }

@@ -51,6 +51,11 @@ impl Engine {
         samples.start * positions..samples.end * positions
     }
 
+    /// How often the arrays of a layer stand on the chip.
+    pub(super) fn copies_of(&self, layer: usize) -> u64 {
+        self.layers[layer].spec.copies as u64
+    }
+
     /// Whether units of a layer put their codes where the next one is driven from, as they are.
     pub(super) fn hands_on_directly(&self, layer: usize) -> bool {
         let next = self.layers.get(layer + 1);

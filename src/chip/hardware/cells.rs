@@ -60,6 +60,24 @@ impl Hardware {
         (!law.is_nothing()).then_some(law)
     }
 
+    /// The key by which its cells draw words of their own, so that two arrays that are written alike would not be alike; `None`: they
+    /// do not. Conversions draw by the read that they are of, and the dither of a write is the layer's.
+    #[must_use]
+    pub(crate) fn differs_by_cell(&self) -> Option<&'static str> {
+        let spread = self.endurance.is_some_and(|of| of.spread.0 != 0);
+        let keys = [
+            (!self.faults.is_none(), "hw.device.faults"),
+            (!self.fault_map.is_empty(), "hw.device.faults.map"),
+            // steps are rounded by draws, even where all are alike
+            (self.device.is_some(), "hw.device.response"),
+            (self.programming.is_some(), "hw.device.programming"),
+            (spread, "hw.device.endurance.spread"),
+            (self.leakage.is_some(), "hw.device.leakage"),
+            (self.ageing.is_some(), "hw.device.drift"),
+        ];
+        keys.into_iter().find_map(|(differs, key)| differs.then_some(key))
+    }
+
     /// The law of its currents, where cells conduct something else than their level.
     #[must_use]
     pub fn conducting(&self) -> Option<Conducting> {

@@ -93,6 +93,16 @@ impl super::LayerSpec {
         self.convolution.map_or(1, ConvShape::positions)
     }
 
+    /// Turns in which its array is read for a sample: copies of it read as many positions at a time.
+    ///
+    /// ```text
+    /// turns   ceil(P / copies);  copy c reads positions c, c + copies, c + 2 copies ..
+    /// ```
+    #[must_use]
+    pub fn turns(&self) -> usize {
+        self.positions().div_ceil(self.copies.max(1))
+    }
+
     /// Times that its rows are driven for a sample, and that products of drives and gates are formed: twice a read where
     /// drives have a sign.
     #[must_use]

@@ -25,6 +25,7 @@ fn dense(inputs: usize, units: usize, wiring: Wiring) -> LayerSpec {
         initial: InitialLevels::Uniform { gain_64ths: [96, 64] },
         constant_row: false,
         convolution: None,
+        copies: 1,
         pool: Pool::None,
         homeostasis: Homeostasis::OFF,
     }

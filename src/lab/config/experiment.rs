@@ -100,6 +100,11 @@ impl Config {
         })
     }
 
+    /// How often the arrays of each convolution stand on the chip.
+    pub(crate) fn copies(&self) -> Vec<usize> {
+        self.convolutions.iter().map(|window| window.copies).collect()
+    }
+
     /// The network between so many values and outputs, through convolutions and hidden layers of so many units.
     pub(super) fn network_of(
         &self,
@@ -141,6 +146,7 @@ impl Config {
                     Bias::Rows => true,
                 },
                 convolution: window.map(|window| window.shape),
+                copies: window.map_or(1, |window| window.copies),
                 pool: window.map_or(Pool::None, |window| window.pool),
                 homeostasis: if last { Homeostasis::OFF } else { self.homeostasis },
             }

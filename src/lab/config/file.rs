@@ -157,6 +157,8 @@ keys! {
         pool: PerLayer<String>,
         /// Convolutions: rows and columns of such a square.
         pool_side: PerLayer<usize>,
+        /// Convolutions: how often their arrays stand on the chip, each written, to read as many positions at a time.
+        copies: PerLayer<usize>,
         /// Units of each hidden layer; of policies, of the network that acts.
         hidden: Vec<usize>,
         /// Policies: units of each hidden layer of the network that says what a state is worth.
@@ -483,13 +485,11 @@ keys! {
         recalibrate: String,
         /// Where the banks are subtracted.
         subtract: String,
-        /// Cycles of a conversion: `fixed` (as `timing.convert_cycles` says), `sar` (bits + 1 steps), `counter` and `ramp`
-        /// (2^bits steps), `flash` (one step).
+        /// Cycles of a conversion: `fixed` (as `timing.convert_cycles` says), `sar` (bits + 1 steps), `counter` and `ramp` (2^bits steps), `flash` (one step).
         converter: String,
         /// Cycles of a step, where bits decide how many there are; default 1.
         step_cycles: i64,
-        /// Bits that a phase is converted to: `owed` (those that earlier phases left) or `all`. Of several phases of
-        /// `pulse_width` alone.
+        /// Bits that a phase is converted to: `owed` (those that earlier phases left) or `all`. Of several phases of `pulse_width` alone.
         phase_bits: String,
         /// Where the numbers come from.
         source: String,

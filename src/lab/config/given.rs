@@ -107,6 +107,7 @@ const FROZEN: &[(&str, &str)] = &[
     ("endurance", "none"),
     ("leakage", "none"),
     ("ageing", "none"),
+    ("layer.copies", "1"),
 ];
 
 /// Key and word.
@@ -383,6 +384,7 @@ impl List {
             initial,
             constant_row,
             convolution,
+            copies,
             pool,
             homeostasis,
         } = layer;
@@ -421,6 +423,7 @@ impl List {
             let sizes = [channels, height, width, side, stride, pad].map(ToString::to_string);
             put("convolution", &sizes.join(" "));
         }
+        put("copies", copies);
         match pool {
             Pool::None => put("pool", &"none"),
             Pool::Average { side } => put("pool", &format!("average {side}")),

@@ -91,6 +91,17 @@ pub enum Per {
     Converter,
 }
 
+impl Per {
+    /// By what an event is priced: itself, or what a copy of an array shares with the first.
+    pub(crate) const fn of(event: Event) -> Self {
+        Self::Event(match event {
+            Event::PulsesCopied => Event::PulsesAttempted,
+            Event::LoadsCopied => Event::CellLoads,
+            _ => event,
+        })
+    }
+}
+
 /// A kind of physical number.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Quantity {
@@ -299,7 +310,8 @@ impl Constants {
     /// The number of an event.
     #[must_use]
     pub fn of(&self, event: Event) -> Option<&Constant> {
-        self.0.iter().find(|c| c.quantity.per == Per::Event(event))
+        let priced = Per::of(event);
+        self.0.iter().find(|c| c.quantity.per == priced)
     }
 
     /// Numbers outside what any chip can have. 0 is never outside: a chip may lack the part.

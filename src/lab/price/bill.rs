@@ -116,13 +116,13 @@ pub fn price<'a>(
 ) -> Bill<'a> {
     let (mut lines, mut missing) = (Vec::new(), Vec::new());
     for event in Event::ALL {
-        let priced = QUANTITIES.iter().find(|q| q.per == Per::Event(event));
+        let per = Per::of(event);
+        let priced = QUANTITIES.iter().find(|q| q.per == per);
         let (Some(quantity), count) = (priced, ledger.total(event)) else { continue };
         if count == 0 {
             continue;
         }
-        let touched: Vec<_> =
-            changes.iter().filter(|c| c.events.contains(&event)).map(|c| c.key).collect();
+        let touched: Vec<_> = changes.iter().filter(|c| c.touches(per)).map(|c| c.key).collect();
         let why = match constants.of(event) {
             _ if !touched.is_empty() => format!("the two chips differ in {}", touched.join(", ")),
             None => format!("the model has no energy.{}", quantity.name),

@@ -5,6 +5,7 @@ use crate::chip::hardware::{
     WriteSpec,
 };
 use crate::chip::ledger::Event;
+use crate::lab::config::Per;
 
 /// A difference between the chip of a run and another one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -15,6 +16,13 @@ pub struct Change {
     pub events: &'static [Event],
     /// Whether the cycles would be others.
     pub time: bool,
+}
+
+impl Change {
+    /// Whether what a quantity is counted by would be another.
+    pub(super) fn touches(&self, per: Per) -> bool {
+        matches!(per, Per::Event(event) if self.events.contains(&event))
+    }
 }
 
 /// Follows from rows of a tile.

@@ -297,6 +297,12 @@ pub fn deploy(
     let layers = layers.map(|layer| (layer.index, &layer.spec));
     check_listed(&hardware.fault_map, layers, Listed::All)
         .map_err(|error| wrong(error.key, &error.found, &error.allowed))?;
+    let copies = session.engines().into_iter().any(|engine| engine.has_copies());
+    if copies && !deployment.after.is_empty() {
+        let allowed = "cells drift each in its own way, so copies of an array would not stay alike: that is not simulated; take \
+                       --after out, or learn with network.copies = 1";
+        return Err(wrong("eval --after", "is given where arrays have copies", allowed).into());
+    }
     let programming = hardware.programming;
     let levels: Vec<AllLevels> =
         session.engines().iter().map(|engine| engine.all_levels()).collect();

@@ -135,7 +135,8 @@ fn inputs(policy: &PolicySettings) -> Vec<PolicyInput> {
 
 /// What a run cost on its own chip.
 pub(super) fn cost(config: &Config, ledger: &LedgerRecord, records: &[EpochRecord]) -> Cost {
-    let plan = Footprint::of_records(records.last().map_or(&[], |record| &record.pathways));
+    let pathways = records.last().map_or(&[][..], |record| &record.pathways);
+    let plan = Footprint::of_records(pathways, &config.copies());
     let bill = price(ledger, &plan, &config.hardware, &config.constants, &[]);
     Cost::of(&bill, ledger, &config.constants, &Pieces::of_records(records))
 }

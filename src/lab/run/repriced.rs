@@ -130,7 +130,7 @@ pub fn reprice_as(path: &Path, other: Option<Prices>) -> Result<Repriced, RunErr
     let Some(record) = records.last() else {
         return Err(damaged(names::METRICS, "has no record".into()).into());
     };
-    let plan = Footprint::of_records(&record.pathways);
+    let plan = Footprint::of_records(&record.pathways, &config.copies());
     let made_on = config.hardware_name.clone();
     let changes = other.as_ref().map_or_else(Vec::new, |o| changes(&config.hardware, &o.hardware));
     let prices = other.unwrap_or_else(|| Prices::of(&config));

@@ -24,6 +24,7 @@ const TAPS_MAX: usize = 4;
 /// Shift of a sum of words, at most: nothing is left of it beyond.
 const TAP_SHIFT_MAX: u32 = 16;
 
+mod copies;
 mod homeostasis;
 
 type Checked = Result<(), NetworkError>;
@@ -34,6 +35,7 @@ fn misfit(key: &'static str, found: impl ToString, allowed: impl ToString) -> Ch
 
 pub(super) fn check(network: &NetworkSpec, hardware: &Hardware) -> Checked {
     sizes(network)?;
+    copies::check(network, hardware)?;
     layer::check(&network.layers, hardware)?;
     numbers(network)?;
     tables(network, hardware)?;

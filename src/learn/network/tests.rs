@@ -24,6 +24,7 @@ fn plain() -> NetworkSpec {
         initial: InitialLevels::Uniform { gain_64ths: [96, 32] },
         constant_row: false,
         convolution: None,
+        copies: 1,
         pool: Pool::None,
         homeostasis: Homeostasis::OFF,
     };
@@ -472,6 +473,7 @@ fn windows(rule: Rule, control: Control) -> NetworkSpec {
         inputs: shape.rows(),
         units: 6,
         convolution: Some(shape),
+        copies: 1,
         pool: Pool::Max { side: 2 },
         ..hidden.clone()
     };
@@ -482,6 +484,7 @@ fn windows(rule: Rule, control: Control) -> NetworkSpec {
         units: 5,
         driven_by,
         convolution: Some(above),
+        copies: 1,
         ..hidden.clone()
     };
     let dense = LayerSpec { inputs: 20, units: 7, driven_by, ..hidden };
@@ -493,6 +496,38 @@ fn windows(rule: Rule, control: Control) -> NetworkSpec {
     network.optimisers = vec![Optimiser::Plain; 4];
     network.centred = vec![false; 4];
     NetworkSpec { control, ..network }
+}
+
+#[test]
+fn copies_are_of_convolutions_and_of_cells_that_are_alike() {
+    use crate::chip::device::{Endurance, ReadNoise, Worn};
+    use crate::num::fixed::Millionths;
+    let plain = Hardware::reference();
+    let with = |layer: usize, copies: usize| {
+        let mut network = windows(Rule::Ed, Control::None);
+        network.layers[layer].copies = copies;
+        network
+    };
+    let refused = |network: NetworkSpec, chip: &Hardware| {
+        let error = network.check(chip).unwrap_err();
+        assert_eq!(error.key(), "network.copies");
+        error.to_string()
+    };
+    // 36 and 4 positions
+    assert!(with(0, 36).check(&plain).is_ok() && with(1, 4).check(&plain).is_ok());
+    assert!(refused(with(0, 37), &plain).contains("36 positions"));
+    assert!(refused(with(1, 5), &plain).contains("4 positions"));
+    assert!(refused(with(2, 2), &plain).contains("dense"));
+    assert!(refused(with(0, 0), &plain).contains("once at least"));
+    let endurance =
+        |spread| Some(Endurance { pulses: 9, spread: Millionths(spread), worn: Worn::Level });
+    let alike = plain
+        .with(|h| (h.read_noise, h.endurance) = (Some(ReadNoise { sigma: 9 }), endurance(0)))
+        .unwrap();
+    assert!(with(0, 3).check(&alike).is_ok());
+    let differ = plain.with(|h| h.endurance = endurance(1)).unwrap();
+    assert!(refused(with(0, 3), &differ).contains("hw.device.endurance.spread"));
+    assert!(with(0, 1).check(&differ).is_ok());
 }
 
 #[test]

@@ -21,6 +21,7 @@ fn network(rule: Rule, mode: UpdateMode) -> NetworkSpec {
         initial: InitialLevels::Uniform { gain_64ths: [96, 32] },
         constant_row: true,
         convolution: None,
+        copies: 1,
         pool: Pool::None,
         homeostasis: Homeostasis::OFF,
     };

@@ -98,6 +98,7 @@ fn network(inputs: usize, outputs: usize, rule: Rule) -> NetworkSpec {
         initial: gain(last),
         constant_row: first,
         convolution: None,
+        copies: 1,
         pool: Pool::None,
         homeostasis: Homeostasis::OFF,
     };
@@ -427,6 +428,7 @@ fn a_policy_and_a_classifier_learn_by_lists_of_the_same_five_operations() {
         initial: InitialLevels::Uniform { gain_64ths: [96, 32] },
         constant_row: false,
         convolution: None,
+        copies: 1,
         pool: Pool::None,
         homeostasis: Homeostasis::OFF,
     };

@@ -75,6 +75,7 @@ pub(super) fn policy(c: &mut Choices<'_>) {
                 initial: InitialLevels::AbsGaussian { gain: [1, 1] },
                 constant_row: inputs == 1,
                 convolution: None,
+                copies: 1,
                 pool: Pool::None,
                 homeostasis: Homeostasis::OFF,
             })

@@ -237,6 +237,7 @@ fn network(c: &mut Choices<'_>, inputs: usize, outputs: usize) -> NetworkSpec {
         },
         constant_row: c.one_in(2),
         convolution: None,
+        copies: if c.one_in(64) { c.size(0, 9) } else { 1 },
         pool: Pool::None,
         homeostasis: Homeostasis::OFF,
     });

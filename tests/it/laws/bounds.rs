@@ -38,6 +38,7 @@ fn engine(hardware: Hardware, backend: Backend, inputs: usize, units: usize) -> 
         initial: InitialLevels::Uniform { gain_64ths: [64, 64] },
         constant_row: false,
         convolution: None,
+        copies: 1,
         pool: Pool::None,
         homeostasis: Homeostasis::OFF,
     };

@@ -243,6 +243,7 @@ pub(crate) fn net(sides: impl Strategy<Value = Vec<usize>>) -> impl Strategy<Val
                     initial: InitialLevels::Uniform { gain_64ths: [96, 32] },
                     constant_row,
                     convolution: None,
+                    copies: 1,
                     pool: Pool::None,
                     homeostasis: Homeostasis::OFF,
                 });

@@ -128,6 +128,7 @@ fn run() -> impl Strategy<Value = Run> {
                     initial: InitialLevels::Uniform { gain_64ths: [96, 32] },
                     constant_row: row,
                     convolution: None,
+                    copies: 1,
                     pool: Pool::None,
                     homeostasis: Homeostasis::OFF,
                 }

@@ -95,6 +95,7 @@ fn layer(l: usize, last: bool, rule: Rule, a: &Value) -> LayerSpec {
             gain_64ths: if last || rule == Rule::Bp { [64, 64] } else { [96, 32] },
         },
         constant_row: false,
+        copies: 1,
         convolution: a["side"].is_i64().then(|| ConvShape {
             height: below[0] as usize,
             width: below[1] as usize,

@@ -76,6 +76,7 @@ impl Net {
                 initial: InitialLevels::Uniform { gain_64ths: [64, 64] },
                 constant_row: false,
                 convolution: window.map(|(shape, _)| shape),
+                copies: 1,
                 pool: Pool::None,
                 homeostasis: law,
             };

@@ -62,6 +62,7 @@ impl Net {
                 initial: InitialLevels::Uniform { gain_64ths: [64, 64] },
                 constant_row: self.rows,
                 convolution: None,
+                copies: 1,
                 pool: Pool::None,
                 homeostasis: Homeostasis::OFF,
             };

@@ -151,6 +151,7 @@ impl Case {
             initial: InitialLevels::Uniform { gain_64ths: [64, 64] },
             constant_row: self.seed.is_multiple_of(2),
             convolution: None,
+            copies: 1,
             pool: Pool::None,
             homeostasis: Homeostasis::OFF,
         };

@@ -87,7 +87,7 @@ impl Network {
     /// Sets the small factor of the rate of each layer and whether writes only potentiate.
     pub fn set_learning(&mut self, mantissas: &[u32], potentiation_only: bool) {
         for (layer, &mantissa) in self.layers.iter_mut().zip(mantissas) {
-            let tiles = layer.tiles.iter_mut();
+            let tiles = layer.all_tiles();
             tiles.for_each(|tile| tile.set_learning(mantissa.into(), potentiation_only));
         }
     }
@@ -265,13 +265,10 @@ impl Network {
                     let left = self.layers[layer].programmed(array, row, levels);
                     let code = self.layers[layer].load_row(array, row, &left);
                     self.layers[layer].count_loads(array, row);
-                    self.charge(
-                        layer,
-                        code,
-                        During::LoadWeights,
-                        Event::CellLoads,
-                        levels.len() as u64,
-                    );
+                    let (during, count) = (During::LoadWeights, levels.len() as u64);
+                    self.charge(layer, code, during, Event::CellLoads, count);
+                    let others = self.layers[layer].copies() as u64 - 1;
+                    self.charge(layer, code, during, Event::LoadsCopied, others * count);
                     for _ in 0..self.timing.beat {
                         self.begin(Interval::Load);
                         self.cycles().occupy(layer, During::LoadWeights, 1);
@@ -491,6 +488,7 @@ impl Network {
             (Event::Bounded, e.bounded),
             (Event::PulsesAttempted, e.pulses_attempted),
             (Event::PulsesEffective, e.pulses_effective),
+            (Event::PulsesCopied, e.pulses_copied),
             (Event::SaturatedConversions, e.saturated_conversions),
             (Event::VerifyReads, e.verify_reads),
             (Event::SumSquares, e.sum_squares),

@@ -136,6 +136,7 @@ impl Net {
             initial: InitialLevels::Uniform { gain_64ths: [64, 64] },
             constant_row: self.constant_row,
             convolution: None,
+            copies: 1,
             pool: Pool::None,
             homeostasis: Homeostasis::OFF,
         };

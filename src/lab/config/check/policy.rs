@@ -76,6 +76,7 @@ fn refused_here(file: &ExperimentFile) -> Result<(), ConfigError> {
         ("network.padding", network.is_some_and(|n| n.padding.is_some()), WINDOWS),
         ("network.pool", network.is_some_and(|n| n.pool.is_some()), WINDOWS),
         ("network.pool_side", network.is_some_and(|n| n.pool_side.is_some()), WINDOWS),
+        ("network.copies", network.is_some_and(|n| n.copies.is_some()), WINDOWS),
         ("network.threshold", network.is_some_and(|n| n.threshold.is_some()), MIDDLES),
         ("network.gain", network.is_some_and(|n| n.gain.is_some()), MIDDLES),
         ("network.gain_spread", network.is_some_and(|n| n.gain_spread.is_some()), MIDDLES),

@@ -19,6 +19,8 @@ pub(crate) struct Convolved {
     pub(crate) units: usize,
     /// What is handed on.
     pub(crate) pool: Pool,
+    /// How often it stands on the chip.
+    pub(crate) copies: usize,
 }
 
 impl Convolved {
@@ -40,6 +42,7 @@ impl Convolved {
             initial: InitialLevels::Uniform { gain_64ths: [64; 2] },
             constant_row: false,
             convolution: Some(self.shape),
+            copies: self.copies,
             pool: self.pool,
             homeostasis: Homeostasis::OFF,
         }
@@ -123,6 +126,7 @@ pub(super) fn resolve(
     let same = PaddingFile::Named("same".into());
     let padding = each("network.padding", &mut file.padding, same, channels.len())?;
     let pools = pools(file, channels.len())?;
+    let copies = each("network.copies", &mut file.copies, 1, channels.len())?;
     let mut all = Vec::new();
     for (at, units) in channels.into_iter().enumerate() {
         if units == 0 {
@@ -146,7 +150,7 @@ pub(super) fn resolve(
             }
         };
         let shape = ConvShape { channels, height, width, side, stride: stride[at], pad };
-        let one = Convolved { shape, units, pool: pools[at] };
+        let one = Convolved { shape, units, pool: pools[at], copies: copies[at] };
         if let Some((found, allowed)) = misshapen(one) {
             let found = format!("makes layer {at}, which {found}");
             return Err(wrong("network.channels", found, allowed));
@@ -177,6 +181,7 @@ fn none(file: &NetworkFile) -> Result<(), ConfigError> {
         ("network.padding", file.padding.is_some()),
         ("network.pool", file.pool.is_some()),
         ("network.pool_side", file.pool_side.is_some()),
+        ("network.copies", file.copies.is_some()),
     ];
     match given.into_iter().find(|(_, given)| *given) {
         Some((key, _)) => {

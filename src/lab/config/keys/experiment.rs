@@ -227,6 +227,11 @@ const NETWORK: &[KeyEntry] = &[
         .default("2")
         .law("squares cover a map without a rest")
         .only("with network.channels and a pool", WINDOWS),
+    other("copies", "a whole number from 1")
+        .windows()
+        .default("1")
+        .law("no more than positions of a map; not with cells that differ: device.response, faults, programming, leakage, drift, endurance.spread")
+        .only(ON_WINDOWS, WINDOWS),
     other("hidden", "a list of whole numbers, each 1..=65535")
         .unit("units")
         .default("[256]")

@@ -42,6 +42,8 @@ impl CostClass {
             | Event::Bounded
             | Event::PulsesAttempted
             | Event::PulsesEffective
+            | Event::PulsesCopied
+            | Event::LoadsCopied
             | Event::RowPulses => Self::Device,
             // a verify read is one cell's current and a whole conversion
             Event::DacSlices

@@ -11,7 +11,7 @@ const SOURCE: &str = "source = \"s\", kind = \"measured\"";
 #[test]
 fn every_event_that_is_an_action_has_one_quantity() {
     for event in Event::ALL {
-        let lines = QUANTITIES.iter().filter(|q| q.per == Per::Event(event)).count();
+        let lines = QUANTITIES.iter().filter(|q| q.per == Per::of(event)).count();
         let outcome = matches!(event, Event::Requested | Event::Bounded | Event::PulsesEffective)
             || event.name().starts_with("saturated");
         assert_eq!(lines, usize::from(!outcome), "{event:?}");

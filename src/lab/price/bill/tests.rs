@@ -59,7 +59,9 @@ fn close(found: f64, wanted: f64) -> bool {
 #[test]
 fn counts_times_constants_and_watts_times_seconds() {
     let (config, ledger) = (chip(), ledger());
-    let plan = Footprint { layers: vec![LayerFootprint { rows: 300, columns: 256, targets: 1 }] };
+    let plan = Footprint {
+        layers: vec![LayerFootprint { rows: 300, columns: 256, targets: 1, copies: 1 }],
+    };
     let bill = price(&ledger, &plan, &config.hardware, &config.constants, &[]);
     // 4000 conversions, 500 holds, two tiles for 10 ms
     let wanted = [4e-9 + 2e-11, 8e-9 + 2e-12 + 2e-11, 16e-9 + 2e-12 + 2e-11];

@@ -61,12 +61,14 @@ fn windows() -> impl Strategy<Value = Run> {
                 initial: InitialLevels::Uniform { gain_64ths: [96, 64] },
                 constant_row: raw[1] % 3 == 0,
                 convolution: None,
+                copies: 1,
                 pool: Pool::None,
                 homeostasis,
             };
             let mut layers = vec![LayerSpec {
                 driven_by: DrivenBy::Shared,
                 convolution: Some(shape),
+                copies: 1,
                 pool,
                 ..layer(shape.rows(), units, false, first)
             }];
@@ -142,6 +144,12 @@ proptest! {
             let smaller = |h: &mut HardwareSpec| (h.tile.rows, h.tile.columns) = (7, 5);
             cut.experiment.hardware = cut.experiment.hardware.with(smaller).unwrap();
             prop_assert_eq!(&whole(&cut, Backend::best(), 1), &want, "cut into tiles of 7 x 5");
+        }
+        let mut shared = run.clone();
+        let first = &mut shared.experiment.network.layers[0];
+        first.copies = first.positions().min(2 + run.stop as usize);
+        if shared.experiment.check().is_ok() {
+            prop_assert_eq!(&whole(&shared, Backend::best(), 1), &want, "shared out among copies");
         }
     }
 }

@@ -78,8 +78,9 @@ impl TickLayer {
 
     /// The reads that come are added up, or are not.
     pub(super) fn note(&mut self, on: bool) {
+        self.set_up();
         if self.balancing.is_some() {
-            self.tiles.iter_mut().for_each(|tile| tile.note(on));
+            self.all_tiles().for_each(|tile| tile.note(on));
         }
     }
 
@@ -181,8 +182,9 @@ impl Network {
             if self.layers[layer].balancing.as_ref().is_some_and(|of| of.threshold) {
                 for target in self.layers[layer].targets() {
                     let code = self.layers[layer].unit_code(target);
-                    // a sum of 64 bits is fetched and stored
-                    let bits = 2 * 64 * self.layers[layer].columns as u64;
+                    // a sum of 64 bits is fetched and stored, of every copy
+                    let (units, copies) = (self.layers[layer].columns, self.layers[layer].copies());
+                    let bits = 2 * 64 * (units * copies) as u64;
                     self.charge(layer, code, During::Update, Event::SramBits, bits);
                 }
             }

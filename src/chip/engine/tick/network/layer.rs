@@ -4,13 +4,14 @@
 //! tiles[(plane * down + tile row) * across + tile column]        a plane is a pair of banks of a target
 //! ```
 //!
-//! A target's first plane has the heads of its columns: what all its planes read is added up there.
+//! A target's first plane has the heads of its columns: what all its planes read is added up there. Of arrays that stand on the chip
+//! more than once these are the tiles of the first copy; the others are in `copies`.
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
 use std::ops::Range;
 use std::sync::Arc;
 
-use super::super::tile::{BankEvents, Command, Launch, Memories, Tile, TileEvents, TileSize};
+use super::super::tile::{Command, Memories, Tile, TileSize};
 use super::balance::Balancing;
 use super::normalise::{Normal, Normaliser};
 use super::pool::Pooler;
@@ -23,6 +24,7 @@ use crate::num::fixed::DriveBits;
 use crate::num::tables::{Activation, Gaussian};
 
 mod build;
+mod copies;
 mod draws;
 mod noise;
 mod optimise;
@@ -82,8 +84,10 @@ pub(super) struct TickLayer {
     programming: Option<noise::Loads>,
     /// Writes of every array so far.
     writes: u64,
-    /// On their way through a tree: cycles left, the head they go to, from columns, sums.
-    tree: Vec<(u64, usize, bool, Launch)>,
+    /// On their way through the tree.
+    tree: Vec<copies::InTree>,
+    /// Copies of all tiles beside the first.
+    beside: Vec<copies::ArrayCopy>,
     /// Cycles through the tree over rows and over columns.
     delay: [u64; 2],
     /// Requests of whole batches.
@@ -151,6 +155,7 @@ impl TickLayer {
             programming: noise::loads(hardware),
             writes: layer.writes.first().copied().unwrap_or(0),
             tree: vec![],
+            beside: vec![],
             delay: added.map(|tiles| timing.beat * tree_levels(tiles as u64)),
             batch: optimise::Batch::new(timing, layer, grid),
         };
@@ -172,6 +177,7 @@ impl TickLayer {
         this.stick(hardware);
         this.load_state(layer);
         this.load_words(layer);
+        this.copy(layer.spec.copies);
         this
     }
 
@@ -287,7 +293,9 @@ impl TickLayer {
     pub(super) fn count_loads(&mut self, array: usize, row: usize) {
         for column in 0..self.columns {
             let (tile, bank, row, column) = self.cell(array, row * self.columns + column);
-            self.tiles[tile].count_load(bank, [row, column], self.writes);
+            let writes = self.writes;
+            self.tiles[tile].count_load(bank, [row, column], writes);
+            self.likes(tile).for_each(|other| other.count_load(bank, [row, column], writes));
         }
     }
 
@@ -310,6 +318,7 @@ impl TickLayer {
         for (column, &level) in levels.iter().enumerate() {
             let (tile, bank, row, column) = self.cell(array, row * self.columns + column);
             self.tiles[tile].load_level(bank, row, column, level);
+            self.likes(tile).for_each(|other| other.load_level(bank, row, column, level));
         }
         self.wiring.pathways()[array].code
     }
@@ -330,7 +339,9 @@ impl TickLayer {
                 }
                 for across in 0..self.grid[1] {
                     let tile = self.at(plane, row / self.tile[0], across);
-                    self.tiles[tile].load_drive(bank, slot, row % self.tile[0], code);
+                    let row = row % self.tile[0];
+                    self.tiles[tile].load_drive(bank, slot, row, code);
+                    self.likes(tile).for_each(|other| other.load_drive(bank, slot, row, code));
                 }
             }
         }
@@ -401,15 +412,6 @@ impl TickLayer {
         }
     }
 
-    /// What the last transposed read gave, by row.
-    pub(super) fn backward_sums(&self) -> Vec<i64> {
-        let sum = |row: usize| {
-            let head = &self.tiles[self.at(self.heads(Stream::P), row / self.tile[0], 0)];
-            head.backward_sum(row % self.tile[0])
-        };
-        (0..self.inputs).map(sum).collect()
-    }
-
     /// Gates of a sample go down from the heads of the columns.
     pub(super) fn share_gates(&mut self, sample: usize) {
         let positions = self.positions();
@@ -424,6 +426,7 @@ impl TickLayer {
                 for down in 0..self.grid[0] {
                     let tile = self.at(plane, down, across);
                     self.tiles[tile].set_gates(slot, &gates);
+                    self.likes(tile).for_each(|other| other.set_gates(slot, &gates));
                 }
             }
         }
@@ -433,7 +436,9 @@ impl TickLayer {
     pub(super) fn written(&mut self) {
         self.move_means();
         self.writes += 1;
-        self.tiles.iter_mut().for_each(|tile| tile.forget(self.writes));
+        let writes = self.writes;
+        self.all_tiles().for_each(|tile| tile.forget(writes));
+        self.assert_alike();
     }
 
     /// Whether a command concerns a tile: words go to heads, transposed reads to target p.
@@ -451,11 +456,11 @@ impl TickLayer {
     pub(super) fn ready(&self, command: &Command<'_>) -> bool {
         let reads = matches!(command, Command::Forward { .. } | Command::Columns { .. });
         let waits = !reads && !self.tree.is_empty();
-        !waits && self.tiles.iter().all(|tile| tile.ready(command))
+        !waits && self.tiles.iter().all(|tile| tile.ready(command)) && self.others_ready(command)
     }
 
     pub(super) fn idle(&self) -> bool {
-        self.tree.is_empty() && self.tiles.iter().all(Tile::idle)
+        self.tree.is_empty() && self.tiles.iter().all(Tile::idle) && self.others_idle()
     }
 
     /// One cycle of all tiles and of the tree between them.
@@ -465,6 +470,7 @@ impl TickLayer {
             Some(&Command::Write { shift }) => self.begin_write(shift),
             _ => {}
         }
+        self.cycle_beside(command);
         for tile in 0..self.tiles.len() {
             let command = command.filter(|command| self.concerns(command, tile));
             self.tiles[tile].set_writes(self.writes);
@@ -489,43 +495,6 @@ impl TickLayer {
         }
     }
 
-    fn tree(&mut self) {
-        self.tree.iter_mut().for_each(|entry| entry.0 -= 1);
-        while self.tree.first().is_some_and(|entry| entry.0 == 0) {
-            let (_, head, columns, launch) = self.tree.remove(0);
-            self.tiles[head].arrive(launch, columns);
-        }
-        for (head, columns, launch) in self.launched() {
-            match self.delay[usize::from(columns)] {
-                0 => self.tiles[head].arrive(launch, columns),
-                delay => self.tree.push((delay, head, columns, launch)),
-            }
-        }
-    }
-
-    /// What left the tiles in this cycle, added up for the head it goes to.
-    fn launched(&mut self) -> Vec<(usize, bool, Launch)> {
-        let mut heads: Vec<(usize, bool, Launch)> = Vec::new();
-        for tile in 0..self.tiles.len() {
-            let Some((launch, columns)) = self.tiles[tile].take_launch() else { continue };
-            let head = match columns {
-                false => {
-                    let heads = self.heads(self.planes[self.plane(tile)].0);
-                    self.at(heads, 0, tile % self.grid[1])
-                }
-                true => tile / self.grid[1] * self.grid[1],
-            };
-            match heads.iter_mut().find(|other| other.0 == head) {
-                Some((_, _, total)) => {
-                    assert_eq!(total.slot, launch.slot, "tiles of a layer are in step");
-                    total.sums.iter_mut().zip(launch.sums).for_each(|(sum, more)| *sum += more);
-                }
-                None => heads.push((head, columns, launch)),
-            }
-        }
-        heads
-    }
-
     /// Whether the lanes of the largest tile have seen the last group of a read in this cycle.
     pub(super) fn looked_up(&self) -> bool {
         self.tiles[0].looked_up()
@@ -540,7 +509,7 @@ impl TickLayer {
         })
     }
 
-    /// Parts at work in the cycle that begins, in the order of `Part`. The first tile is the largest.
+    /// Parts of the first copy at work in the cycle that begins, in the order of `Part`. The first tile is the largest.
     pub(super) fn at_work(&self) -> [u64; 8] {
         let tile = &self.tiles[0];
         let in_tree = self.tree.iter().filter(|entry| entry.1 == 0).count() as u64;
@@ -550,7 +519,7 @@ impl TickLayer {
         [arrays, converters, in_tree, lanes, bus, multipliers, accumulators, writers]
     }
 
-    /// What each part of each tile is at in the cycle that begins, in the order of tiles: tile, part, sample, slice. What is
+    /// What each part of each tile of the first copy is at in the cycle that begins, in the order of tiles: tile, part, sample, slice. What is
     /// in the tree belongs to the tile it goes to, and there may be several there at once.
     pub(super) fn doing(&self) -> impl Iterator<Item = (usize, Part, [Option<usize>; 2])> + '_ {
         const PARTS: [Part; 7] = [
@@ -569,24 +538,5 @@ impl TickLayer {
         let tree = self.tree.iter();
         let on = |slot| [Some(slot / self.positions()), None];
         tiles.chain(tree.map(move |entry| (entry.1, Part::Tree, on(entry.3.slot))))
-    }
-
-    /// What was counted since the last call, by plane: banks, and what is beside them.
-    pub(super) fn take_events(&mut self) -> Vec<(Stream, [BankEvents; 2], TileEvents)> {
-        let mut all = Vec::new();
-        for plane in 0..self.planes.len() {
-            let mut banks = [BankEvents::default(); 2];
-            let mut events = TileEvents::default();
-            for down in 0..self.grid[0] {
-                for across in 0..self.grid[1] {
-                    let tile = self.at(plane, down, across);
-                    let (tile_banks, tile_events) = self.tiles[tile].take_events();
-                    banks.iter_mut().zip(&tile_banks).for_each(|(sum, more)| sum.merge(more));
-                    events.merge(&tile_events, across == 0);
-                }
-            }
-            all.push((self.planes[plane].0, banks, events));
-        }
-        all
     }
 }

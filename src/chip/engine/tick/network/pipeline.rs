@@ -1,7 +1,7 @@
 //! Reads of layers in a pipeline: a layer takes a sample when the one below has handed it on; stages behind a layer, which no
 //! command begins, take a sample each.
 //!
-//! A convolution is read once a position, read after read; a sample is handed on after its last.
+//! A convolution is read once a position, read after read, or as many at a time as its arrays have copies; a sample is handed on after its last.
 #![deny(clippy::float_arithmetic, clippy::disallowed_types, clippy::disallowed_methods)]
 
 use std::ops::Range;
@@ -41,7 +41,7 @@ impl Network {
                 self.account(layer, During::ForwardRows, offer);
                 self.layers[layer].cycle(given.as_ref(), &[]);
                 if given.is_some() {
-                    issued[layer] += 1;
+                    issued[layer] += self.layers[layer].together(issued[layer]);
                     offered[layer] = 0;
                 }
             }
@@ -51,7 +51,8 @@ impl Network {
                     done[layer] += 1;
                 }
                 if self.layers[layer].looked_up() {
-                    seen[layer] += 1;
+                    self.layers[layer].gather_units(seen[layer]);
+                    seen[layer] += self.layers[layer].together(seen[layer]);
                     // the last read of a sample
                     if seen[layer].is_multiple_of(positions[layer]) {
                         let sample = seen[layer] / positions[layer] - 1;
@@ -67,6 +68,7 @@ impl Network {
         for layer in layers {
             self.take_events(layer, During::ForwardRows, false);
             self.layers[layer].take_rails(training);
+            self.layers[layer].gather_readings();
         }
     }
 
@@ -75,6 +77,7 @@ impl Network {
         let start = self.clock;
         let (positions, beat) = (self.layers[layer].positions(), self.timing.beat);
         let during = During::ForwardColumns;
+        self.layers[layer].set_up();
         let (mut issued, mut seen, mut offered, mut added) = (0, 0, 0, 0);
         while seen < positions {
             self.begin(Interval::Columns);
@@ -85,13 +88,17 @@ impl Network {
             self.account(layer, during, offer);
             self.layers[layer].cycle(given.as_ref(), &[]);
             if given.is_some() {
-                issued += 1;
+                issued += self.layers[layer].together(issued);
                 offered = 0;
             }
             self.end();
             if self.layers[layer].looked_up() {
-                added += self.layers[layer].keep_backward((sample, self.samples), seen);
-                seen += 1;
+                let this = &mut self.layers[layer];
+                let together = seen..seen + this.together(seen);
+                for position in together.clone() {
+                    added += this.keep_backward((sample, self.samples), position);
+                }
+                seen = together.end;
             }
         }
         let span = Span {

@@ -11,6 +11,7 @@ use crate::chip::hardware::{Adc, AdcRange, Hardware, HardwareSpec, Subtract, Win
 use crate::chip::layer::{
     Delivery, DrivenBy, Gain, Homeostasis, InitialLevels, Layer, LayerSpec, Optimiser, Pool, Taps,
 };
+use crate::chip::ledger::{During, Event};
 use crate::chip::population::{Stream, Wiring};
 use crate::num::fixed::{AdcBits, DriveBits, LevelBits, ResidualBits};
 use crate::num::tables::Activation;
@@ -87,6 +88,7 @@ fn convolution(
         initial: InitialLevels::Uniform { gain_64ths: [64, 64] },
         constant_row: rows,
         convolution: Some(shape),
+        copies: 1,
         pool: match (fits, greatest) {
             (false, _) => Pool::None,
             (true, true) => Pool::Max { side: pool },
@@ -186,7 +188,10 @@ fn net() -> impl Strategy<Value = Net> {
                 let (channels, image) =
                     convolutions.last().map_or((channels, image), |l| (l.units, l.pooled()));
                 let spec = convolution(channels, image, wish, rows);
-                convolutions.push(LayerSpec { wiring: wirings[0], ..spec });
+                let most = spec.positions().min(7);
+                let copies =
+                    1 + number(seed, 31 + convolutions.len(), 2 * most).saturating_sub(most);
+                convolutions.push(LayerSpec { wiring: wirings[0], copies, ..spec });
             }
             convolutions[0].driven_by = DrivenBy::Shared;
             let (optimiser, centred) = match mode {
@@ -207,6 +212,13 @@ fn net() -> impl Strategy<Value = Net> {
 }
 
 impl Net {
+    /// The same on arrays that stand once.
+    fn alone(&self) -> Self {
+        let mut alone = self.clone();
+        alone.convolutions.iter_mut().for_each(|one| one.copies = 1);
+        alone
+    }
+
     fn layers(&self) -> Vec<Layer> {
         let last = self.convolutions.last().expect("there is one");
         let output = LayerSpec {
@@ -215,6 +227,7 @@ impl Net {
             wiring: self.wirings[1],
             driven_by: DrivenBy::Streams,
             convolution: None,
+            copies: 1,
             pool: Pool::None,
             activation: Activation::Relu,
             homeostasis: Homeostasis::OFF,
@@ -330,7 +343,7 @@ proptest! {
 
     #[test]
     fn a_convolution_takes_the_cycles_of_its_closed_form(mut net in net()) {
-        // one chip in three has noisy conversions, one in three stuck cells
+        // one chip in three has noisy conversions, one in three stuck cells, which no two copies would share
         let share = Chance::new(1 << 29).unwrap();
         let faults = Faults { floor: share, ceiling: share, any: share };
         let flaws = |h: &mut HardwareSpec| {
@@ -338,6 +351,9 @@ proptest! {
             h.read_noise = (net.seed / 3 % 3 == 0).then_some(ReadNoise { sigma: 1 << 14 });
         };
         net.chip = net.chip.with(flaws).unwrap();
+        if net.chip.differs_by_cell().is_some() {
+            net.convolutions.iter_mut().for_each(|one| one.copies = 1);
+        }
         let mut engine = net.engine();
         let _ = engine.calibrate(&net.codes(9, 3));
         let slots = *net.batches.iter().max().unwrap();
@@ -381,6 +397,52 @@ proptest! {
             for (sample, unit) in outputs {
                 let got = tick.output(Stream::P, sample, unit);
                 prop_assert_eq!(engine.output(Stream::P, sample, unit), got);
+            }
+        }
+    }
+
+    #[test]
+    fn copies_move_no_result_and_multiply_what_writes_take(net in net()) {
+        let both = [&net, &net.alone()].map(|net| {
+            let mut engine = net.engine();
+            let _ = engine.calibrate(&net.codes(9, 3));
+            let levels = vec![5; net.convolutions[0].units];
+            engine.execute(&Operation::LoadWeights { layer: 0, array: 0, row: 0, levels: &levels });
+            (0..net.batches.len()).for_each(|batch| net.batch(&mut engine, batch));
+            engine.settle();
+            engine
+        });
+        let [shared, alone] = &both;
+        let ledgers = [shared, alone].map(|engine| engine.ledger(Phase::Training));
+        for (at, layer) in shared.layers().iter().enumerate() {
+            let copies = layer.spec.copies as u64;
+            let own = alone.layers()[at].arrays.iter();
+            for (array, own) in layer.arrays.iter().zip(own) {
+                prop_assert!(array.levels().eq(own.levels()), "levels of {}", at);
+            }
+            for pathway in layer.spec.wiring.pathways() {
+                let [this, that] =
+                    ledgers.map(|ledger| |event| ledger.of_pathway(at, pathway.code, event));
+                for event in Event::ALL {
+                    let wanted = match event {
+                        Event::RowPulses | Event::VerifyReads => copies * that(event),
+                        Event::PulsesCopied => (copies - 1) * that(Event::PulsesAttempted),
+                        Event::LoadsCopied => (copies - 1) * that(Event::CellLoads),
+                        // sums of thresholds beside, of every copy
+                        Event::SramBits if layer.balance.law().threshold => continue,
+                        _ => that(event),
+                    };
+                    prop_assert_eq!(this(event), wanted, "{} of {}", event.name(), at);
+                }
+            }
+            let turns = layer.spec.positions().div_ceil(layer.spec.copies);
+            let [this, that] = ledgers.map(|ledger| {
+                let cycles = ledger.cycles().unwrap();
+                [During::ForwardRows, During::ForwardColumns].map(|during| cycles.busy(at, during))
+            });
+            for (this, that) in this.into_iter().zip(that) {
+                let wanted = that / layer.spec.positions() as u64 * turns as u64;
+                prop_assert_eq!(this, wanted, "cycles of reads of {}", at);
             }
         }
     }

@@ -63,6 +63,15 @@ impl Tile {
         }
     }
 
+    /// Takes what another copy has added up.
+    pub(in super::super) fn take_readings(&mut self, other: &mut Self) {
+        let more = std::mem::take(&mut other.readings);
+        let sums = self.readings.sums.iter_mut().zip(more.sums);
+        sums.for_each(|(sum, more)| *sum += more);
+        self.readings.squares += more.squares;
+        self.readings.reads += more.reads;
+    }
+
     pub(in super::super) const fn readings(&self) -> &TileReadings {
         &self.readings
     }

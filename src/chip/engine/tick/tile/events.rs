@@ -36,6 +36,8 @@ pub struct BankEvents {
     pub sum_squares: u64,
     /// Only in networks: sums that an optimiser asked for something by.
     pub optimiser_steps: u64,
+    /// Only in networks: pulses given to a further copy of an array.
+    pub pulses_copied: u64,
 }
 
 /// Counters of a tile, in the order of docs/TILE.md, 6.
@@ -62,6 +64,23 @@ pub struct TileEvents {
 }
 
 impl BankEvents {
+    /// What of it a copy of an array beside the first counts: its reads and its pulses, not what is formed for all of them.
+    #[must_use]
+    pub(in super::super) const fn of_copy(self) -> Self {
+        Self {
+            accumulates: 0,
+            delta_computations: 0,
+            requested: 0,
+            bounded: 0,
+            pulses_attempted: 0,
+            pulses_effective: 0,
+            sum_squares: 0,
+            optimiser_steps: 0,
+            pulses_copied: self.pulses_attempted,
+            ..self
+        }
+    }
+
     pub(in super::super) const fn merge(&mut self, more: &Self) {
         self.cell_loads += more.cell_loads;
         self.dac_slices += more.dac_slices;
@@ -79,6 +98,7 @@ impl BankEvents {
         self.verify_reads += more.verify_reads;
         self.sum_squares += more.sum_squares;
         self.optimiser_steps += more.optimiser_steps;
+        self.pulses_copied += more.pulses_copied;
     }
 }
 

@@ -102,6 +102,38 @@ impl Tile {
         self.gate[slot * self.size.columns..][..gates.len()].copy_from_slice(gates);
     }
 
+    /// Registers that say how to read, and by which numbers to write, are those of another copy.
+    pub(in super::super) fn set_up(&mut self, first: &Self) {
+        self.config.clone_from(&first.config);
+    }
+
+    /// Whether its first row is about to be computed, of a write.
+    pub(in super::super) fn begins_to_write(&self) -> bool {
+        let computes = self.upd.phase == UpdPhase::Compute && self.upd.kind != UpdKind::Add;
+        self.upd.busy && computes && self.upd.row == 0 && self.upd.beat == 0 && !self.has_computed()
+    }
+
+    /// Begins the write that the first copy begins: what is asked of its cells is what is asked of those.
+    pub(in super::super) fn write_as(&mut self, first: &Self) {
+        self.set_up(first);
+        self.sum.clone_from(&first.sum);
+        self.kept.clone_from(&first.kept);
+        self.upd.clone_from(&first.upd);
+    }
+
+    /// Takes over what lanes of another copy have looked up of a read.
+    pub(in super::super) fn take_units(&mut self, other: &Self, slot: usize) {
+        let read = slot * self.size.columns..(slot + 1) * self.size.columns;
+        self.value[read.clone()].copy_from_slice(&other.value[read.clone()]);
+        self.slope[read.clone()].copy_from_slice(&other.slope[read]);
+    }
+
+    /// Whether its cells and their remainders are those of another copy.
+    pub(in super::super) fn is_like(&self, first: &Self) -> bool {
+        (&self.level, &self.pruned, &self.residual)
+            == (&first.level, &first.pruned, &first.residual)
+    }
+
     /// Whether the last group of a sample was looked up in the cycle that has just ended.
     pub(in super::super) const fn looked_up(&self) -> bool {
         self.looked_up

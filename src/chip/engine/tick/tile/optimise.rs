@@ -119,6 +119,11 @@ impl Tile {
         pulse
     }
 
+    /// Whether beats of the row in progress have passed.
+    pub(super) const fn has_computed(&self) -> bool {
+        self.kept.beats > 0
+    }
+
     /// Whether the beats that a row takes to be computed are over, with the one that has just ended.
     pub(super) const fn computed(&mut self) -> bool {
         self.kept.beats += 1;

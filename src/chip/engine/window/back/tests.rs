@@ -56,6 +56,7 @@ fn convolution(channels: usize, [height, width]: [usize; 2], wish: Wish) -> Laye
         initial: InitialLevels::Uniform { gain_64ths: [64, 64] },
         constant_row: false,
         convolution: Some(shape),
+        copies: 1,
         pool: match (fits, greatest) {
             (false, _) => Pool::None,
             (true, true) => Pool::Max { side: pool },
@@ -130,6 +131,7 @@ impl Net {
             inputs: last.sample_outputs(),
             units: OUTPUTS,
             convolution: None,
+            copies: 1,
             pool: Pool::None,
             ..last.clone()
         };
@@ -208,6 +210,7 @@ impl Net {
             units: shape.positions() * own.units,
             driven_by: DrivenBy::Streams,
             convolution: None,
+            copies: 1,
             pool: Pool::None,
             ..own.clone()
         };

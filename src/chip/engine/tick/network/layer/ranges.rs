@@ -19,7 +19,7 @@ impl TickLayer {
     pub(in super::super) fn take_rails(&mut self, counted: bool) {
         for tile in 0..self.tiles.len() {
             let (target, _) = self.planes[self.plane(tile)];
-            let seen = self.tiles[tile].take_rails();
+            let seen = self.take_rails_of(tile);
             if let Some(rails) = self.rails.get_mut(target.index()).filter(|_| counted) {
                 let both = rails.iter_mut().flatten().zip(seen.into_iter().flatten());
                 both.for_each(|(sum, more)| *sum += more);

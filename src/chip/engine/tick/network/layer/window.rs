@@ -123,7 +123,7 @@ impl TickLayer {
         (sample, samples): (usize, usize),
         position: usize,
     ) -> u64 {
-        let (size, sums) = (self.sample_sums(), self.backward_sums());
+        let (size, sums) = (self.sample_sums(), self.backward_sums(position % self.copies()));
         self.backward.resize(samples * size, 0);
         let kept = &mut self.backward[sample * size..(sample + 1) * size];
         let Some(shape) = self.window.shape else {
