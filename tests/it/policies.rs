@@ -60,8 +60,13 @@ fn a_policy_is_the_same_on_every_back_end_and_any_number_of_threads() {
 
 #[test]
 fn a_policy_that_was_stopped_goes_on_to_the_same_bits_and_is_verified() {
-    for input in ["split", "signed"] {
-        stopped_and_verified(&config(&["environment.steps=48", &format!("network.input={input}")]));
+    for settings in [
+        &["network.input=split"][..],
+        &["network.input=signed"],
+        &["network.activation=ramp", "network.threshold=true", "network.gain=tracking"],
+        &["network.activation=ramp"],
+    ] {
+        stopped_and_verified(&config(&[&["environment.steps=48"], settings].concat()));
     }
 }
 
@@ -132,6 +137,12 @@ fn a_seed_and_an_environment_make_another_policy() {
         of(&["learning.control=same_sign_hidden"]),
         of(&["learning.control=same_sign"]),
         of(&["environment.id=Pendulum-v1", "ppo.noise_steps=3"]),
+        of(&["network.activation=ramp"]),
+        of(&["network.activation=ramp", "network.gain_spread=1"]),
+        of(&["network.activation=ramp", "network.threshold=true"]),
+        of(&["network.activation=ramp", "network.gain=tracking", "network.homeostasis_window=8"]),
+        of(&["network.activation=relu"]),
+        of(&["network.activation=relu", "network.threshold=true"]),
         of(&["learning.optimiser=momentum", "learning.rate=30"]),
         of(&["learning.optimiser=momentum", "learning.rate=30", "learning.momentum_shift=1"]),
         of(&["learning.optimiser=adam_fx", "learning.rate=0.02"]),
@@ -239,6 +250,9 @@ fn keys_of_one_task_are_refused_in_the_other_and_say_what_to_use() {
         (&["environment.id=CartPole-v2"], "environment.id", "did you mean \"CartPole-v1\"?"),
         (&["ppo.gamma=1.5"], "ppo.gamma", "0..=1"),
         (&["network.input=offset", "network.bias=none"], "network.input", "input_row"),
+        (&["network.homeostasis_window=512"], "network.homeostasis_window", "network.threshold"),
+        (&["network.gain_spread=1"], "network.gain_spread", "fixed"),
+        (&["network.threshold=true", "network.hidden=[]"], "network.threshold", "no hidden layer"),
         (&["task=classify"], "environment", "task = \"policy\""),
     ] {
         let settings: Vec<String> = settings.iter().map(ToString::to_string).collect();
@@ -269,6 +283,37 @@ fn what_cannot_be_taken_away_is_refused() {
 }
 
 #[test]
+fn middles_that_do_not_fit_are_refused() {
+    for (settings, key, words) in [
+        (&["network.threshold=true"][..], "network.threshold", "normalised"),
+        (&["network.gain=fixed"], "network.gain", "normalised"),
+        (&["network.activation=ramp", "network.gain=table"], "network.gain", "deviations"),
+        (&["network.activation=relu", "network.gain=tracking"], "network.gain", "no ramp"),
+        (
+            &["network.activation=ramp", "network.threshold=true", "network.homeostasis_window=4"],
+            "network.homeostasis_window",
+            "holds a batch",
+        ),
+        (&["network.activation=ramp", "network.input=signed"], "network.input", "signed"),
+    ] {
+        let error = config(settings).policy_experiment().unwrap_err().to_string();
+        assert!(error.starts_with(&format!("`{key}`")) && error.contains(words), "{error}");
+    }
+    let of = |settings: &[&str]| {
+        let text = "task = 'policy'\nlearning = { rule = 'es' }\nnetwork = { activation = 'ramp' }";
+        let settings: Vec<String> = settings.iter().map(ToString::to_string).collect();
+        let experiment = Some(("es", text));
+        let config = load(&Sources { experiment, settings: &settings, ..Sources::default() });
+        config.unwrap().policy_experiment().map(drop).map_err(|error| error.to_string())
+    };
+    assert_eq!(of(&[]), Ok(()));
+    for setting in ["network.threshold=true", "network.gain=tracking"] {
+        let error = of(&[setting]).unwrap_err();
+        assert!(error.contains("evolution loads"), "{error}");
+    }
+}
+
+#[test]
 fn rules_of_one_stream_of_pairs_are_pulsed_twice_as_often_by_default() {
     for (settings, rate) in [
         (&["learning.rule=ed"][..], "0.25"),
@@ -285,7 +330,11 @@ fn rules_of_one_stream_of_pairs_are_pulsed_twice_as_often_by_default() {
 
 #[test]
 fn a_resolved_policy_resolves_to_itself() {
-    for settings in [&[][..], &["environment.id=Pendulum-v1", "learning.optimiser=plain"]] {
+    for settings in [
+        &[][..],
+        &["environment.id=Pendulum-v1", "learning.optimiser=plain"],
+        &["network.activation=ramp", "network.threshold=true"],
+    ] {
         let first = config(settings);
         let text = first.to_toml();
         let again = load(&Sources { experiment: Some(("it", &text)), ..Sources::default() });

@@ -237,8 +237,7 @@ impl Engine {
 
     /// Whether thresholds or steps of a layer move after writes.
     pub(super) fn balances(&self, layer: usize) -> bool {
-        let balance = &self.layers[layer].balance;
-        balance.law().threshold || balance.tracks()
+        self.layers[layer].balance.law().moves()
     }
 
     /// Writes are done: thresholds and steps move by what was read before them.

@@ -78,6 +78,12 @@ impl Homeostasis {
     pub const fn is_on(self) -> bool {
         self.threshold || !matches!(self.gain, Gain::Table)
     }
+
+    /// Whether writes move what units do beside their table.
+    #[must_use]
+    pub(crate) const fn moves(self) -> bool {
+        self.threshold || matches!(self.gain, Gain::Tracking)
+    }
 }
 
 impl Default for Homeostasis {

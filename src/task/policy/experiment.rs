@@ -130,6 +130,19 @@ impl PolicyExperiment {
         self
     }
 
+    /// Thresholds and gains that track move after writes, of which evolution has none.
+    fn middles(&self, network: &NetworkSpec) -> Result<(), NetworkError> {
+        let moves = network.layers.iter().map(|layer| layer.homeostasis).find(|law| law.moves());
+        let (Method::Evolution(_), Some(law)) = (self.method, moves) else { return Ok(()) };
+        let (key, found) = match law.threshold {
+            true => ("network.threshold", "is true"),
+            false => ("network.gain", "is \"tracking\""),
+        };
+        let allowed =
+            "it moves after writes, and evolution loads: use a gain that is \"fixed\", or none";
+        Err(NetworkError::misfit(key, format_args!("{found} with evolution"), allowed))
+    }
+
     /// Checks that everything fits together, on the chip, and with the environment.
     ///
     /// # Errors
@@ -180,11 +193,7 @@ impl PolicyExperiment {
                 let allowed = "a policy reads the accumulators of both streams: use \"p-n\"";
                 return Err(NetworkError::misfit("network.readout", "is not \"p-n\"", allowed));
             }
-            if network.layers.iter().any(|layer| layer.homeostasis.is_on()) {
-                let allowed =
-                    "thresholds and gains follow batches of examples; layers of policies have none";
-                return Err(NetworkError::misfit("network.threshold", "is given", allowed));
-            }
+            self.middles(network)?;
         }
         let layers = self.actor.layers.iter().chain(&self.critic.layers);
         NetworkError::listed(&self.hardware.fault_map, (0..).zip(layers), Listed::All)?;

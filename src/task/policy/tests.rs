@@ -20,6 +20,7 @@ use crate::num::fixed::{Batch, RateMantissa};
 use crate::num::tables::{Activation, Decay, Positive};
 use crate::task::environment::{self, EnvSource, EnvSpec, Replaying};
 
+mod middles;
 mod outside;
 
 /// Everything that a state shows, as text; and, where it is told to, what a state is to be replaced by.

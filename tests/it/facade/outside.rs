@@ -30,6 +30,18 @@ fn observations(c: &mut Choices<'_>, spec: &EnvSpec, count: usize) -> Observatio
     shown
 }
 
+/// What hidden units keep to, and their function: mostly what goes together.
+fn middle(c: &mut Choices<'_>) -> (Homeostasis, Activation) {
+    let gain = match c.byte() % 3 {
+        0 => Gain::Fixed { spread: c.near(0, 2) as u32 },
+        1 => Gain::Tracking,
+        _ => Gain::Table,
+    };
+    let ramp = (gain != Gain::Table) != c.one_in(16);
+    let law = Homeostasis { threshold: c.one_in(2), gain, window_log2: c.near(4, 24) as u32 };
+    (law, if ramp { Activation::Ramp } else { Activation::Relu })
+}
+
 /// A policy that is trained from outside.
 pub(super) fn policy(c: &mut Choices<'_>) {
     let spec = EnvSpec {
@@ -49,7 +61,7 @@ pub(super) fn policy(c: &mut Choices<'_>) {
         255 => Share::from_bits(c.word() as u32),
         byte => Share::from_num(f32::from(byte) / 255.0),
     };
-    let policy = |outputs| NetworkSpec {
+    let policy = |outputs, homeostasis: Homeostasis, hidden: Activation| NetworkSpec {
         rule: Rule::Ed,
         mode: UpdateMode::Accumulate,
         error: OutputError::OneVsAll,
@@ -69,21 +81,29 @@ pub(super) fn policy(c: &mut Choices<'_>) {
                 inputs,
                 units,
                 wiring: Wiring::Dual,
-                driven_by: if inputs == 1 { DrivenBy::Shared } else { DrivenBy::Normalised },
-                activation: if inputs == 1 { Activation::Rms } else { Activation::Accumulator },
+                driven_by: match inputs {
+                    1 => DrivenBy::Shared,
+                    _ if hidden == Activation::Rms => DrivenBy::Normalised,
+                    _ => DrivenBy::Streams,
+                },
+                activation: if inputs == 1 { hidden } else { Activation::Accumulator },
                 weight_max_log2: 0,
                 initial: InitialLevels::AbsGaussian { gain: [1, 1] },
                 constant_row: inputs == 1,
                 convolution: None,
                 copies: 1,
                 pool: Pool::None,
-                homeostasis: Homeostasis::OFF,
+                homeostasis: if inputs == 1 { homeostasis } else { Homeostasis::OFF },
             })
             .collect(),
     };
-    let own = |c: &mut Choices<'_>, outputs| match c.one_in(16) {
-        true => network(c, 1, outputs),
-        false => policy(outputs),
+    let own = |c: &mut Choices<'_>, outputs| match c.byte() % 16 {
+        15 => network(c, 1, outputs),
+        11..15 => {
+            let (law, hidden) = middle(c);
+            policy(outputs, law, hidden)
+        }
+        _ => policy(outputs, Homeostasis::OFF, Activation::Rms),
     };
     let experiment = PolicyExperiment {
         seed: c.word(),

@@ -12,7 +12,7 @@ use dalean::hardware::{
     SliceTimes, Subtract, TileSpec, Timing, Window, WriteScheme, WriteSpec,
 };
 use dalean::network::{
-    Activation, Augment, Batch, Centre, Coding, Control, Decay, DrivenBy, Homeostasis,
+    Activation, Augment, Batch, Centre, Coding, Control, Decay, DrivenBy, Gain, Homeostasis,
     InitialLevels, LayerSpec, Optimiser, OutputError, Pool, Positive, RateMantissa, Route, Rule,
     UpdateMode, Wiring,
 };

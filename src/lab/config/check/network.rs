@@ -63,24 +63,27 @@ pub(super) fn resolve(
         weight_max_log2: weights(file, fan_ins, style)?,
         bias,
         gain_64ths,
-        homeostasis: homeostasis(file, fan_ins.len() > 1, style)?,
+        homeostasis: homeostasis(file, fan_ins.len() > 1, style.middles())?,
     })
 }
 
+/// What ramps do by default beside their table; they have no step of their own.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Middles {
+    pub(super) threshold: bool,
+    /// `network.gain`.
+    pub(super) gain: &'static str,
+}
+
 /// What hidden units do beside their table.
-fn homeostasis(
+pub(super) fn homeostasis(
     file: &mut NetworkFile,
     hidden: bool,
-    style: Style,
+    of_ramps: Middles,
 ) -> Result<Homeostasis, ConfigError> {
     let ramp = file.activation.as_deref() == Some("ramp") && hidden;
-    let default = match (ramp, style.windows) {
-        (false, _) => "table",
-        // a ramp has no step of its own
-        (true, 0) => "fixed",
-        (true, _) => "tracking",
-    };
-    let threshold = *file.threshold.get_or_insert(ramp && style.keeps_middles());
+    let default = if ramp { of_ramps.gain } else { "table" };
+    let threshold = *file.threshold.get_or_insert(ramp && of_ramps.threshold);
     let gain = word("network.gain", &mut file.gain, default, &GAINS)?;
     let gain = match (gain, file.gain_spread) {
         (Gain::Fixed { .. }, _) => {
@@ -101,8 +104,7 @@ fn homeostasis(
             "hidden units alone keep to a middle, and there is no hidden layer: take it out";
         return Err(wrong(key, "is given", allowed));
     }
-    let moves = threshold || gain == Gain::Tracking;
-    match (moves, file.homeostasis_window) {
+    match (homeostasis.moves(), file.homeostasis_window) {
         (true, _) => {
             let window = *file.homeostasis_window.get_or_insert(1 << Homeostasis::OFF.window_log2);
             let log2 = (0..=WINDOW_LOG2_MAX).find(|log2| window == 1 << log2);

@@ -52,8 +52,6 @@ pub(super) fn refused_in_classification(file: &ExperimentFile) -> Result<(), Con
 fn refused_here(file: &ExperimentFile) -> Result<(), ConfigError> {
     const WINDOWS: &str =
         "it belongs to convolutions, and policies have dense layers alone: take the key out";
-    const MIDDLES: &str = "units of policies are normalised (network.activation = \"rms\"), they keep to no middle of \
-                           their own: take the key out";
     let (network, learning) = (file.network.as_ref(), file.learning.as_ref());
     refuse(&[
         (
@@ -77,14 +75,6 @@ fn refused_here(file: &ExperimentFile) -> Result<(), ConfigError> {
         ("network.pool", network.is_some_and(|n| n.pool.is_some()), WINDOWS),
         ("network.pool_side", network.is_some_and(|n| n.pool_side.is_some()), WINDOWS),
         ("network.copies", network.is_some_and(|n| n.copies.is_some()), WINDOWS),
-        ("network.threshold", network.is_some_and(|n| n.threshold.is_some()), MIDDLES),
-        ("network.gain", network.is_some_and(|n| n.gain.is_some()), MIDDLES),
-        ("network.gain_spread", network.is_some_and(|n| n.gain_spread.is_some()), MIDDLES),
-        (
-            "network.homeostasis_window",
-            network.is_some_and(|n| n.homeostasis_window.is_some()),
-            MIDDLES,
-        ),
         (
             "learning.error",
             learning.is_some_and(|l| l.error.is_some()),

@@ -1,6 +1,7 @@
 //! What a network is by default where its file is silent, beside what its data say: a net with convolutions keeps its units
 //! to a middle of their own, unless it is to be the paper's.
 
+use super::network::Middles;
 use super::wrong;
 use crate::lab::config::ConfigError;
 use crate::lab::config::defaults::SetDefaults;
@@ -56,6 +57,11 @@ impl Style {
 
     pub(super) fn hidden(self) -> Vec<usize> {
         if self.windows > 0 { vec![160] } else { self.data.hidden.to_vec() }
+    }
+
+    pub(super) const fn middles(self) -> Middles {
+        let gain = if self.windows > 0 { "tracking" } else { "fixed" };
+        Middles { threshold: self.keeps_middles(), gain }
     }
 
     /// Sigmoid width of each of so many layers.

@@ -40,6 +40,8 @@ pub(in crate::lab::config) const HORIZON: i64 = 128;
 pub(in crate::lab::config) const HIDDEN: [usize; 2] = [64, 64];
 /// Weight of the level after the greatest: of hidden layers and of the output.
 pub(in crate::lab::config) const WEIGHT_MAX: [f64; 2] = [0.5, 0.25];
+/// The same of outputs behind ramps, which put out about a quarter of what is normalised.
+pub(in crate::lab::config) const WEIGHT_MAX_BEHIND_RAMPS: f64 = 1.0;
 /// Width of sigmoids, where those are chosen.
 pub(in crate::lab::config) const ALPHA: f64 = 6.0;
 /// Steps of a minibatch.
@@ -100,9 +102,10 @@ pub(in crate::lab::config) fn multipliers(optimiser: Optimiser, layers: usize) -
     PerLayer::Each(each)
 }
 
-/// `network.weight_max` of a network of so many layers.
-pub(in crate::lab::config) fn weight_max(layers: usize) -> PerLayer<f64> {
+/// `network.weight_max` of a network of so many layers, its outputs behind ramps or not.
+pub(in crate::lab::config) fn weight_max(layers: usize, ramps: bool) -> PerLayer<f64> {
     let [hidden, of_output] = WEIGHT_MAX;
+    let of_output = if ramps { WEIGHT_MAX_BEHIND_RAMPS } else { of_output };
     let mut each = vec![hidden; layers];
     if let Some(output) = each.last_mut() {
         *output = of_output;

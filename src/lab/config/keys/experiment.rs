@@ -287,7 +287,7 @@ const NETWORK: &[KeyEntry] = &[
     flag("threshold")
         .default("false")
         .otherwise("true with convolutions whose units are ramps, but with preset = \"paper\"")
-        .law("not with task = \"policy\""),
+        .law("not with rule = \"es\""),
     words(
         "gain",
         &[
@@ -297,7 +297,8 @@ const NETWORK: &[KeyEntry] = &[
         ],
     )
     .default("\"table\"")
-    .otherwise("\"tracking\" in nets with convolutions whose units are ramps, \"fixed\" in others whose units are ramps; not with task = \"policy\""),
+    .otherwise("\"tracking\" in nets with convolutions whose units are ramps, \"fixed\" in others whose units are ramps")
+    .law("with rule = \"es\" not \"tracking\""),
     whole("gain_spread", 0, 2)
         .unit("bits")
         .default("0")
@@ -312,7 +313,7 @@ const NETWORK: &[KeyEntry] = &[
         .default("2.0")
         .otherwise(
             "4.0 with other data than the built-in digits; with convolutions, in each layer the one nearest to 13 / sqrt(inputs); \
-             0.5, and 0.25 in the output layer, with task = \"policy\"",
+             0.5, and 0.25 in the output layer, or 1.0 behind ramps, with task = \"policy\"",
         ),
     words(
         "bias",

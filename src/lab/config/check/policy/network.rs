@@ -1,6 +1,6 @@
 //! `[network]` of a policy: actor and critic.
 
-use super::super::network::{self, Network};
+use super::super::network::{self, Middles, Network};
 use super::super::{Bias, per_layer, positive, word, wrong};
 use super::refuse;
 use crate::chip::layer::Homeostasis;
@@ -57,16 +57,30 @@ pub(super) fn resolve(
         let allowed = "what a policy puts out has a sign: use \"p-n\", or take the key out";
         return Err(wrong("network.readout", "is \"p\"", allowed));
     }
-    file.weight_max.get_or_insert_with(|| defaults::weight_max(layers));
+    let ramps = is_ramp(file) && !hidden.is_empty();
+    file.weight_max.get_or_insert_with(|| defaults::weight_max(layers, ramps));
     let weights = per_layer("network.weight_max", &mut file.weight_max, 1.0, layers)?;
     let network = Network {
         activations: activations(file, hidden.len())?,
         weight_max_log2: network::logarithms(weights)?,
         bias: word("network.bias", &mut file.bias, "input_row", &network::BIASES)?,
         gain_64ths: [[64; 2]; 2],
-        homeostasis: Homeostasis::OFF,
+        homeostasis: homeostasis(file, !hidden.is_empty())?,
     };
     Ok(Made { hidden, critic_hidden, input: input(file, spec, network.bias)?, network })
+}
+
+fn is_ramp(file: &NetworkFile) -> bool {
+    file.activation.as_deref() == Some("ramp")
+}
+
+/// What hidden units of both networks do beside their table. What is normalised has none, and nothing is written back of it.
+fn homeostasis(file: &mut NetworkFile, hidden: bool) -> Result<Homeostasis, ConfigError> {
+    let beside = [file.threshold.is_some(), file.gain.is_some(), file.gain_spread.is_some()];
+    if !(is_ramp(file) || beside.contains(&true) || file.homeostasis_window.is_some()) {
+        return Ok(Homeostasis::OFF);
+    }
+    network::homeostasis(file, hidden, Middles { threshold: false, gain: "fixed" })
 }
 
 /// How numbers become drives; lines that are on are driven as they are.
