@@ -35,6 +35,7 @@ use crate::learn::network::NetworkError;
 ///     initial: InitialLevels::Uniform { gain_64ths: [96, 32] },
 ///     constant_row: true,
 ///     convolution: None,
+///     copies: 1,
 ///     pool: Pool::None,
 ///     homeostasis: Homeostasis::OFF,
 /// };
